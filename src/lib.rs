@@ -118,7 +118,7 @@
 //! scene       -> geometry materials lights sampling film math choice system
 //! assets      -> geometry materials math control system
 //! world       -> scene assets accel materials lights geometry math control
-//! film        -> math choice
+//! film        -> math choice system
 //! integrators -> world scene materials lights geometry sampling film math choice control
 //! compare     -> assets film math control
 //! output      -> film math choice control system

@@ -112,6 +112,22 @@ fn scene_must_be_a_regular_file() {
 }
 
 #[test]
+fn part_must_be_a_regular_file() {
+    for what in ["folder", "pipe", "device", "kernel"] {
+        let dir = TestDir::new();
+        let Some(words) = make(&dir.path("1.part"), what) else { continue };
+        for line in ["merge out.png 1.part", "merge --watch out.png 1.part"] {
+            let stderr = dir.expect(line, 2);
+            assert_eq!(
+                stderr,
+                format!("error: 1.part: it {} part or checkpoint\n", words[0]),
+                "{what}: {line}"
+            );
+        }
+    }
+}
+
+#[test]
 fn asset_must_be_a_regular_file() {
     for what in KINDS {
         for ending in ["obj", "off", "ply", "png", "jpg", "hdr", "exr", "txt"] {

@@ -179,13 +179,49 @@ fn missing_mtl_images_name_their_material() {
     dir.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     dir.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
     let missing = dir.expect("a.toml --once -o a.png", 2);
-    assert_mentions(&missing, &["lost.png", "\"brick\"", "a.obj"]);
+    assert_mentions(&missing, &["a.mtl:2: cannot read lost.png", "\"brick\"", "a.obj"]);
+    let shown = dir.expect("a.obj --once --width 24 --height 18 --samples 1 -o b.png", 0);
+    assert_mentions(&shown, &["warning: a.mtl:2: cannot read lost.png", "\"brick\"", "a.obj"]);
     dir.write("lost.png", "no picture");
     let wrong = dir.expect("a.toml --once -o a.png", 2);
-    assert_mentions(&wrong, &["lost.png", "\"brick\"", "a.obj"]);
+    assert_mentions(&wrong, &["a.mtl:2: ", "lost.png", "\"brick\"", "a.obj"]);
     dir.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
     let gray = dir.expect("a.toml --once -o a.png", 0);
-    assert_mentions(&gray, &["warning", "heights.pgm", "normals", "\"brick\""]);
+    assert_mentions(&gray, &["warning: a.mtl:2: ", "heights.pgm", "normals", "\"brick\""]);
+}
+
+/// Values of a model that cannot be used cause warnings with the file and line, with and without a scene.
+#[test]
+fn unusable_model_values_warn() {
+    let dir = TestDir::new();
+    dir.write("h.ppm", "P3 1 1 255 9 9 9\n");
+    dir.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wall\nf 1 2 3\n");
+    dir.write("a.mtl", "newmtl wall\nTf 0 1 0\nPr 7\nmap_Kd -s 0 0 0 -unknown 3 h.ppm\n");
+    dir.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
+    let small = "--once --force --width 24 --height 18 --samples 1 -o a.png";
+    for scene in ["a.obj", "a.toml"] {
+        let said = dir.expect(&format!("{scene} {small}"), 0);
+        for warning in [
+            "a.obj: line 6: the file has no texture coordinates: each triangle shows half of every texture of \"wall\"",
+            "a.obj: a.mtl:2: `Tf` is ignored; use `tint` in a material of the scene",
+            "a.obj: a.mtl:3: 7 in `Pr` is clamped to 1",
+            "a.obj: a.mtl:4: option `-s 0 0 0` is ignored",
+            "a.obj: a.mtl:4: option `-unknown 3` is ignored",
+        ] {
+            assert_eq!(
+                said.matches(&format!("warning: {warning}\n")).count(),
+                1,
+                "{scene}: {warning}: {said}"
+            );
+        }
+    }
+    let header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+                  property uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let body = "0 0 0 300 0 0\n1 0 0 0 0 0\n0 1 0 0 0 0\n3 0 1 2\n";
+    dir.write("a.ply", format!("ply\nformat ascii 1.0\ncomment TextureFile x.png\n{header}{body}"));
+    let said = dir.expect(&format!("a.ply {small}"), 0);
+    assert!(said.contains("warning: line 3: the texture \"x.png\" is ignored"), "{said}");
+    assert!(said.contains("warning: a.ply: line 14: the color component 300 is outside"), "{said}");
 }
 
 #[test]

@@ -515,7 +515,7 @@ fn unusable_models_are_rejected() {
 #[test]
 fn model_errors_do_not_quote_generated_scene() {
     let dir = TestDir::new();
-    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl q\nf 1/1 2/1 3/1\n";
     dir.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
     // The material file is missing.
     for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {

@@ -1,4 +1,4 @@
-//! Commands that run out of threads or file descriptors.
+//! Commands that run out of threads, memory or file descriptors.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -54,6 +54,34 @@ fn commands_without_threads_fail_with_message() {
         assert!(stderr.contains("ulimit -u"), "{line}: {stderr}");
         let is_new = |name: &str| dir.path(name).exists();
         assert!(!["new.png", "new.part", "new.toml", "new.exr"].into_iter().any(is_new), "{line}");
+    }
+}
+
+/// If memory runs out, at startup or later, the only message is one sentence that says so.
+#[test]
+#[cfg(target_os = "linux")]
+fn too_little_memory_is_one_message() {
+    let dir = TestDir::new();
+    let render = "ball.toml --once --threads 2 --progress none";
+    let mut messages = Vec::new();
+    for kilobytes in (8_000..200_000).step_by(250) {
+        let mut process = Process::new("bash");
+        process.args(["-c", &format!("ulimit -v {kilobytes} && exec \"$0\" {render}"), PROGRAM]);
+        process.env("RUST_BACKTRACE", "1").current_dir(dir.0.path()).stdin(Stdio::null());
+        let output = process.output().expect("it runs");
+        match output.status.code() {
+            Some(0) => break,
+            Some(1) => messages.push(String::from_utf8(output.stderr).expect("UTF-8")),
+            // The system could not load the program.
+            _ => {}
+        }
+    }
+    for start in ["out of memory: cannot start a thread; ", "out of memory: cannot allocate "] {
+        assert!(messages.iter().any(|said| said.starts_with(&format!("error: {start}"))), "{messages:?}");
+    }
+    for said in &messages {
+        let is_sentence = said.starts_with("error: ") && said.lines().count() == 1;
+        assert!(is_sentence && said.contains("memory") && !said.contains("ulimit -u"), "{said}");
     }
 }
 

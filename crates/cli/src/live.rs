@@ -15,7 +15,7 @@ use crate::pipeline::watch::{ExternalChange, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
-use crate::system::threads::describe_start_failure;
+use crate::system::threads::{describe_start_failure, spawn};
 use crate::tui::messages::WAITING_FOR_FILE;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
@@ -41,7 +41,7 @@ pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
 }
 
 fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure("a thread", false, &error));
+    let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure(1, false, &error));
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
@@ -55,8 +55,7 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     let recorder = writes.clone();
     let forward_all =
         move || forward_events(&from_worker, &watcher, &recorder, |event| forward.send(event).is_ok());
-    let forwarder = std::thread::Builder::new().name("glimt-events".to_owned());
-    let forwarder = forwarder.spawn(forward_all).map_err(no_thread)?;
+    let forwarder = spawn("glimt-events", forward_all).map_err(no_thread)?;
     let (remote, contents) = (worker.remote(), worker.contents());
     let asked = writes.clone();
     let outcome = tui::run(Options {

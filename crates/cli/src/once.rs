@@ -34,7 +34,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure("a thread", false, &error)),
+        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure(1, false, &error)),
     };
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);
@@ -47,7 +47,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         }
     }) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
+        Err(message) => return console.fail(Exit::FAILED, &message),
     };
     let mut deadline = ExitDeadline::default();
     let mut written = ImagesWrittenSoFar::default();

@@ -7,6 +7,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::system::describe_error;
+use crate::system::threads::{describe_start_failure, spawn};
 
 /// The first signal received, if any.
 #[derive(Clone, Debug, Default)]
@@ -27,30 +28,26 @@ pub(super) fn signal_name(number: i32) -> Option<&'static str> {
     }
 }
 
-/// Explains why [`install_signal_handlers`] failed and what to do.
-pub(super) fn describe_handler_failure(error: &std::io::Error) -> String {
-    format!(
-        "cannot listen to signals: {}; raise the limits on open files and on processes (ulimit -n, ulimit -u)",
-        describe_error(error)
-    )
-}
-
 /// Installs handlers that call `on_signal` on a separate thread instead of terminating the process.
 ///
 /// # Errors
-/// The handlers could not be set up.
+/// The handlers could not be set up. The message explains why and what to do.
 pub(super) fn install_signal_handlers(
     on_signal: impl Fn() + Send + 'static,
-) -> std::io::Result<ReceivedSignal> {
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+) -> Result<ReceivedSignal, String> {
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(|error| {
+        let why = describe_error(&error);
+        format!("cannot listen to signals: {why}; raise the limit on open files (`ulimit -n`)")
+    })?;
     let received = ReceivedSignal::default();
     let recorder = received.clone();
-    std::thread::Builder::new().name("glimt-signals".to_owned()).spawn(move || {
+    let listen = move || {
         for number in &mut signals {
             // The first signal determines the exit code.
             let _ = recorder.0.compare_exchange(0, number, Ordering::AcqRel, Ordering::Acquire);
             on_signal();
         }
-    })?;
+    };
+    spawn("glimt-signals", listen).map_err(|error| describe_start_failure(1, false, &error))?;
     Ok(received)
 }

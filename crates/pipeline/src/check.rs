@@ -13,11 +13,11 @@ use super::sink::Sink;
 use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
 use super::stages::textures::Textures;
+use crate::assets::FileMaterial;
 use crate::control::CancelToken;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{LoweredShape, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::world::file_emits;
 
 /// Object counts and warnings for a valid scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +98,7 @@ fn summarize(
     };
     let emits = |object: &&Object| match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].emits(),
-        (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(file_emits),
+        (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(FileMaterial::emits),
         (None, None) => false,
     };
     let lights = scene.lights.iter().filter(|light| light.has_emission()).count();

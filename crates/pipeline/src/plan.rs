@@ -16,6 +16,7 @@ use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::system::threads::core_count;
 
 /// Resolved settings of a request, merged from the scene, the command line and the keyboard.
 #[derive(Clone, Debug)]
@@ -355,10 +356,6 @@ fn tone_mapping(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
 /// Returns the number of render threads: as requested, or one per core.
 pub(super) fn thread_count(overrides: &Overrides) -> usize {
     overrides.threads.filter(|count| *count > 0).unwrap_or_else(core_count)
-}
-
-pub(super) fn core_count() -> usize {
-    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
 #[cfg(test)]

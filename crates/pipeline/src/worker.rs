@@ -18,6 +18,7 @@ use super::settings::Overrides;
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
+use crate::system::threads::spawn;
 
 /// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so that
 /// the front end and other programs have priority.
@@ -36,8 +37,7 @@ pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let contents = Arc::<Contents>::default();
     let worker =
         Worker { remote: remote.clone(), previews: previews.clone(), config, contents: contents.clone() };
-    let thread =
-        std::thread::Builder::new().name("glimt-worker".to_owned()).spawn(move || worker.run_loop())?;
+    let thread = spawn("glimt-worker", move || worker.run_loop())?;
     Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 

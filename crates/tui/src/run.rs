@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::io;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
@@ -24,6 +23,7 @@ use super::terminals::TerminalId;
 use super::update::{start, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
+use crate::system::threads::spawn;
 
 /// Maximum time to spend planning a slice before it is sent and keys are handled.
 const TURN: Duration = Duration::from_millis(3);
@@ -106,10 +106,7 @@ fn forward_channel<T: Send + 'static>(
         }
         let _ = events.send(Event::Lost(source));
     };
-    thread::Builder::new()
-        .name(name.to_owned())
-        .spawn(pass)
-        .map_err(terminal_error_for("start a thread for"))?;
+    spawn(name, pass).map_err(terminal_error_for("start a thread for"))?;
     Ok(())
 }
 

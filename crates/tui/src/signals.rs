@@ -25,6 +25,7 @@ use signal_hook::low_level;
 use super::ExitStatus;
 use super::event::{Event, Signal};
 use super::terminal;
+use crate::system::threads::spawn;
 
 /// Grace period for the event loop to exit after a signal.
 const GRACE: Duration = Duration::from_millis(1500);
@@ -66,7 +67,7 @@ impl SignalListener {
             HANDLED_SIGNALS.into_iter().chain(OTHER_SIGNALS).chain(linux_signals()).chain([MARK]),
         )?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
-        thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        spawn("signals", move || {
             loop {
                 signals.wait().for_each(|number| handler.handle(number));
                 *lock_round_count() += 1;
@@ -74,7 +75,7 @@ impl SignalListener {
             }
         })?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
-        thread::Builder::new().name("terminal-watch".to_owned()).spawn(move || handler.watch_terminal())?;
+        spawn("terminal-watch", move || handler.watch_terminal())?;
         Ok(Self { over })
     }
 }

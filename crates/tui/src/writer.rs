@@ -7,7 +7,6 @@ use std::os::fd::AsFd;
 use std::os::unix::fs::OpenOptionsExt;
 use std::sync::mpsc::Sender;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread;
 use std::time::Duration;
 
 use nix::fcntl::OFlag;
@@ -15,6 +14,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::unistd::ttyname;
 
 use super::event::Event;
+use crate::system::threads::spawn;
 
 /// Slices to be written. There is a single queue because there is only one standard output.
 static QUEUE: WriteQueue = WriteQueue {
@@ -78,7 +78,7 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
             }
         }
     };
-    thread::Builder::new().name("screen".to_owned()).spawn(write)?;
+    spawn("screen", write)?;
     Ok(())
 }
 

@@ -229,6 +229,7 @@ pub(super) fn ply() -> Vec<Case> {
         ("a list with four billion entries", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: a list claims 4294967295 items, more than the file can hold"),
         ("faces without vertex indices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the element `face` needs an integer list `vertex_indices`"),
         ("text in a vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:10: vertex 1: expected a number, found \"x\""),
+        ("colors out of range", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty float green\nproperty int blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 300 nan -1\n1 0 0 -1 inf 1e99\n0 1 0 0.5 0 0\n3 0 1 2\n".to_vec(), ""),
         ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has no faces"),
         ("a property before any element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
         ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: incomplete or unknown statement \"element\""),
@@ -292,6 +293,9 @@ pub(super) fn mtl() -> Vec<Case> {
             "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         ("a negative color", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
+        ("numbers out of range", b"newmtl m\nPr 7\nPm -3\nd 7\nKe 1e30\nillum 300\n".to_vec(), ""),
+        ("too many numbers", b"newmtl m\nKd 1 1 1 1\nNs 5 6\n".to_vec(), ""),
+        ("useless map options", b"newmtl m\nmap_Kd -s 0 0 -o nan -bm -unknown 3 h.png\n".to_vec(), ""),
         (
             "text as an exponent",
             b"newmtl m\nNs shiny\n".to_vec(),

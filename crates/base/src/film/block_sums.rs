@@ -4,6 +4,7 @@ use super::Rect;
 use super::sum_order::SumOrder;
 use super::sums::{Film, FilmError, Tile, bytes_needed, can_allocate};
 use crate::math::DVec3;
+use crate::system::memory::try_reserve_exact;
 
 impl Tile {
     /// Moves a pixel's running sum to its block sum if the block is complete.
@@ -39,7 +40,7 @@ impl Film {
             let mut earlier = Vec::with_capacity(kept);
             for _ in 0..kept {
                 let mut sums = Vec::new();
-                sums.try_reserve_exact(area).map_err(|_| lacks())?;
+                try_reserve_exact(&mut sums, area).map_err(|_| lacks())?;
                 earlier.push(sums);
             }
             self.tile(tile).earlier = earlier;

@@ -4,6 +4,7 @@
 use super::CELLS;
 use crate::math::DVec3;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
+use crate::system::memory::try_reserve_exact;
 
 /// Relative luminance in double precision, so that sums of squares and squared sums are consistent.
 pub(super) fn luminance(radiance: DVec3) -> f64 {
@@ -62,7 +63,7 @@ impl SquaredSteps {
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let reserved = || {
             let mut values = Vec::new();
-            values.try_reserve_exact(area).ok()?;
+            try_reserve_exact(&mut values, area).ok()?;
             Some(values)
         };
         Some(Self { last: reserved()?, half_way: reserved()?, recent: reserved()?, levels: Vec::new() })

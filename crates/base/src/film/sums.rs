@@ -8,14 +8,15 @@ use super::pixel_subset::PixelSubset;
 use super::sum_order::{SumOrder, sum_with_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
+use crate::system::memory::try_reserve_exact;
 
 /// Error from creating a film.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// There is not enough memory.
     #[error(
-        "a {width}×{height} image needs {:.1} GB of memory, more than this machine has available; \
-         make it smaller{}", *.bytes as f64 / 1e9,
+        "a {width}×{height} image needs {} of memory, more than is available; make it smaller{}",
+        describe_size(*.bytes),
         remedy(*.crop_helps)
     )]
     Memory {
@@ -37,6 +38,13 @@ pub enum FilmError {
         /// Height of the image in pixels.
         height: u32,
     },
+}
+
+fn describe_size(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000_000 => format!("{} MB", bytes.div_ceil(1_000_000)),
+        1_000_000_000.. => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
 }
 
 fn remedy(crop_helps: bool) -> &'static str {
@@ -434,7 +442,7 @@ pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
 
 /// Whether an allocation of this size succeeds.
 pub(super) fn can_allocate(bytes: u64) -> bool {
-    usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+    usize::try_from(bytes).is_ok_and(|bytes| try_reserve_exact(&mut Vec::<u8>::new(), bytes).is_ok())
 }
 
 /// Allocates the tiles. First tries to allocate all the memory at once, because a system that overcommits
@@ -445,14 +453,14 @@ fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     }
     let (columns, rows) = tile_grid(crop);
     let mut tiles = Vec::new();
-    tiles.try_reserve_exact(columns * rows).ok()?;
+    try_reserve_exact(&mut tiles, columns * rows).ok()?;
     for tile in 0..columns * rows {
         let area = tile_rect(crop, tile).area();
         let mut sums = Vec::new();
         let mut counts = Vec::new();
-        sums.try_reserve_exact(area).ok()?;
+        try_reserve_exact(&mut sums, area).ok()?;
         let steps = SquaredSteps::reserved(area)?;
-        counts.try_reserve_exact(area).ok()?;
+        try_reserve_exact(&mut counts, area).ok()?;
         tiles.push(Mutex::new(Tile { sums, counts, steps, ..Tile::default() }));
     }
     Some(tiles)

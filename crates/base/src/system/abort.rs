@@ -1,22 +1,22 @@
-//! Handles abort(3), for example after a failed allocation: glimt restores the terminal, prints a message and
+//! Ends the process if an allocation fails or on abort(3): glimt restores the terminal, prints a message and
 //! exits with code 1.
 //!
-//! Only this module and the SIMD kernels contain `unsafe` code. Everything that runs in the handler is
+//! Only this module and the SIMD kernels contain `unsafe` code. Everything that runs at the end is
 //! async-signal-safe (signal-safety(7)): it neither locks nor allocates.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::fmt::Write;
+use std::fmt::{Arguments, Write};
 use std::io;
 use std::os::fd::BorrowedFd;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-/// Size in bytes of the last failed allocation, or 0.
-static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
+use super::memory::allocation_may_fail;
 
 /// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
@@ -24,16 +24,33 @@ static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 /// Exit code for failures.
 const FAILED: i32 = 1;
 
-/// The system allocator, extended to record failed allocations.
+/// The system allocator, extended to end the process with a message if an allocation fails. Otherwise, the
+/// standard library would print its own message and a backtrace. The exceptions are allocations with
+/// [`try_reserve_exact`](super::memory::try_reserve_exact).
 pub struct Allocator;
 
-/// Records `bytes` if the allocation failed.
+/// Ends the process if the allocation failed and its caller does not handle that.
 #[inline(always)]
-fn record_failed_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() {
-        REFUSED_BYTES.store(bytes, Ordering::Relaxed);
+fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
+    if memory.is_null() && !allocation_may_fail() {
+        end_without_memory(bytes);
     }
     memory
+}
+
+#[cold]
+fn end_without_memory(bytes: usize) -> ! {
+    let (number, unit) = match bytes {
+        1 => (bytes, "byte"),
+        0..1_000 => (bytes, "bytes"),
+        1_000..1_000_000 => (bytes.div_ceil(1_000), "kB"),
+        1_000_000.. => (bytes.div_ceil(1_000_000), "MB"),
+    };
+    let is_limited = getrlimit(Resource::RLIMIT_AS).is_ok_and(|(limit, _)| limit < RLIM_INFINITY);
+    let limit = if is_limited { ", or raise the limit (`ulimit -v`)" } else { "" };
+    end_with_message(format_args!(
+        "error: out of memory: cannot allocate {number} {unit}; use a smaller image or scene{limit}"
+    ))
 }
 
 // SAFETY: every call is forwarded to the system allocator with the caller's arguments, and its result is
@@ -42,19 +59,19 @@ unsafe impl GlobalAlloc for Allocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller upholds the contract of `GlobalAlloc`.
-        record_failed_allocation(unsafe { System.alloc(layout) }, layout.size())
+        check_allocation(unsafe { System.alloc(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        record_failed_allocation(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        check_allocation(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
         // SAFETY: as above.
-        record_failed_allocation(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
+        check_allocation(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
     }
 
     #[inline]
@@ -79,12 +96,16 @@ pub fn set_terminal_restore(restore: fn()) {
     let _ = RESTORE_TERMINAL.set(restore);
 }
 
-/// Whether a thread is already running the handler.
+/// Whether a thread is already ending the process.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Restores the terminal, prints the reason and exits. If several threads abort at once when memory runs out,
-/// the first thread prints and the others wait for the process to end.
 fn on_abort() {
+    end_with_message(format_args!("error: glimt was aborted (SIGABRT)"));
+}
+
+/// Restores the terminal, prints the message and exits. If several threads run out of memory at once, the
+/// first thread prints and the others wait for the process to end.
+fn end_with_message(words: Arguments<'_>) -> ! {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();
     }
@@ -93,17 +114,10 @@ fn on_abort() {
     }
     let mut message = MessageBuffer::default();
     // Truncate messages that do not fit.
-    let _ = match REFUSED_BYTES.load(Ordering::Relaxed) {
-        0 => writeln!(message, "error: glimt was aborted (SIGABRT)"),
-        bytes => writeln!(
-            message,
-            "error: out of memory: an allocation of {} MB failed; use a smaller image or scene, or raise the limit (`ulimit -v`)",
-            bytes.div_ceil(1_000_000)
-        ),
-    };
+    let _ = writeln!(message, "{words}");
     // SAFETY: standard error stays open for the lifetime of the process; if not, the write fails.
     let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, message.bytes());
-    low_level::exit(FAILED);
+    low_level::exit(FAILED)
 }
 
 /// Stack-allocated text buffer.
@@ -137,15 +151,6 @@ impl Write for MessageBuffer {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn failed_allocations_are_recorded() {
-        let layout = Layout::from_size_align(usize::MAX / 4, 1).expect("a layout");
-        // SAFETY: the layout's size is not 0, and a null pointer is not used.
-        let memory = std::hint::black_box(unsafe { Allocator.alloc(layout) });
-        assert!(memory.is_null());
-        assert_eq!(REFUSED_BYTES.load(Ordering::Relaxed), usize::MAX / 4);
-    }
 
     #[test]
     fn long_messages_are_truncated() {

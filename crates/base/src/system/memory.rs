@@ -1,9 +1,55 @@
-//! System limits on this process's memory.
+//! System limits on this process's memory, and allocations that may fail.
 
+use std::cell::Cell;
+use std::collections::TryReserveError;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+
+thread_local! {
+    static MAY_FAIL: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether the caller of the current allocation handles its failure.
+pub(super) fn allocation_may_fail() -> bool {
+    MAY_FAIL.get()
+}
+
+/// Reserves memory for exactly `additional` more elements. If any other allocation fails,
+/// [`Allocator`](super::abort::Allocator) ends the process.
+///
+/// # Errors
+/// There is not enough memory.
+pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
+    MAY_FAIL.set(true);
+    let reserved = vec.try_reserve_exact(additional);
+    MAY_FAIL.set(false);
+    reserved
+}
+
+/// Returns the setting that keeps this process from mapping `bytes` more bytes of memory, if any.
+pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let limits = [
+        (Resource::RLIMIT_AS, status_bytes(&status, "VmSize"), "`ulimit -v`"),
+        (
+            Resource::RLIMIT_DATA,
+            status_bytes(&status, "VmData") + status_bytes(&status, "VmStk"),
+            "`ulimit -d`",
+        ),
+    ];
+    let is_exhausted =
+        |resource, used: u64| getrlimit(resource).is_ok_and(|(limit, _)| used.saturating_add(bytes) > limit);
+    limits.into_iter().find(|(resource, used, _)| is_exhausted(*resource, *used)).map(|(.., setting)| setting)
+}
+
+/// Returns a size listed in `/proc/self/status`, such as `VmSize:  1024 kB`. 0 if it is not listed.
+fn status_bytes(status: &str, name: &str) -> u64 {
+    let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
+    let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+    kilobytes.unwrap_or(0).saturating_mul(1024)
+}
 
 /// Maximum amount of memory available to this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,6 +110,21 @@ mod tests {
         let path = root.join(file);
         fs::create_dir_all(path.parent().expect("a folder")).expect("made");
         fs::write(path, text).expect("written");
+    }
+
+    #[test]
+    fn sizes_in_the_process_status_are_bytes() {
+        let status = "Name:\tglimt\nVmPeak:\t   9000 kB\nVmSize:\t   8192 kB\nThreads:\t1\n";
+        assert_eq!(status_bytes(status, "VmSize"), 8192 * 1024);
+        assert_eq!(status_bytes(status, "VmData"), 0);
+    }
+
+    #[test]
+    fn only_requested_reservations_may_fail() {
+        let mut bytes = Vec::<u8>::new();
+        assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
+        assert!(!allocation_may_fail());
+        assert!(try_reserve_exact(&mut bytes, 100).is_ok() && bytes.capacity() >= 100);
     }
 
     #[test]

@@ -1,37 +1,76 @@
-//! Checks and messages for threads that the system cannot start.
+//! Starts threads, and explains why the system cannot start them.
 
 use std::fmt::Display;
-use std::io::Error;
+use std::io::{Error, Result};
+use std::num::NonZero;
+use std::thread::{Builder, JoinHandle, available_parallelism};
 
-use nix::sys::resource::{Resource, getrlimit};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::describe_error;
+use super::{describe_error, memory};
 
-/// Address space per thread stack in bytes (the standard library's default).
-const STACK_BYTES: u64 = 2 << 20;
+/// Address space of a thread: its stack (the standard library's default) and its signal stack.
+const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
 
-/// Checks that the stacks of `threads` threads fit within the process's address-space limit. Must be called
-/// before the first thread is started, because the standard library terminates the process if a new thread
-/// has no room for its signal stack.
+/// Starts a thread.
 ///
 /// # Errors
-/// If the stacks do not fit, returns the error that the system reports when it cannot start a thread.
-pub fn check_stack_space(threads: usize) -> Result<(), Error> {
-    let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
-    if (threads as u64).saturating_mul(STACK_BYTES) > limit {
-        return Err(Error::from_raw_os_error(nix::libc::EAGAIN));
-    }
-    Ok(())
+/// The system does not have enough memory or threads.
+pub fn spawn<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>> {
+    check_stack_space(1)?;
+    Builder::new().name(name.to_owned()).spawn(work)
 }
 
-/// Explains why `what` could not be started and how to fix it: raise the limits on memory (for stacks) or on
-/// the number of threads, or use fewer threads.
-pub fn describe_start_failure(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
-    let why = describe_error(&Error::other(error.to_string()));
-    let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
-    format!(
-        "cannot start {what}: {why}; {fewer}raise the limits on memory and on processes (ulimit -v, ulimit -u)"
-    )
+/// Number of cores.
+pub fn core_count() -> usize {
+    available_parallelism().map_or(1, NonZero::get)
+}
+
+/// Starts a pool with one thread per core.
+///
+/// # Errors
+/// The message from [`describe_start_failure`].
+pub fn core_pool() -> std::result::Result<ThreadPool, String> {
+    let threads = core_count();
+    let failed = |error: &dyn Display| describe_start_failure(threads, false, &error);
+    check_stack_space(threads).map_err(|error| failed(&error))?;
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| failed(&error))
+}
+
+/// Checks that the stacks of `threads` more threads fit within the process's memory limits. The standard
+/// library terminates the process if a new thread has no room for its signal stack.
+///
+/// # Errors
+/// The system's error if memory runs out.
+pub fn check_stack_space(threads: usize) -> Result<()> {
+    match exhausted_limit(threads) {
+        Some(_) => Err(Error::from_raw_os_error(nix::libc::ENOMEM)),
+        None => Ok(()),
+    }
+}
+
+/// Setting that leaves no room for the stacks of `threads` more threads.
+fn exhausted_limit(threads: usize) -> Option<&'static str> {
+    memory::exhausted_limit((threads as u64).saturating_mul(STACK_BYTES))
+}
+
+/// Explains why `threads` threads could not be started and how to fix it. The system reports the same error
+/// for a lack of memory and a lack of threads.
+pub fn describe_start_failure(threads: usize, has_threads_option: bool, error: &impl Display) -> String {
+    let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
+    let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };
+    match exhausted_limit(threads) {
+        Some(setting) => {
+            format!("out of memory: cannot start {what}; {fewer}raise the memory limit ({setting})")
+        }
+        None => {
+            let why = describe_error(&Error::other(error.to_string()));
+            format!("cannot start {what}: {why}; {fewer}raise the limit on processes (`ulimit -u`)")
+        }
+    }
 }
 
 #[cfg(test)]
@@ -41,14 +80,23 @@ mod tests {
     #[test]
     fn message_suggests_a_fix() {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
-        let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
+        let limit = "raise the limit on processes (`ulimit -u`)";
         assert_eq!(
-            describe_start_failure("2 threads", true, &error),
+            describe_start_failure(2, true, &error),
             format!(
-                "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limits}"
+                "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limit}"
             )
         );
-        let alone = format!("cannot start a thread: resource temporarily unavailable; {limits}");
-        assert_eq!(describe_start_failure("a thread", false, &error), alone);
+        for has_threads_option in [true, false] {
+            let alone = format!("cannot start a thread: resource temporarily unavailable; {limit}");
+            assert_eq!(describe_start_failure(1, has_threads_option, &error), alone);
+        }
+    }
+
+    #[test]
+    fn threads_are_named() {
+        let name = || std::thread::current().name().map(str::to_owned);
+        let thread = spawn("a name", name).expect("a thread");
+        assert_eq!(thread.join().expect("no panic"), Some("a name".to_owned()));
     }
 }

@@ -26,7 +26,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::signals::{self, ReceivedSignal};
 use crate::system::priority;
-use crate::system::threads::describe_start_failure;
+use crate::system::threads::{describe_start_failure, spawn};
 
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
@@ -46,10 +46,10 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
-        .map_err(|error| console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)))?;
+        .map_err(|message| console.fail(Exit::FAILED, &message))?;
     let mut progress = BenchProgress::new(args.progress, console);
     let (news, work) = spawn_benchmark(order, token.clone())
-        .map_err(|error| console.fail(Exit::FAILED, &describe_start_failure("a thread", false, &error)))?;
+        .map_err(|error| console.fail(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
     report_events(&news, &mut progress);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(panic_result())));
     progress.clear();
@@ -101,8 +101,7 @@ fn spawn_benchmark(
         let _ = sender.send(one);
     };
     let work = move || bench::run(&order, &token, &tell);
-    let thread = std::thread::Builder::new().name("glimt-bench".to_owned()).spawn(work)?;
-    Ok((news, thread))
+    Ok((news, spawn("glimt-bench", work)?))
 }
 
 /// Reports events until the thread ends.

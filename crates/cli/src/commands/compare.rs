@@ -5,7 +5,7 @@ mod pictures;
 use std::cell::RefCell;
 use std::path::Path;
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 use serde::Serialize;
 
 use crate::args::CompareArgs;
@@ -19,13 +19,13 @@ use crate::output::write::{self, WritePolicy};
 use crate::output::{
     self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, is_same_file,
 };
-use crate::system::threads::describe_start_failure;
+use crate::system::threads::core_pool;
 use crate::tui::wrapped;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
-    match ThreadPoolBuilder::new().build() {
+    match core_pool() {
         Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
-        Err(error) => console.fail(Exit::FAILED, &describe_start_failure("threads", false, &error)),
+        Err(message) => console.fail(Exit::FAILED, &message),
     }
 }
 

@@ -18,7 +18,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let cancel = token.clone();
     let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
+        Err(message) => return console.fail(Exit::FAILED, &message),
     };
     let exit = convert(args, console, &token);
     let Some(number) = ended.signal_number() else { return exit };

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use indicatif::ProgressBar;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 use serde_json::json;
 
 use self::inputs::{MergeInputs, scene_paths};
@@ -26,22 +26,22 @@ use crate::output::{
 use crate::progress::{bar_style, json_line};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals;
-use crate::system::threads::describe_start_failure;
+use crate::system::threads::core_pool;
 use crate::tui::{NamedImage, images_as_text};
 
 /// Polling interval for new parts.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
-    let pool = match ThreadPoolBuilder::new().build() {
+    let pool = match core_pool() {
         Ok(pool) => pool,
-        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure("threads", false, &error)),
+        Err(message) => return console.fail(Exit::FAILED, &message),
     };
     let token = CancelToken::new();
     let cancel = token.clone();
     let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
+        Err(message) => return console.fail(Exit::FAILED, &message),
     };
     let exit = MergeCommand { args, console, token: &token, pool: &pool }.run();
     ended.signal_number().map_or(exit, |number| report_signal(number, console))
@@ -278,6 +278,7 @@ impl MergeCommand<'_> {
             PartError::Cancelled(_) => Exit::FAILED,
             PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
             PartError::Unreadable { .. }
+            | PartError::NotRegular { .. }
             | PartError::Foreign { .. }
             | PartError::Version { .. }
             | PartError::Unfinished { .. }

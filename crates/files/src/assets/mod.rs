@@ -1,6 +1,7 @@
 //! Reads meshes, textures and cameras. All errors include the file name and, for text files, the line.
 
 pub mod catch_panic;
+mod file_material;
 pub mod gltf;
 pub mod image;
 pub mod mesh;
@@ -10,9 +11,9 @@ mod read;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
-use crate::materials::PixelValue;
-use crate::math::{DVec2, Vec2, Vec3};
 use crate::system::file::FileStamp;
+
+pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 
 /// Error for a file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -122,108 +123,6 @@ pub struct Dropped {
     pub non_finite: u64,
     /// Faces with coincident or collinear corners.
     pub degenerate: u64,
-}
-
-/// A material from an MTL or glTF file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FileMaterial {
-    /// Name in the file.
-    pub name: String,
-    /// Diffuse reflectance, `Kd`.
-    pub diffuse: Vec3,
-    /// Specular reflectance, `Ks`: scale of the unnormalized Phong lobe.
-    pub specular: Vec3,
-    /// Phong exponent, `Ns`.
-    pub shininess: f32,
-    /// Emitted radiance, `Ke`. Scales the emission texture, if any.
-    pub emission: Vec3,
-    /// Index of refraction, `Ni`.
-    pub ior: f32,
-    /// Illumination model, `illum`.
-    pub illumination_model: Option<u8>,
-    /// Opacity in [0, 1]: `d`, or 1 − `Tr`.
-    pub opacity: f32,
-    /// Opacity texture, `map_d`. Overrides `opacity`.
-    pub opacity_texture: Option<FileTexture>,
-    /// Diffuse texture, `map_Kd`.
-    pub diffuse_texture: Option<FileTexture>,
-    /// Specular texture, `map_Ks`.
-    pub specular_texture: Option<FileTexture>,
-    /// Emission texture, `map_Ke`.
-    pub emission_texture: Option<FileTexture>,
-    /// Normal map, `norm` or `map_Bump`.
-    pub normal_texture: Option<FileTexture>,
-    /// Scale factor for the normal map's slopes, ≥ 0. Set by the option `-bm`, 1 by default.
-    pub normal_strength: f32,
-    /// Parameters of the PBR extension. `None` if the material does not use the extension.
-    pub physical: Option<PhysicalMaterial>,
-}
-
-impl FileMaterial {
-    /// Whether the material has a specular highlight. Illumination models 0 and 1 have none. Materials with
-    /// an exponent of 0 are also excluded: their highlight would cover the hemisphere at full strength.
-    pub fn has_highlight(&self) -> bool {
-        self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
-    }
-
-    /// Whether the specular reflection is a coat over a diffuse texture or a stronger diffuse color.
-    pub fn is_coated(&self) -> bool {
-        self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
-    }
-}
-
-/// A texture with map options in an MTL material.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FileTexture {
-    /// Image file, relative to the MTL file's folder.
-    pub path: PathBuf,
-    /// Scale of the texture coordinates, `-s`.
-    pub repeat: Vec2,
-    /// Offset added to the scaled texture coordinates, `-o`.
-    pub offset: DVec2,
-    /// Whether coordinates outside [0, 1] are clamped, `-clamp on`.
-    pub is_clamped: bool,
-    /// Offset and scale of the values, `-mm`.
-    pub range: (f32, f32),
-    /// Channel to read as a scalar, `-imfchan`.
-    pub number: Option<PixelValue>,
-}
-
-impl FileTexture {
-    /// A texture without options.
-    pub fn new(path: PathBuf) -> Self {
-        Self {
-            path,
-            repeat: Vec2::ONE,
-            offset: DVec2::ZERO,
-            is_clamped: false,
-            range: (0.0, 1.0),
-            number: None,
-        }
-    }
-
-    /// Whether both textures use the same image with the same coordinates.
-    pub fn is_same_image(&self, other: &Self) -> bool {
-        let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
-        self.path == other.path && at(self) == at(other)
-    }
-}
-
-/// PBR extension of MTL. Values are in [0, 1].
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhysicalMaterial {
-    /// Roughness, `Pr`.
-    pub roughness: f32,
-    /// Metallic weight, `Pm`.
-    pub metallic: f32,
-    /// Clear coat weight, `Pc`.
-    pub clearcoat: f32,
-    /// Clear coat roughness, `Pcr`.
-    pub clearcoat_roughness: f32,
-    /// Roughness texture, `map_Pr`.
-    pub roughness_texture: Option<FileTexture>,
-    /// Metallic texture, `map_Pm`.
-    pub metallic_texture: Option<FileTexture>,
 }
 
 /// A gKit orbiter camera, which orbits the scene's center.

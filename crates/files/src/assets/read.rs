@@ -8,6 +8,7 @@ use super::{AssetError, FileHash};
 use crate::control::{CancelToken, Cancelled, Progress};
 pub(crate) use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
+use crate::system::memory::try_reserve_exact;
 
 /// Number of bytes between two polls of the cancel token.
 const CHUNK: usize = 1 << 20;
@@ -148,7 +149,7 @@ pub(crate) fn read_rest(
     let length = length as usize;
     let mut bytes = Vec::new();
     let out_of_memory = |_| AssetError::OutOfMemory { path: path.to_owned(), bytes: length };
-    bytes.try_reserve_exact(length + 1).map_err(out_of_memory)?;
+    try_reserve_exact(&mut bytes, length + 1).map_err(out_of_memory)?;
     loop {
         monitor.tick(bytes.len().min(length), 2 * length)?;
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;

@@ -30,7 +30,7 @@ use super::inputs::Inputs;
 use super::keys;
 use super::memory::MemoryEstimate;
 use super::model::ModelView;
-use super::plan::{OutputNameSource, Plan, core_count, plan, thread_count};
+use super::plan::{OutputNameSource, Plan, plan, thread_count};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, WriteMode};
 use super::queries::{Query, QueryContext};
 use super::render::checkpointer::CheckpointLock;
@@ -72,7 +72,7 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::system::threads::{check_stack_space, describe_start_failure};
+use crate::system::threads::{check_stack_space, core_count, describe_start_failure};
 use crate::world::{CoplanarLight, GlassSolids, TextureNeeds, World};
 
 /// Engine configuration, which tests override.
@@ -646,8 +646,13 @@ impl Engine {
         rendered
     }
 
-    /// Returns a pool with `threads` threads, reusing the current pool if it has that many.
+    /// Returns the pool for a render with `--threads` or its default.
     fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
+        self.thread_pool_for(threads, true)
+    }
+
+    /// Returns a pool with the given number of threads, reusing the current pool if it has that many.
+    fn thread_pool_for(&mut self, threads: usize, has_threads_option: bool) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
         }
@@ -655,10 +660,8 @@ impl Engine {
         let name = |index| format!("glimt-{index}");
         let nice = self.config.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
-        let failed = |error: &dyn Display| match threads {
-            1 => Stop::work(describe_start_failure("a thread", false, &error)),
-            _ => Stop::work(describe_start_failure(&format!("{threads} threads"), true, &error)),
-        };
+        let failed =
+            |error: &dyn Display| Stop::work(describe_start_failure(threads, has_threads_option, &error));
         check_stack_space(threads).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
         let pool = builder.build().map_err(|error| failed(&error))?;
@@ -684,7 +687,7 @@ impl Engine {
         let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
             let containers = Containers::default();
             let origin = SceneSource { path, sets, show: ModelView::default() };
-            let pool = engine.thread_pool(core_count())?;
+            let pool = engine.thread_pool_for(core_count(), false)?;
             let read = || parse(origin, (contents, &containers), &mut engine.parsed, findings, token);
             let parsed = pool.install(read)?.value;
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };

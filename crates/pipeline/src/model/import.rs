@@ -2,19 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
-
 use super::gltf::{ExportNaming, ExportSource};
 use super::{ModelText, ModelView, in_generated_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, ignore_progress};
-use crate::plan::core_count;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_generated;
 use crate::stages::containers::Containers;
-use crate::system::threads::{check_stack_space, describe_start_failure};
+use crate::system::threads::core_pool;
 
 /// An imported scene, ready to be written.
 #[derive(Debug)]
@@ -45,8 +42,7 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());
         return Err(ImportError::File(message));
     }
-    let pool = create_thread_pool()
-        .map_err(|error| ImportError::Work(describe_start_failure("threads", false, &error)))?;
+    let pool = core_pool().map_err(ImportError::Work)?;
     let containers = Containers::default();
     let naming = ExportNaming::Folder(folder.to_owned());
     let read = || {
@@ -77,12 +73,6 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
             ImportError::File(error.to_string())
         }
     })
-}
-
-/// Creates a thread pool with one thread per core.
-fn create_thread_pool() -> Result<ThreadPool, String> {
-    check_stack_space(core_count()).map_err(|error| error.to_string())?;
-    ThreadPoolBuilder::new().num_threads(core_count()).build().map_err(|error| error.to_string())
 }
 
 /// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` renders, because the

@@ -18,7 +18,6 @@ use crate::messages::INVISIBLE_MODEL;
 use crate::scene::toml_string;
 use crate::settings::{Side, UpAxis};
 use crate::stages::containers::Containers;
-use crate::world::file_is_glass;
 
 /// Default up axis: z for STL (the CAD and 3D printing convention) and for PLY files exported by Blender, y
 /// for all others.
@@ -77,7 +76,7 @@ fn is_polished(material: &FileMaterial) -> bool {
 /// Whether every face is fully transparent.
 fn is_fully_transparent(loaded: &LoadedMesh) -> bool {
     let is_clear =
-        |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !file_is_glass(own);
+        |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !own.is_glass();
     let is_fully_transparent = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
     !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_fully_transparent)
 }

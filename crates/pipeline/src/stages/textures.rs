@@ -2,6 +2,7 @@
 //! parallel.
 
 use std::collections::{HashMap, HashSet};
+use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -209,7 +210,7 @@ pub(crate) fn textures(
                 warn_about_gray_normal_map(loaded, &image, texels, findings);
                 warn_about_opaque_alpha(loaded, &image, texels, findings);
                 for warning in &decoded.warnings {
-                    findings.add_warning(loaded, reference_span(loaded, image.asked_by[0]), warning.clone());
+                    warn(loaded, image.asked_by[0], warning, findings);
                 }
                 if let Some(mipmaps) = &mipmaps {
                     let bytes = mipmaps.memory_bytes();
@@ -233,7 +234,12 @@ pub(crate) fn textures(
                         (Some(material), Some(file)) => {
                             let file = loaded.scene.mesh_files[file].value.display();
                             let help = format!("it is used by the material \"{material}\" of {file}");
-                            findings.add_error(loaded, reference_span(loaded, one), error.to_string(), &help);
+                            findings.add_error(
+                                loaded,
+                                reference_span(loaded, one),
+                                locate(one, &error),
+                                &help,
+                            );
                         }
                         _ => findings.add_asset_error(loaded, reference_span(loaded, one), &error),
                     }
@@ -265,7 +271,7 @@ fn substitute_texture(
         let warning = loaded.diagnostic_at(
             reference_span(loaded, one),
             Severity::Warning,
-            error.to_string(),
+            locate(one, error),
             Some(help),
         );
         if !findings.warnings.contains(&warning) {
@@ -296,6 +302,19 @@ fn substitute_texture(
     images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
 }
 
+/// Adds the line of the MTL file that refers to an image to a message about the image.
+fn locate(one: &NeededTexture, message: &impl Display) -> String {
+    match &one.statement {
+        Some(statement) => format!("{statement}: {message}"),
+        None => message.to_string(),
+    }
+}
+
+/// Warns about an image where it is referenced.
+fn warn(loaded: &LoadedScene, one: &NeededTexture, message: &str, findings: &mut Findings) {
+    findings.add_warning(loaded, reference_span(loaded, one), locate(one, &message));
+}
+
 /// Warns about pixels that are negative, not finite or too large.
 fn warn_about_unusable_pixels(
     loaded: &LoadedScene,
@@ -311,7 +330,7 @@ fn warn_about_unusable_pixels(
     let path = image.path().display();
     let message =
         format!("{path}: {count} negative, not finite or above 1e18 in a channel; glimt uses 0 instead");
-    findings.add_warning(loaded, reference_span(loaded, image.asked_by[0]), message);
+    warn(loaded, image.asked_by[0], &message, findings);
 }
 
 /// Warns about a gray normal map, which probably contains heights. A gray normal map from a mesh file has no
@@ -331,7 +350,7 @@ fn warn_about_gray_normal_map(
     let path = image.path().display();
     let message =
         format!("the normal map {path} of \"{material}\" is gray and probably contains heights: {effect}");
-    findings.add_warning(loaded, reference_span(loaded, one), message);
+    warn(loaded, one, &message, findings);
 }
 
 /// Warns about an image used with `channel = "a"` whose alpha is 1 everywhere.
@@ -348,7 +367,7 @@ fn warn_about_opaque_alpha(
     let Some(one) = image.asked_by.iter().find(is_alpha).filter(|_| texels.is_white()) else { return };
     let path = image.path().display();
     let message = format!("{path} has no alpha below 1: `channel = \"a\"` is 1 everywhere");
-    findings.add_warning(loaded, reference_span(loaded, one), message);
+    warn(loaded, one, &message, findings);
 }
 
 /// Returns the span of the environment map's file name.
@@ -578,6 +597,7 @@ pub(crate) fn add_declared(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
             declared: Some(index),
             mesh_file: None,
             material: None,
+            statement: None,
             normals_of: None,
             is_environment: false,
             has_mipmaps: false,

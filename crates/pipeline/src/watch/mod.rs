@@ -30,6 +30,7 @@ use self::outputs::UnconfirmedChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
 pub use self::working_folder::missing_folder;
 use crate::control::CancelToken;
+use crate::system::threads::spawn;
 
 /// Interval between checks while notifications work.
 const HEARTBEAT: Duration = Duration::from_secs(2);
@@ -144,7 +145,7 @@ impl Watcher {
             quiet,
             say,
         };
-        std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
+        spawn("glimt-watch", move || watch.run(&received))?;
         Ok(Self { orders })
     }
 

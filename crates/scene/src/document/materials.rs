@@ -6,6 +6,7 @@ use super::super::description::{
 use super::common;
 use super::context::Issue;
 use super::key::TableKey;
+use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::choice;
@@ -100,7 +101,7 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
     MaterialKind::Phong {
         diffuse,
         specular,
-        shininess: table.optional("shininess").number32(table.limits("phong.shininess")).unwrap_or(32.0),
+        shininess: read_or(table, "phong.shininess", 32.0, TableKey::number32),
         ambient: color(&ambient_key, "phong.ambient"),
     }
 }
@@ -167,31 +168,41 @@ fn type_key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
-/// Reads a color or a texture, with the range defined for `TYPE.KEY`.
+/// Reads the key at the path `TYPE.KEY` with its limits. Returns `default` if the key is missing or invalid.
+fn read_or<'a, T>(
+    table: &TableReader<'a>,
+    path: &'static str,
+    default: T,
+    read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
+) -> T {
+    read(&type_key(table, path), table.limits(path)).unwrap_or(default)
+}
+
+/// Reads a color or a texture.
 fn read_color(
     table: &TableReader<'_>,
     textures: &DefinedNames,
     path: &'static str,
     default: f32,
 ) -> ColorSource {
-    let color = type_key(table, path).color_or_texture(textures, table.limits(path));
-    color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
+    let default = ColorSource::Constant(Vec3::splat(default));
+    read_or(table, path, default, |key, limits| key.color_or_texture(textures, limits))
 }
 
-/// Reads a number or a texture, with the range defined for `TYPE.KEY`.
+/// Reads a number or a texture.
 fn read_number(
     table: &TableReader<'_>,
     textures: &DefinedNames,
     path: &'static str,
     default: f32,
 ) -> NumberSource {
-    let number = type_key(table, path).number_or_texture(textures, table.limits(path));
-    number.unwrap_or(NumberSource::Constant(default))
+    let default = NumberSource::Constant(default);
+    read_or(table, path, default, |key, limits| key.number_or_texture(textures, limits))
 }
 
 /// Reads an index of refraction.
 fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
-    type_key(table, path).number32(table.limits(path)).unwrap_or(1.5)
+    read_or(table, path, 1.5, TableKey::number32)
 }
 
 /// Reads a metal's reflectance, specified with exactly one of three groups of keys.

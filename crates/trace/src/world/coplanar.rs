@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::MeshTree;
-use super::lower::file_emits;
-use crate::assets::LoadedMesh;
+use crate::assets::{FileMaterial, LoadedMesh};
 use crate::geometry::cuboid::Cuboid;
 use crate::materials::EmissionSides;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -273,7 +272,7 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
     match (object.material, object.shape.mesh()) {
         (Some(material), _) => scene.materials[material].emits(),
-        (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(file_emits),
+        (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(FileMaterial::emits),
         (None, None) => false,
     }
 }
@@ -337,7 +336,7 @@ fn each_flat_face(
             let transform = mesh.placed.transform();
             let own = |triangle: usize| {
                 let material = *loaded.mesh.materials.get(triangle)? as usize;
-                loaded.materials.get(material).filter(|own| file_emits(own)).map(|_| EmissionSides::Front)
+                loaded.materials.get(material).filter(|own| own.emits()).map(|_| EmissionSides::Front)
             };
             for triangle in 0..loaded.mesh.triangles.len() {
                 let corners = loaded.mesh.corners(triangle as u32);

@@ -10,8 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::coplanar::{
     EmissiveFaces, FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, are_coplanar_and_overlap,
 };
-use super::lower::file_emits;
-use crate::assets::LoadedMesh;
+use crate::assets::{FileMaterial, LoadedMesh};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
@@ -30,12 +29,13 @@ pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
 /// Returns a copy of the mesh in which rays hit, see and sample coincident emissive triangles alike. `None` if
 /// there are no such triangles. If `all_emit` is false, the file's materials determine the emissive triangles.
 pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
-    if !all_emit && !loaded.materials.iter().any(file_emits) {
+    if !all_emit && !loaded.materials.iter().any(FileMaterial::emits) {
         return None;
     }
     let emits = |triangle: u32| {
         let material = loaded.mesh.materials.get(triangle as usize);
-        all_emit || material.and_then(|own| loaded.materials.get(*own as usize)).is_some_and(file_emits)
+        all_emit
+            || material.and_then(|own| loaded.materials.get(*own as usize)).is_some_and(FileMaterial::emits)
     };
     let mut mesh = Cow::Borrowed(&loaded.mesh);
     let repeated = repeated_triangles(&loaded.mesh, emits);

@@ -7,7 +7,7 @@ use super::textures::{
     material_source,
 };
 use super::{Image, Images};
-use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
+use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, ScaleAndOffset, Texture, TextureFilter, UvTransform, Wrap};
 use crate::materials::{
@@ -136,59 +136,14 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Material class of a mesh file's material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is
-/// an opacity texture. Materials with the physically based MTL extension are principled. Otherwise, models 3,
-/// 5 and 8 with a specular color are mirrors, or coats over a stronger diffuse color.
-enum FileMaterialKind<'a> {
-    Phong,
-    Principled(&'a PhysicalMaterial),
-    Coated,
-    Mirror,
-    Glass,
-}
-
-fn file_material_kind(own: &FileMaterial) -> FileMaterialKind<'_> {
-    match (own.illumination_model, &own.physical) {
-        (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileMaterialKind::Glass,
-        (_, Some(physical)) => FileMaterialKind::Principled(physical),
-        (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => {
-            if own.is_coated() {
-                FileMaterialKind::Coated
-            } else {
-                FileMaterialKind::Mirror
-            }
-        }
-        (_, None) => FileMaterialKind::Phong,
-    }
-}
-
-/// Whether a mesh file's material emits light.
-pub fn file_emits(own: &FileMaterial) -> bool {
-    match file_material_kind(own) {
-        FileMaterialKind::Phong | FileMaterialKind::Principled(_) => own.emission != Vec3::ZERO,
-        FileMaterialKind::Mirror | FileMaterialKind::Coated | FileMaterialKind::Glass => false,
-    }
-}
-
-/// Whether a mesh file's material is glass.
-pub fn file_is_glass(own: &FileMaterial) -> bool {
-    match file_material_kind(own) {
-        FileMaterialKind::Glass => true,
-        FileMaterialKind::Phong
-        | FileMaterialKind::Principled(_)
-        | FileMaterialKind::Coated
-        | FileMaterialKind::Mirror => false,
-    }
-}
-
 /// Index of refraction and transmittance per unit length of a mesh file's glass. `None` for other materials.
 pub fn file_glass(own: &FileMaterial) -> Option<(f32, DVec3)> {
-    file_is_glass(own).then(|| (own.ior.clamp(1.0, 10.0), DVec3::ONE))
+    own.is_glass().then(|| (own.ior.clamp(1.0, FileMaterial::MAX_IOR), DVec3::ONE))
 }
 
 /// Emission of a mesh file's material, which is one-sided.
 pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
-    if !file_emits(own) {
+    if !own.emits() {
         return Emission::NONE;
     }
     match &own.emission_texture {
@@ -203,7 +158,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 
 /// Opacity of a mesh file's material. `None` if it is fully opaque or glass.
 pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
-    if file_is_glass(own) {
+    if own.is_glass() {
         return None;
     }
     let texture = own.opacity_texture.as_ref();
@@ -218,7 +173,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 
 /// Converts a material from a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
-    let bsdf = match (file_material_kind(own), file_glass(own)) {
+    let bsdf = match (own.kind(), file_glass(own)) {
         (FileMaterialKind::Mirror, _) => {
             Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE))))
         }
@@ -261,10 +216,8 @@ fn file_color(images: &Images, own: &FileMaterial, texture: Option<&FileTexture>
 /// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
 /// incidence.
 fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
-    // A higher reflectance would require an index of refraction above 10.
-    const MOST: f32 = 0.66;
     let specular = own.specular.min(Vec3::ONE);
-    let root = specular.max_element().min(MOST).sqrt();
+    let root = specular.max_element().min(FileMaterial::MAX_COAT).sqrt();
     let diffuse = file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
     let tint = Color::Constant(specular / specular.max_element());
     plastic(diffuse, tint, Number::Constant(0.0), (1.0 + root) / (1.0 - root))
@@ -294,7 +247,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
         color: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE)),
         metallic: number(&physical.metallic_texture, physical.metallic),
         roughness: number(&physical.roughness_texture, physical.roughness),
-        ior: if own.ior > 1.0 { own.ior.min(10.0) } else { 1.5 },
+        ior: if own.ior > 1.0 { own.ior.min(FileMaterial::MAX_IOR) } else { FileMaterial::DEFAULT_IOR },
         specular: Number::Constant(1.0),
         specular_color: Color::Constant(Vec3::ONE),
         transmission: Number::Constant(0.0),

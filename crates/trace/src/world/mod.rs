@@ -41,7 +41,6 @@ pub use distinct_lights::{emissive_meshes, with_distinct_lights};
 pub use emitters::{lights, photon_source, sky_map};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
-pub use lower::{file_emits, file_is_glass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::assets::image::{ColorCurve, ImageEncoding};
-use crate::assets::{FileMaterial, FileTexture, LoadedMesh};
+use crate::assets::{FileLine, FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{
     Channel, Encoding, Material, PixelValue, Scene, TextureFilter, TextureRole, TextureUse,
@@ -54,6 +54,8 @@ pub struct NeededTexture {
     pub mesh_file: Option<usize>,
     /// Name of the mesh file's material that refers to the image. `None` for other textures.
     pub material: Option<String>,
+    /// Line of the MTL file that refers to the image. `None` for other textures.
+    pub statement: Option<FileLine>,
     /// Name of a material that uses the image as a normal map. `None` if there is no such material.
     pub normals_of: Option<String>,
     /// Whether the image is the environment map.
@@ -71,6 +73,7 @@ impl NeededTexture {
             declared: None,
             mesh_file: None,
             material: None,
+            statement: None,
             normals_of: None,
             is_environment: true,
             has_mipmaps: false,
@@ -168,6 +171,7 @@ pub fn textures_needed(
                 declared: Some(texture),
                 mesh_file: None,
                 material: None,
+                statement: None,
                 normals_of: (role == TextureRole::NormalMap).then(|| material.name.clone()),
                 is_environment: false,
                 has_mipmaps: has_mipmaps(scene, texture),
@@ -185,6 +189,7 @@ pub fn textures_needed(
                 declared: None,
                 mesh_file: Some(file),
                 material: Some(own.name.clone()),
+                statement: Some(texture.statement.clone()),
                 normals_of: (used == TextureUse::Normal).then(|| own.name.clone()),
                 is_environment: false,
                 has_mipmaps: false,

@@ -14,7 +14,6 @@ use std::io;
 use std::os::fd::AsFd;
 use std::sync::mpsc::Sender;
 use std::sync::{Condvar, Mutex, PoisonError};
-use std::thread;
 use std::time::Instant;
 
 use nix::errno::Errno;
@@ -23,6 +22,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 pub(super) use self::decoded::DecodedInput;
 pub(super) use self::decoder::Decoder;
 use super::event::{Event, EventSource};
+use crate::system::threads::spawn;
 
 /// Starts a thread that reads standard input. When the input ends, it reports the loss of
 /// [`EventSource::Keys`].
@@ -42,7 +42,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
         }
         let _ = events.send(Event::Lost(EventSource::Keys));
     };
-    thread::Builder::new().name("keys".to_owned()).spawn(read)?;
+    spawn("keys", read)?;
     Ok(())
 }
 

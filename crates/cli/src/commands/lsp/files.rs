@@ -13,6 +13,7 @@ use super::diagnostics;
 use super::document::OpenDocument;
 use crate::control::CancelToken;
 use crate::pipeline::IncrementalChecker;
+use crate::system::threads::spawn;
 
 /// A thread that checks files until the handle is dropped.
 pub(super) struct FileCheckThread {
@@ -51,7 +52,7 @@ impl FileCheckThread {
                 }
             }
         };
-        let thread = std::thread::Builder::new().name("files".to_owned()).spawn(read).ok()?;
+        let thread = spawn("files", read).ok()?;
         Some(Self { shared, thread: Some(thread) })
     }
 

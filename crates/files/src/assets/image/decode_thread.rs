@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::assets::read::Monitor;
 use crate::control::{CancelToken, Cancelled};
+use crate::system::threads::spawn;
 
 /// Polling interval for the cancel token.
 const POLL: Duration = Duration::from_millis(2);
@@ -56,7 +57,7 @@ pub(super) fn run<T: Send + 'static>(
             let _ = send.send(work(ProgressReporter(Some(report))));
         }
     };
-    let Ok(thread) = thread::Builder::new().name("glimt-image".to_owned()).spawn(run) else {
+    let Ok(thread) = spawn("glimt-image", run) else {
         return Ok(take(&work).map(|work| work(ProgressReporter(None))));
     };
     let waited = wait(&reports, &result, monitor, total);

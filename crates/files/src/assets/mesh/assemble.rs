@@ -1,5 +1,7 @@
 //! Builds a valid [`TriangleMesh`] from a parser's output.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use super::normals::fill_missing_normals;
@@ -59,6 +61,10 @@ pub(super) fn assemble_text(
     if triangles.is_empty() {
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
+    let bad_uvs = [&uvs, &second_uvs].map(|uvs| non_finite_vertices(uvs, |uv| uv.is_finite()));
+    let bad_normals = non_finite_vertices(&normals, |normal| normal.is_finite());
+    warnings.extend(non_finite_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
+    warnings.extend(non_finite_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
     let materials_of = triangle_materials;
     let mut mesh = TriangleMesh {
         origin,
@@ -113,15 +119,44 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
     format!("no usable face: {non_finite} of {faces} have a non-finite corner, {degenerate} have zero area")
 }
 
+const NON_FINITE_UVS: &str = "has non-finite texture coordinates; such coordinates are set to (0, 0)";
+const NON_FINITE_NORMALS: &str = "has non-finite normals; such normals are computed";
+
+/// Vertices with an attribute that is not finite.
+fn non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
+    (0_u32..).zip(values).filter(|(_, value)| !is_finite(value)).map(|(vertex, _)| vertex).collect()
+}
+
+/// Warns about the first face that has any of these vertices.
+fn non_finite_warning(
+    faces: &Faces,
+    line_of: impl Fn(usize) -> Option<usize>,
+    vertices: &[u32],
+    words: &str,
+) -> Option<String> {
+    let vertices: HashSet<u32> = vertices.iter().copied().collect();
+    if vertices.is_empty() {
+        return None;
+    }
+    let corner = faces.corners.iter().position(|vertex| vertices.contains(vertex))?;
+    let face = faces.face_of_corner(corner);
+    Some(format!("{} {words}", face_label(face, line_of(face))))
+}
+
+/// Label of a face, with its line in text files.
+fn face_label(face: usize, line: Option<usize>) -> String {
+    match line {
+        Some(line) => format!("line {line}: face {}", face + 1),
+        None => format!("face {}", face + 1),
+    }
+}
+
 /// Warns about self-intersecting polygons.
 fn self_intersection_warning(
     (count, first): (u64, usize),
     line_of: impl Fn(usize) -> Option<usize>,
 ) -> Option<String> {
-    let first_face = || match line_of(first) {
-        Some(line) => format!("line {line}: face {}", first + 1),
-        None => format!("face {}", first + 1),
-    };
+    let first_face = || face_label(first, line_of(first));
     match count {
         0 => None,
         1 => Some(format!("{} intersects itself; its triangles may overlap", first_face())),
@@ -424,7 +459,11 @@ mod tests {
             faces: faces(&[&[0, 1, 2, 3]]),
             ..ParsedMesh::default()
         };
-        let mesh = assembled(parsed).expect("good").mesh;
+        let LoadedMesh { mesh, warnings, .. } = assembled(parsed).expect("good");
+        assert_eq!(
+            warnings,
+            [NON_FINITE_UVS, NON_FINITE_NORMALS].map(|words| format!("{} {words}", face_label(0, None)))
+        );
         assert_eq!(mesh.normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::NEG_Z]);
         assert_eq!(mesh.uvs[1], Vec2::ZERO);
     }

@@ -125,8 +125,9 @@ struct OffColors {
 
 impl OffColors {
     /// Adds a color for `times` vertices or corners.
-    fn push(&mut self, color: &[f64], times: usize) {
-        let color: Option<[f64; 3]> = color.first_chunk().copied().inspect(|color| self.range.add(*color));
+    fn push(&mut self, color: &[f64], times: usize, at: usize) {
+        let color: Option<[f64; 3]> = color.first_chunk().copied();
+        color.iter().for_each(|color| self.range.add(*color, at));
         self.all.extend(std::iter::repeat_n(color, times));
     }
 
@@ -144,6 +145,8 @@ impl OffColors {
         if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.one()) {
             warnings.push(alpha_ignored(source.line(at)));
         }
+        let outside = self.range.outside();
+        warnings.extend(outside.map(|(at, words)| format!("line {}: {words}", source.line(at))));
         let bytes = |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.bytes(color));
         self.all.into_iter().map(bytes).collect()
     }
@@ -304,7 +307,7 @@ impl OffReader<'_> {
 
     /// Adds the color at the end of a line to `times` vertices or corners.
     fn color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
-        colors.push(color, times);
+        colors.push(color, times, self.cursor.at());
         match color {
             [_, _, _, alpha] => colors.add_alpha(*alpha, self.cursor.at()),
             [_] => self.indices.add(self.cursor.at()),
@@ -398,6 +401,7 @@ impl OffReader<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::parsed::color_clamped;
     use super::*;
     use crate::assets::read::Monitor;
     use crate::assets::rejection;
@@ -493,6 +497,8 @@ mod tests {
         assert_eq!(off(["", ""]), (vec![], vec![]));
         let index = ignored_lines(7, 1, COLOR_INDEX);
         assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index]));
+        let clamped = vec![format!("line 8: {}", color_clamped(-1.0, 255.0))];
+        assert_eq!(off(["255 0 0", "-1 255 0"]), (both.0, clamped));
         let transparent = vec![alpha_ignored(8)];
         assert_eq!(off(["1 0 0", "0 1 0 0.5"]), ([[red; 3], [green; 3]].concat(), transparent));
         let more = ignored_lines(7, 2, UNDECLARED);

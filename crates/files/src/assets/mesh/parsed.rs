@@ -10,6 +10,16 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
+/// Index of the face that contains a corner, given the number of corners of each face.
+pub(super) fn face_of_corner(arities: &[u32], corner: usize) -> usize {
+    let mut end = 0;
+    let is_before = |arity: &&u32| {
+        end += **arity as usize;
+        end <= corner
+    };
+    arities.iter().take_while(is_before).count()
+}
+
 /// Concatenated vertex indices of all polygons.
 #[derive(Debug, Default)]
 pub(crate) struct Faces {
@@ -53,6 +63,14 @@ impl Faces {
     /// Maximum number of corners, limited by 32-bit vertex indices.
     pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
 
+    /// Index of the face that contains a corner.
+    pub(super) fn face_of_corner(&self, corner: usize) -> usize {
+        if self.arities.is_empty() {
+            return corner / 3;
+        }
+        face_of_corner(&self.arities, corner)
+    }
+
     /// Number of faces.
     pub(crate) fn len(&self) -> usize {
         if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
@@ -86,31 +104,83 @@ pub(crate) struct ParsedMesh {
     pub(crate) pictures: Vec<PathBuf>,
 }
 
-/// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
+/// Extremes of the values of a color component, each with the byte offset of its color.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ColorRange {
-    max: f64,
-    has_fractions: bool,
+pub(crate) struct Extremes {
+    least: Option<(f64, usize)>,
+    greatest: Option<(f64, usize)>,
+    non_finite: Option<(f64, usize)>,
+    /// First number that is not an integer.
+    fraction: Option<(f64, usize)>,
 }
 
-impl ColorRange {
-    /// Largest value so far.
-    pub(crate) fn max(&self) -> f64 {
-        self.max
+impl Extremes {
+    pub(super) fn add(&mut self, value: f64, at: usize) {
+        if !value.is_finite() {
+            self.non_finite.get_or_insert((value, at));
+            return;
+        }
+        if value.fract() != 0.0 {
+            self.fraction.get_or_insert((value, at));
+        }
+        if self.least.is_none_or(|(least, _)| value < least) {
+            self.least = Some((value, at));
+        }
+        if self.greatest.is_none_or(|(greatest, _)| value > greatest) {
+            self.greatest = Some((value, at));
+        }
     }
 
-    pub(crate) fn add(&mut self, parts: [f64; 3]) {
-        for part in parts.into_iter().filter(|part| part.is_finite()) {
-            self.max = self.max.max(part);
-            self.has_fractions |= part.fract() != 0.0;
-        }
+    /// Largest value. 0 if all are negative.
+    pub(super) fn max(&self) -> f64 {
+        self.greatest.map_or(0.0, |(greatest, _)| greatest.max(0.0))
+    }
+
+    /// A value outside of 0 to `one`: the byte offset of its color, and a warning.
+    pub(super) fn outside(&self, one: f64) -> Option<(usize, String)> {
+        let least = self.least.filter(|(least, _)| *least < 0.0);
+        let greatest = self.greatest.filter(|(greatest, _)| *greatest > one);
+        let (value, at) = self.non_finite.or(greatest).or(least)?;
+        Some((at, color_clamped(value, one)))
+    }
+
+    /// A value of an integer type that is not an integer: the byte offset of its color, and a warning.
+    pub(super) fn fraction(&self) -> Option<(usize, String)> {
+        self.fraction.map(|(value, at)| (at, color_not_integer(value)))
+    }
+}
+
+/// Warning about colors outside of their range.
+pub(super) fn color_clamped(value: f64, one: f64) -> String {
+    format!("the color component {value} is outside the range from 0 to {one}; such values are clamped")
+}
+
+/// Warning about fractions in colors declared as integers.
+pub(super) fn color_not_integer(value: f64) -> String {
+    format!("the color component {value} is not an integer, as the header declares; fractions are dropped")
+}
+
+/// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ColorRange(Extremes);
+
+impl ColorRange {
+    /// Adds a color, given its byte offset.
+    pub(crate) fn add(&mut self, parts: [f64; 3], at: usize) {
+        parts.into_iter().for_each(|part| self.0.add(part, at));
     }
 
     /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are taken
     /// as bright colors, not bytes.
     pub(crate) fn one(&self) -> f64 {
-        let are_bytes = self.max > 2.0 || (self.max > 1.0 && !self.has_fractions);
+        let (max, has_fractions) = (self.0.max(), self.0.fraction.is_some());
+        let are_bytes = max > 2.0 || (max > 1.0 && !has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
+    }
+
+    /// A value outside of the range: the byte offset of its color, and a warning.
+    pub(super) fn outside(&self) -> Option<(usize, String)> {
+        self.0.outside(self.one())
     }
 
     /// Converts a color in this range to bytes.

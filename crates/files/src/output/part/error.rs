@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use nix::errno::Errno;
 
 use crate::system::describe_error;
+use crate::system::file::FileKind;
 
 /// Index of a part, and the number of parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +27,14 @@ pub enum PartError {
         path: PathBuf,
         /// System error.
         source: io::Error,
+    },
+    /// The path is not a regular file.
+    #[error("{}: it is {}, not a part or checkpoint", path.display(), kind.words())]
+    NotRegular {
+        /// The path.
+        path: PathBuf,
+        /// Its file type.
+        kind: FileKind,
     },
     /// The file has a different format.
     #[error("{}: not a part or checkpoint written by glimt", path.display())]

@@ -11,6 +11,7 @@ use super::head::{Head, PartKind};
 use super::{Digest, FOOTER, Footer, MARK, PartError, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
+use crate::system::file;
 
 /// A validated part or checkpoint on disk.
 #[derive(Debug)]
@@ -35,7 +36,7 @@ pub(super) const IMPOSSIBLE_HEADER: &str = "the header has invalid values";
 /// Whether a file has the magic number of parts and checkpoints.
 pub fn is_part(path: &Path) -> bool {
     let mut mark = [0; MARK.len()];
-    open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
+    open(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
 }
 
 /// Finds an input file of these images with the same content as the file at `path`, and returns its name.
@@ -66,7 +67,7 @@ impl PartFile {
     /// cancelled.
     pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
-        let file = open(path).map_err(unreadable)?;
+        let file = open(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
         let mut reader = PartReader { path, file: BufReader::with_capacity(1 << 20, &file), at: 0, size };
         let (head, header_digest) = reader.head()?;
@@ -104,7 +105,7 @@ impl PartFile {
     /// Same as [`Self::open`].
     pub fn head(path: &Path) -> Result<Head, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
-        let file = open(path).map_err(unreadable)?;
+        let file = open(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
         PartReader { path, file: BufReader::new(&file), at: 0, size }.head().map(|(head, _)| head)
     }
@@ -166,20 +167,22 @@ impl PartFile {
     }
 }
 
-/// Opens a regular file. If the process has reached its limit on open files, raises the limit.
-fn open(path: &Path) -> io::Result<File> {
-    // Reading a pipe or device might never end.
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(ErrorKind::InvalidInput, "not a regular file"));
-    }
-    match File::open(path) {
+/// Opens a regular file. If the process's limit on open files is reached, raises it.
+fn open(path: &Path) -> Result<File, PartError> {
+    let opened = match file::open(path) {
         Err(error) if error.raw_os_error() == Some(nix::errno::Errno::EMFILE as i32) => {
-            let (_, limit) = getrlimit(Resource::RLIMIT_NOFILE)?;
-            setrlimit(Resource::RLIMIT_NOFILE, limit, limit)?;
-            File::open(path)
+            raise_file_limit().and_then(|()| file::open(path))
         }
         opened => opened,
-    }
+    };
+    let found = opened.map_err(|source| PartError::Unreadable { path: path.to_owned(), source })?;
+    found.map(|(file, _)| file).map_err(|kind| PartError::NotRegular { path: path.to_owned(), kind })
+}
+
+/// Raises the limit on open files to its maximum.
+fn raise_file_limit() -> io::Result<()> {
+    let (_, limit) = getrlimit(Resource::RLIMIT_NOFILE)?;
+    Ok(setrlimit(Resource::RLIMIT_NOFILE, limit, limit)?)
 }
 
 /// Sequential reader of a part file.

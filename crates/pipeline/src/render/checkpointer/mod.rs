@@ -227,6 +227,7 @@ impl<'a> Checkpointer<'a> {
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
+                    | PartError::NotRegular { .. }
                     | PartError::Foreign { .. }
                     | PartError::Unfinished { .. }
                     | PartError::Damaged { .. }
@@ -481,6 +482,7 @@ fn rejection_reason(error: &PartError) -> String {
             format!("format version {found}, but this glimt reads version {known}")
         }
         PartError::Unreadable { .. }
+        | PartError::NotRegular { .. }
         | PartError::Foreign { .. }
         | PartError::Kind { .. }
         | PartError::Doubled { .. }

@@ -3,8 +3,8 @@
 
 use std::collections::HashMap;
 
-use super::super::lower::{file_glass, file_is_glass};
-use crate::assets::LoadedMesh;
+use super::super::lower::file_glass;
+use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
@@ -168,7 +168,7 @@ impl GlassParts {
             MeshGlass::Some => mesh
                 .materials
                 .get(triangle)
-                .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(file_is_glass)),
+                .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(FileMaterial::is_glass)),
         };
         // Sum area and volume over the triangles in world coordinates.
         let (mut area, mut volume, mut reach) = (0.0, 0.0, DVec3::ZERO);
@@ -223,7 +223,7 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
         (None, Some(mesh)) => {
-            meshes[mesh.file].materials.iter().any(file_is_glass).then_some(MeshGlass::Some)
+            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(MeshGlass::Some)
         }
         (None, None) => None,
     }

@@ -6,7 +6,7 @@ use super::map::{Map, MapKind};
 use super::material::{is_opaque_despite_tr, material};
 use super::statements::{MtlColor, MtlNumber};
 use super::{MtlMaterial, WithLine};
-use crate::assets::FileMaterial;
+use crate::assets::{FileMaterial, FileMaterialKind};
 use crate::math::Vec3;
 
 /// A statement that is ignored or approximated.
@@ -46,32 +46,12 @@ fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
     let mut add = |line: Option<usize>, words: &str| {
         ignored.push(IgnoredStatement { line: line.unwrap_or(found.line), words: words.to_owned() });
     };
-    let model = converted.illumination_model.unwrap_or(2);
-    let line_of_model = found.illumination.map(|at| at.line);
-    match model {
-        0 => add(line_of_model, UNSHADED),
-        10 => add(line_of_model, SHADOW_CATCHER),
-        11.. => add(line_of_model, UNKNOWN_MODEL),
-        1..=9 => {}
-    }
-    let is_glass = matches!(model, 4 | 6 | 7 | 9) && converted.opacity_texture.is_none();
-    if is_glass && converted.ior <= 1.0 {
-        add(line_of_model, INVISIBLE_GLASS);
-    }
-    if is_opaque_despite_tr(found) && converted.opacity_texture.is_none() && !is_glass {
-        let line = found.numbers[MtlNumber::Transparency as usize].map(|at| at.line);
-        add(line, OPAQUE_TR);
-    }
-    let has_filter = found.color(MtlColor::Filter).filter(|at| at.value != [1.0; 3]);
-    if let Some(at) = has_filter
-        && (is_glass || converted.opacity < 1.0 || converted.opacity_texture.is_some())
-    {
-        add(Some(at.line), FILTER_IGNORED);
-    }
-    warn_about_reflectance(found, &converted, model, &mut add);
-    warn_about_pbr(found, &mut add);
+    warn_about_illumination(found, &converted, &mut add);
+    warn_about_opacity(found, &converted, &mut add);
+    warn_about_reflectance(found, &converted, &mut add);
+    warn_about_pbr(found, &converted, &mut add);
     for (kind, map) in &found.maps {
-        warn_about_map(found, (*kind, map), &mut add);
+        warn_about_map(found, &converted, (*kind, map), &mut add);
     }
     ignored
 }
@@ -80,14 +60,21 @@ pub(super) const UNSHADED: &str = "`illum 0` (unshaded color) is rendered as a m
 pub(super) const SHADOW_CATCHER: &str = "`illum 10` (shadow catcher) is rendered as an ordinary surface";
 pub(super) const UNKNOWN_MODEL: &str = "unknown illumination model; `illum 2` is used";
 pub(super) const INVISIBLE_GLASS: &str = "glass without an index of refraction `Ni` above 1 is invisible";
+pub(super) const IOR_CLAMPED: &str = "`Ni` is clamped to 10";
 const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for an invisible surface";
+const TR_IGNORED: &str = "`Tr` is ignored because `d` has priority";
+const OPACITY_MAP: &str = "the opacity map replaces `d`";
 pub(super) const FILTER_IGNORED: &str = "`Tf` is ignored; use `tint` in a material of the scene";
 const NO_HIGHLIGHT: &str = "`Ks` has no effect without `Ns` above 0";
 pub(super) const GAINS_ENERGY: &str =
     "the material reflects more light than it receives; keep `Kd` and `Ks` at or below 1";
+const BRIGHT_DIFFUSE: &str = "`Kd` is clamped to 1";
+const BRIGHT_COAT: &str = "`Ks` of a mirror over a diffuse color is clamped to 0.66";
 pub(super) const BRIGHT_MIRROR: &str = "`Ks` of a mirror is clamped to 1";
 pub(super) const DIFFUSE_UNDER_MIRROR: &str =
     "`Kd` is ignored because the mirror reflection `Ks` is stronger";
+const LOW_IOR: &str = "`Ni` is ignored because it is not above 1; 1.5 is used";
+const SECOND_NORMAL_MAP: &str = "`bump` has no effect because the material has a normal map";
 pub(super) const AMBIENT_MAP: &str = "`map_Ka` is not supported; ambient light uses the diffuse color";
 
 pub(super) fn statement_ignored(keyword: &str) -> String {
@@ -98,86 +85,197 @@ pub(super) fn map_unsupported(keyword: &str) -> String {
     format!("`{keyword}` is not supported")
 }
 
-pub(super) fn option_ignored(option: &str) -> String {
-    format!("option `{option}` is ignored")
+fn without_effect(keyword: &str, kind: FileMaterialKind<'_>) -> String {
+    let kind = match kind {
+        FileMaterialKind::Phong => "Phong materials",
+        FileMaterialKind::Principled(_) => "materials with PBR statements",
+        FileMaterialKind::Coated | FileMaterialKind::Mirror => "mirrors",
+        FileMaterialKind::Glass => "glass",
+    };
+    format!("`{keyword}` has no effect on {kind}")
 }
 
 fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
     at.map(|at| at.line)
 }
 
-/// Warns about reflectances that cannot be rendered as specified.
-fn warn_about_reflectance(
-    found: &MtlMaterial,
-    converted: &FileMaterial,
-    model: u8,
-    add: &mut impl FnMut(Option<usize>, &str),
-) {
-    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
-    let is_rough = matches!(model, 0..=2 | 10..) || converted.specular == Vec3::ZERO;
-    let is_phong = converted.physical.is_none() && !matches!(model, 4 | 6 | 7 | 9);
-    let has_strength = converted.specular != Vec3::ZERO || converted.specular_texture.is_some();
-    let is_shiny = is_phong && matches!(model, 2 | 10..);
-    if is_shiny && has_strength && !converted.has_highlight() {
-        let line = line(specular).or(found.map(MapKind::Specular).map(|map| map.line));
-        add(line, NO_HIGHLIGHT);
-    }
-    if !is_phong {
-        return;
-    }
-    let kd = if converted.diffuse_texture.is_some() { Vec3::ZERO } else { converted.diffuse };
-    let has_highlight = is_shiny && converted.has_highlight() && converted.specular_texture.is_none();
-    let ks =
-        if has_highlight { converted.specular * (2.0 / (converted.shininess + 2.0)) } else { Vec3::ZERO };
-    if (kd + ks).max_element() > 1.0 + 1e-5 {
-        let line = line(diffuse).or(line(specular));
-        add(line, GAINS_ENERGY);
-    } else if converted.specular.max_element() > 1.0 + 1e-5 && !is_rough {
-        add(line(specular), BRIGHT_MIRROR);
-    }
-    let is_mirror = !is_rough && !converted.is_coated();
-    if is_mirror && (converted.diffuse != Vec3::ZERO || converted.diffuse_texture.is_some()) {
-        add(line(diffuse), DIFFUSE_UNDER_MIRROR);
-    }
+/// Whether a number is above 1, except for rounding errors.
+fn is_above_one(number: f32) -> bool {
+    number > 1.0 + 1e-5
 }
 
-/// Warns about parameters of the PBR extension that have no effect.
-fn warn_about_pbr(found: &MtlMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
-    for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
-        let given = found.numbers[number as usize].filter(|at| at.value != 0.0);
-        if let Some(at) = given {
-            add(Some(at.line), &statement_ignored(number.keyword()));
+/// Warns about illumination models and indices of refraction that are approximated.
+fn warn_about_illumination(
+    found: &MtlMaterial,
+    converted: &FileMaterial,
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
+    let model = line(found.illumination);
+    match converted.illumination_model.unwrap_or(2) {
+        0 => add(model, UNSHADED),
+        10 => add(model, SHADOW_CATCHER),
+        11.. => add(model, UNKNOWN_MODEL),
+        1..=9 => {}
+    }
+    let ior = found.number_at(MtlNumber::Ior);
+    match converted.kind() {
+        FileMaterialKind::Glass if converted.ior <= 1.0 => add(model, INVISIBLE_GLASS),
+        FileMaterialKind::Glass | FileMaterialKind::Principled(_)
+            if converted.ior > FileMaterial::MAX_IOR =>
+        {
+            add(line(ior), IOR_CLAMPED);
+        }
+        FileMaterialKind::Principled(_) if ior.is_some() && converted.ior <= 1.0 => add(line(ior), LOW_IOR),
+        FileMaterialKind::Principled(_)
+        | FileMaterialKind::Phong
+        | FileMaterialKind::Coated
+        | FileMaterialKind::Mirror
+        | FileMaterialKind::Glass => {}
+    }
+    if converted.emission != Vec3::ZERO && !converted.emits() {
+        let emission = found.color(MtlColor::Emission);
+        if emission.is_some() {
+            add(line(emission), &without_effect("Ke", converted.kind()));
         }
     }
 }
 
-/// Warns about an unsupported map or unsupported options of a map.
+/// Warns about opacities and transmission filters that are ignored. Glass has no opacity.
+fn warn_about_opacity(
+    found: &MtlMaterial,
+    converted: &FileMaterial,
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
+    if let Some(at) = found.color(MtlColor::Filter).filter(|at| at.value != [1.0; 3]) {
+        add(Some(at.line), FILTER_IGNORED);
+    }
+    if converted.is_glass() {
+        return;
+    }
+    let [opacity, transparency] =
+        [MtlNumber::Dissolve, MtlNumber::Transparency].map(|of| found.number_at(of));
+    if converted.opacity_texture.is_some() {
+        let given = opacity.or(transparency).filter(|_| converted.opacity < 1.0);
+        given.iter().for_each(|at| add(Some(at.line), OPACITY_MAP));
+    } else if is_opaque_despite_tr(found) {
+        add(line(transparency), OPAQUE_TR);
+    }
+    if let (Some(opacity), Some(transparency)) = (opacity, transparency) {
+        // Some programs write the opacity as `Tr`.
+        let is_same = |other: f64| (opacity.value - other).abs() < 1e-3;
+        if !is_same(transparency.value) && !is_same(1.0 - transparency.value) {
+            add(Some(transparency.line), TR_IGNORED);
+        }
+    }
+}
+
+/// Warns about reflectances that cannot be rendered as specified.
+fn warn_about_reflectance(
+    found: &MtlMaterial,
+    converted: &FileMaterial,
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
+    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
+    let kd = match converted.diffuse_texture {
+        Some(_) => 0.0,
+        None => converted.diffuse.max_element(),
+    };
+    let ks = converted.specular.max_element();
+    match converted.kind() {
+        FileMaterialKind::Phong => warn_about_phong(found, converted, add),
+        FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_above_one(kd) => {
+            add(line(diffuse), BRIGHT_DIFFUSE);
+        }
+        FileMaterialKind::Coated if ks > FileMaterial::MAX_COAT => add(line(specular), BRIGHT_COAT),
+        FileMaterialKind::Mirror if is_above_one(ks) => add(line(specular), BRIGHT_MIRROR),
+        FileMaterialKind::Mirror if kd > 0.0 => add(line(diffuse), DIFFUSE_UNDER_MIRROR),
+        FileMaterialKind::Principled(_)
+        | FileMaterialKind::Coated
+        | FileMaterialKind::Mirror
+        | FileMaterialKind::Glass => {}
+    }
+}
+
+/// Warns about a missing highlight and about energy gain.
+fn warn_about_phong(
+    found: &MtlMaterial,
+    converted: &FileMaterial,
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
+    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
+    let specular_map = found.map(MapKind::Specular);
+    let is_matte = matches!(converted.illumination_model, Some(0 | 1));
+    let has_strength = converted.specular != Vec3::ZERO || specular_map.is_some();
+    if !is_matte && has_strength && !converted.has_highlight() {
+        add(line(specular).or(specular_map.map(|map| map.line)), NO_HIGHLIGHT);
+    }
+    let kd = if converted.diffuse_texture.is_some() { Vec3::ZERO } else { converted.diffuse };
+    let has_constant_highlight = converted.has_highlight() && converted.specular_texture.is_none();
+    let ks = match has_constant_highlight {
+        true => converted.specular * (2.0 / (converted.shininess + 2.0)),
+        false => Vec3::ZERO,
+    };
+    if is_above_one((kd + ks).max_element()) {
+        add(line(diffuse).or(line(specular)), GAINS_ENERGY);
+    }
+}
+
+/// Warns about parameters of the PBR extension that have no effect.
+fn warn_about_pbr(found: &MtlMaterial, converted: &FileMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
+    let nonzero = |number: MtlNumber| found.number_at(number).filter(|at| at.value != 0.0);
+    for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
+        if let Some(at) = nonzero(number) {
+            add(Some(at.line), &statement_ignored(number.keyword()));
+        }
+    }
+    for number in [MtlNumber::Metallic, MtlNumber::Coat] {
+        if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
+            add(Some(at.line), &without_effect(number.keyword(), converted.kind()));
+        }
+    }
+}
+
+/// Warns about maps and options that are unsupported or have no effect.
 fn warn_about_map(
     found: &MtlMaterial,
+    converted: &FileMaterial,
     (kind, map): (MapKind, &Map),
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    match kind {
-        MapKind::Other(name) => return add(Some(map.line), &map_unsupported(name)),
+    let line = Some(map.line);
+    let physical = converted.physical.as_ref();
+    let texture = match kind {
+        MapKind::Other(name) => return add(line, &map_unsupported(name)),
         MapKind::Ambient => {
             let is_diffuse = found
                 .map(MapKind::Diffuse)
                 .is_some_and(|diffuse| diffuse.candidate_paths().eq(map.candidate_paths()));
             if !is_diffuse {
-                add(Some(map.line), AMBIENT_MAP);
+                add(line, AMBIENT_MAP);
             }
             return;
         }
-        MapKind::Diffuse
-        | MapKind::Specular
-        | MapKind::Emission
-        | MapKind::Opacity
-        | MapKind::Normal
-        | MapKind::Bump
-        | MapKind::Roughness
-        | MapKind::Metallic => {}
+        MapKind::Bump if found.map(MapKind::Normal).is_some() => return add(line, SECOND_NORMAL_MAP),
+        MapKind::Diffuse => converted.diffuse_texture.as_ref(),
+        MapKind::Specular => converted.specular_texture.as_ref(),
+        MapKind::Emission => converted.emission_texture.as_ref(),
+        MapKind::Opacity => converted.opacity_texture.as_ref(),
+        MapKind::Normal | MapKind::Bump => converted.normal_texture.as_ref(),
+        MapKind::Roughness => physical.and_then(|own| own.roughness_texture.as_ref()),
+        MapKind::Metallic => physical.and_then(|own| own.metallic_texture.as_ref()),
+    };
+    if texture.is_none() {
+        match converted.kind() {
+            // The warning about a missing highlight covers the only such map.
+            FileMaterialKind::Phong => {}
+            FileMaterialKind::Principled(_)
+            | FileMaterialKind::Coated
+            | FileMaterialKind::Mirror
+            | FileMaterialKind::Glass => add(line, &without_effect(kind.keyword(), converted.kind())),
+        }
+        return;
     }
-    for option in map.ignored_options(kind) {
-        add(Some(map.line), &option_ignored(&option));
+    for words in map.option_warnings(kind) {
+        add(line, &words);
     }
 }

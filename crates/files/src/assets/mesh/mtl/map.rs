@@ -4,8 +4,9 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use crate::assets::FileTexture;
+use crate::assets::{FileLine, FileTexture};
 use crate::materials::{Channel, PixelValue};
+use crate::math::limits::{LARGEST, is_too_short};
 use crate::math::{DVec2, Vec2};
 
 /// Material parameter that a map controls.
@@ -58,6 +59,22 @@ impl MapKind {
         })
     }
 
+    /// Keyword of the statement. One of them if there are several.
+    pub(super) fn keyword(self) -> &'static str {
+        match self {
+            Self::Diffuse => "map_Kd",
+            Self::Specular => "map_Ks",
+            Self::Emission => "map_Ke",
+            Self::Opacity => "map_d",
+            Self::Normal => "norm",
+            Self::Bump => "bump",
+            Self::Roughness => "map_Pr",
+            Self::Metallic => "map_Pm",
+            Self::Ambient => "map_Ka",
+            Self::Other(name) => name,
+        }
+    }
+
     /// Whether the map contains colors.
     fn is_color(self) -> bool {
         match self {
@@ -95,8 +112,8 @@ pub(super) struct Map {
     number: Option<PixelValue>,
     /// Scale factor for the normal map's slopes.
     pub(super) strength: f64,
-    /// Options that have no effect.
-    ignored: Vec<String>,
+    /// Warnings about options.
+    warnings: Vec<String>,
     /// File name: the text after the options.
     name: String,
 }
@@ -112,91 +129,65 @@ impl Map {
             is_clamped: false,
             number: None,
             strength: 1.0,
-            ignored: Vec::new(),
+            warnings: Vec::new(),
             name: String::new(),
         };
         let mut rest = MapArguments(text.trim());
         while let Some(option) = rest.option() {
-            map.add(&option, &mut rest);
+            let start = rest.0;
+            if !map.add(&option, &mut rest) {
+                let arguments = start[..start.len() - rest.0.len()].trim_end();
+                let option = format!("{option} {arguments}");
+                map.warnings.push(option_ignored(option.trim_end()));
+            }
         }
         // Some exporters quote names that contain spaces.
         let name = rest.0;
         map.name = name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).to_owned();
+        let first = map.name.split_whitespace().next().filter(|first| first.len() < map.name.len());
+        map.warnings.extend(first.filter(|first| is_like_option(first)).map(not_an_option));
         (!map.name.is_empty()).then_some(map)
     }
 
-    /// Parses the arguments of an option.
-    fn add(&mut self, option: &str, rest: &mut MapArguments<'_>) {
+    /// Parses the arguments of an option. Returns whether all of them can be used.
+    fn add(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
         match option {
             "-s" => {
-                let [u, v, _] = rest.numbers([1.0; 3]);
-                self.repeat = [u, v];
+                let scale = rest.numbers([1.0; 3]).filter(|[u, v, _]| !is_zero(*u) && !is_zero(*v));
+                set(&mut self.repeat, scale.map(|[u, v, _]| [u, v]))
             }
-            "-o" => {
-                let [u, v, _] = rest.numbers([0.0; 3]);
-                self.offset = [u, v];
-            }
-            "-t" => {
-                if rest.numbers([0.0; 3]) != [0.0; 3] {
-                    self.ignored.push("-t".to_owned());
-                }
-            }
-            "-mm" => self.range = rest.numbers([0.0, 1.0]),
+            "-o" => set(&mut self.offset, rest.numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
+            "-t" => rest.numbers([0.0; 3]) == Some([0.0; 3]),
+            "-mm" => set(&mut self.range, rest.numbers([0.0, 1.0])),
             "-bm" => {
-                let [strength] = rest.numbers([1.0]);
-                if strength < 0.0 {
-                    self.ignored.push(format!("-bm {strength}"));
-                } else {
-                    self.strength = strength;
-                }
+                let strength = rest.numbers([1.0]).filter(|[strength]| *strength >= 0.0);
+                set(&mut self.strength, strength.map(|[strength]| strength))
             }
-            "-clamp" => self.is_clamped = rest.next_switch().unwrap_or(false),
-            "-imfchan" => self.add_channel(rest),
-            "-boost" | "-texres" => {
-                if rest.numbers([0.0]) != [0.0] {
-                    self.ignored.push(option.to_owned());
-                }
-            }
-            "-blendu" | "-blendv" => {
-                if rest.next_switch() == Some(false) {
-                    self.ignored.push(format!("{option} off"));
-                }
-            }
-            "-cc" => {
-                if rest.next_switch() == Some(true) {
-                    self.ignored.push("-cc on".to_owned());
-                }
+            "-clamp" => set(&mut self.is_clamped, rest.next_switch()),
+            "-imfchan" => set(&mut self.number, rest.word().and_then(channel).map(Some)),
+            "-boost" | "-texres" => rest.numbers([0.0]) == Some([0.0]),
+            "-blendu" | "-blendv" => rest.next_switch() == Some(true),
+            "-cc" => rest.next_switch() == Some(false),
+            "-type" | "-colorspace" => {
+                rest.word();
+                false
             }
             _ => {
-                rest.word();
-                self.ignored.push(option.to_owned());
+                while rest.next_is_value() {
+                    rest.word();
+                }
+                false
             }
         }
     }
 
-    fn add_channel(&mut self, rest: &mut MapArguments<'_>) {
-        let Some(letter) = rest.word() else { return };
-        let channel = |channel| Some(PixelValue::Channel(channel));
-        self.number = match letter.to_ascii_lowercase().as_str() {
-            "r" => channel(Channel::Red),
-            "g" => channel(Channel::Green),
-            "b" => channel(Channel::Blue),
-            "m" => channel(Channel::Alpha),
-            "l" => Some(PixelValue::Luminance),
-            _ => {
-                self.ignored.push(format!("-imfchan {letter}"));
-                None
-            }
-        };
-    }
-
-    /// Options that have no effect on this kind of map.
-    pub(super) fn ignored_options(&self, kind: MapKind) -> impl Iterator<Item = String> {
-        let channel =
-            (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
-        let range = (self.range != [0.0, 1.0] && kind.is_normal()).then(|| "-mm".to_owned());
-        let strength = (self.strength != 1.0 && !kind.is_normal()).then(|| "-bm".to_owned());
-        self.ignored.iter().cloned().chain(channel).chain(range).chain(strength)
+    /// Warnings about options that cannot be used or have no effect on this kind of map.
+    pub(super) fn option_warnings(&self, kind: MapKind) -> impl Iterator<Item = String> {
+        let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then_some("-imfchan");
+        let range = (self.range != [0.0, 1.0] && kind.is_normal()).then_some("-mm");
+        let strength = (self.strength != 1.0 && !kind.is_normal()).then_some("-bm");
+        let unused = channel.into_iter().chain(range).chain(strength).map(option_ignored);
+        self.warnings.iter().cloned().chain(unused)
     }
 
     /// Candidate paths of the image file, relative to the MTL file's folder: the whole name, then the name
@@ -205,9 +196,11 @@ impl Map {
         without_trailing_comments(&self.name).flat_map(|name| decoded_paths(&name.replace('\\', "/")))
     }
 
-    /// Texture for this map. Its path is the first candidate that exists, or the first candidate if none
-    /// exists.
-    pub(super) fn texture(&self, folder: &Path) -> Option<FileTexture> {
+    /// Texture for this map of the MTL file at `library`. Its path is the first candidate that exists, or the
+    /// first candidate if none exists.
+    pub(super) fn texture(&self, library: &Path) -> Option<FileTexture> {
+        let folder = library.parent().unwrap_or(Path::new(""));
+        let statement = FileLine { path: library.to_owned(), line: self.line };
         let [u, v] = self.repeat;
         let [base, gain] = self.range.map(|number| number as f32);
         Some(FileTexture {
@@ -216,59 +209,127 @@ impl Map {
             is_clamped: self.is_clamped,
             range: (base, gain),
             number: self.number,
-            ..FileTexture::new(first_existing(folder, self.candidate_paths())?)
+            ..FileTexture::new(first_existing(folder, self.candidate_paths())?, statement)
         })
     }
 }
 
+/// Sets a field unless the value is `None`. Returns whether it was set.
+fn set<T>(field: &mut T, value: Option<T>) -> bool {
+    let is_set = value.is_some();
+    if let Some(value) = value {
+        *field = value;
+    }
+    is_set
+}
+
+/// Channel that `-imfchan` selects.
+fn channel(letter: &str) -> Option<PixelValue> {
+    match letter.to_ascii_lowercase().as_str() {
+        "r" => Some(PixelValue::Channel(Channel::Red)),
+        "g" => Some(PixelValue::Channel(Channel::Green)),
+        "b" => Some(PixelValue::Channel(Channel::Blue)),
+        "m" => Some(PixelValue::Channel(Channel::Alpha)),
+        "l" => Some(PixelValue::Luminance),
+        _ => None,
+    }
+}
+
+/// Whether a scale is 0 or too small to compute with.
+fn is_zero(scale: f64) -> bool {
+    scale == 0.0 || is_too_short(scale)
+}
+
+/// Whether a word has the form of an option: a dash and letters.
+fn is_like_option(word: &str) -> bool {
+    word.strip_prefix('-')
+        .is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()))
+}
+
+pub(super) fn option_ignored(option: &str) -> String {
+    format!("option `{option}` is ignored")
+}
+
+pub(super) fn not_an_option(word: &str) -> String {
+    format!("`{word}` is not a map option; it is read as part of the file name")
+}
+
 /// Arguments of a map statement. The last one is the file name.
+#[derive(Clone, Copy)]
 struct MapArguments<'a>(&'a str);
 
 impl<'a> MapArguments<'a> {
-    /// Consumes an option and returns it in lowercase. Any other word starts the file name, even if it begins
-    /// with a dash.
+    /// Consumes an option and returns it in lowercase. An unknown option must have a number or a switch as an
+    /// argument. Any other word starts the file name, even if it begins with a dash.
     fn option(&mut self) -> Option<String> {
-        const OPTIONS: [&str; 13] = [
-            "-s", "-o", "-t", "-mm", "-bm", "-clamp", "-imfchan", "-boost", "-texres", "-blendu", "-blendv",
-            "-cc", "-type",
+        const OPTIONS: [&str; 14] = [
+            "-s",
+            "-o",
+            "-t",
+            "-mm",
+            "-bm",
+            "-clamp",
+            "-imfchan",
+            "-boost",
+            "-texres",
+            "-blendu",
+            "-blendv",
+            "-cc",
+            "-type",
+            "-colorspace",
         ];
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
-        let option = word.to_ascii_lowercase();
-        OPTIONS.contains(&option.as_str()).then(|| {
-            self.0 = rest.trim_start();
+        let (option, rest) = (word.to_ascii_lowercase(), Self(rest.trim_start()));
+        let is_option = OPTIONS.contains(&option.as_str()) || is_like_option(word) && rest.next_is_value();
+        is_option.then(|| {
+            *self = rest;
             option
         })
     }
 
+    /// Returns the next word and the text after it. `None` if it is the last word.
+    fn peek(&self) -> Option<(&'a str, &'a str)> {
+        let (word, rest) = self.0.split_once(char::is_whitespace)?;
+        Some((word, rest.trim_start()))
+    }
+
     /// Consumes the next word unless it is the last one.
     fn word(&mut self) -> Option<&'a str> {
-        let (word, rest) = self.0.split_once(char::is_whitespace)?;
-        self.0 = rest.trim_start();
+        let (word, rest) = self.peek()?;
+        self.0 = rest;
         Some(word)
     }
 
-    /// Consumes up to `N` numbers. Missing numbers keep their defaults.
-    fn numbers<const N: usize>(&mut self, default: [f64; N]) -> [f64; N] {
+    /// Whether the next word is a number or a switch, and not the last word.
+    fn next_is_value(&self) -> bool {
+        self.peek().is_some_and(|(word, _)| word.parse::<f32>().is_ok() || parse_switch(word).is_some())
+    }
+
+    /// Consumes up to `N` numbers. Missing numbers keep their defaults. `None` if there are no numbers or one
+    /// of them is not finite or too large.
+    fn numbers<const N: usize>(&mut self, default: [f64; N]) -> Option<[f64; N]> {
         let mut numbers = default;
-        for number in &mut numbers {
-            let Some((word, _)) = self.0.split_once(char::is_whitespace) else { break };
-            let Ok(value) = word.parse::<f32>() else { break };
-            if value.is_finite() {
-                *number = f64::from(value);
-            }
+        let mut are_usable = false;
+        for (index, number) in numbers.iter_mut().enumerate() {
+            let Some(value) = self.peek().and_then(|(word, _)| word.parse::<f32>().ok()) else { break };
             self.word();
+            *number = f64::from(value);
+            are_usable = (index == 0 || are_usable) && number.abs() <= LARGEST;
         }
-        numbers
+        are_usable.then_some(numbers)
     }
 
     /// Consumes `on` or `off`.
     fn next_switch(&mut self) -> Option<bool> {
-        let (word, _) = self.0.split_once(char::is_whitespace)?;
-        let value = [("on", true), ("off", false)];
-        let (_, is_on) = value.into_iter().find(|(name, _)| word.eq_ignore_ascii_case(name))?;
+        let is_on = parse_switch(self.peek()?.0)?;
         self.word();
         Some(is_on)
     }
+}
+
+fn parse_switch(word: &str) -> Option<bool> {
+    let switches = [("on", true), ("off", false)];
+    switches.into_iter().find(|(name, _)| word.eq_ignore_ascii_case(name)).map(|(_, is_on)| is_on)
 }
 
 /// Yields the whole text, then the text without its last comment, and so on.

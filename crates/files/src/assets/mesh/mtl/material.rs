@@ -8,10 +8,10 @@ use super::statements::{MtlColor, MtlNumber};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
-/// Converts a material. File names are relative to `folder`, which contains the MTL file. The default diffuse
-/// color is the same as in other MTL readers: 0.6 without a texture, 1 with a texture, and 0 for mirrors.
-pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> FileMaterial {
-    let texture = |kind| found.map(kind).and_then(|map| map.texture(folder));
+/// Converts a material of the MTL file at `path`. The default diffuse color is the same as in other MTL
+/// readers: 0.6 without a texture, 1 with a texture, and 0 for mirrors. Textures without effect are dropped.
+pub(in crate::assets::mesh) fn material(found: &MtlMaterial, path: &Path) -> FileMaterial {
+    let texture = |kind| found.map(kind).and_then(|map| map.texture(path));
     let specular = color(found, MtlColor::Specular, 0.0);
     let is_mirror =
         matches!(found.illumination, Some(at) if matches!(at.value, 3 | 5 | 8)) && specular != Vec3::ZERO;
@@ -24,11 +24,11 @@ pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> F
     let emission_texture = texture(MapKind::Emission);
     let default_emission = if emission_texture.is_some() { 1.0 } else { 0.0 };
     let normals = found.map(MapKind::Normal).or(found.map(MapKind::Bump));
-    FileMaterial {
+    let mut material = FileMaterial {
         name: found.name.clone(),
         diffuse: color(found, MtlColor::Diffuse, default_diffuse),
         specular,
-        shininess: (found.number(MtlNumber::Shininess).unwrap_or(0.0) as f32).max(0.0),
+        shininess: found.number(MtlNumber::Shininess).unwrap_or(0.0) as f32,
         emission: color(found, MtlColor::Emission, default_emission),
         ior: found.number(MtlNumber::Ior).unwrap_or(1.0) as f32,
         illumination_model: found.illumination.map(|at| at.value),
@@ -37,23 +37,24 @@ pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> F
         diffuse_texture,
         specular_texture: texture(MapKind::Specular),
         emission_texture,
-        normal_texture: normals.and_then(|map| map.texture(folder)),
+        normal_texture: normals.and_then(|map| map.texture(path)),
         normal_strength: normals.map_or(1.0, |map| map.strength as f32),
-        physical: pbr_extension(found, folder),
-    }
+        physical: pbr_extension(found, path),
+    };
+    material.drop_unused_textures();
+    material
 }
 
-/// Color with negative components clamped to 0.
 fn color(found: &MtlMaterial, color: MtlColor, default: f32) -> Vec3 {
     let color = found.color(color);
-    color.map_or(Vec3::splat(default), |at| DVec3::from_array(at.value).as_vec3().max(Vec3::ZERO))
+    color.map_or(Vec3::splat(default), |at| DVec3::from_array(at.value).as_vec3())
 }
 
 /// Opacity: `d`, or else 1 − `Tr`. Opaque if `Tr` is 1 and there is no `d`.
 fn opacity(found: &MtlMaterial) -> f32 {
     let transparency = found.number(MtlNumber::Transparency).map(|part| 1.0 - part);
     let opacity = found.number(MtlNumber::Dissolve).or(transparency);
-    if is_opaque_despite_tr(found) { 1.0 } else { opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32 }
+    if is_opaque_despite_tr(found) { 1.0 } else { opacity.unwrap_or(1.0) as f32 }
 }
 
 /// Whether the material has `Tr` 1 but no `d`, which is how MeshLab and other programs write opaque
@@ -64,7 +65,7 @@ pub(super) fn is_opaque_despite_tr(found: &MtlMaterial) -> bool {
 }
 
 /// The PBR extension, if the material uses it.
-fn pbr_extension(found: &MtlMaterial, folder: &Path) -> Option<PhysicalMaterial> {
+fn pbr_extension(found: &MtlMaterial, path: &Path) -> Option<PhysicalMaterial> {
     const NUMBERS: [MtlNumber; 7] = [
         MtlNumber::Roughness,
         MtlNumber::Metallic,
@@ -77,13 +78,13 @@ fn pbr_extension(found: &MtlMaterial, folder: &Path) -> Option<PhysicalMaterial>
     let [roughness_map, metallic_map] = [MapKind::Roughness, MapKind::Metallic].map(|kind| found.map(kind));
     let is_physical = NUMBERS.iter().any(|number| found.number(*number).is_some());
     let has_maps = roughness_map.is_some() || metallic_map.is_some();
-    let number = |number, default| found.number(number).map_or(default, |value| value.clamp(0.0, 1.0) as f32);
+    let number = |number, default| found.number(number).map_or(default, |value| value as f32);
     (is_physical || has_maps).then(|| PhysicalMaterial {
         roughness: number(MtlNumber::Roughness, 0.5),
         metallic: number(MtlNumber::Metallic, 0.0),
         clearcoat: number(MtlNumber::Coat, 0.0),
         clearcoat_roughness: number(MtlNumber::CoatRoughness, 0.0),
-        roughness_texture: roughness_map.and_then(|map| map.texture(folder)),
-        metallic_texture: metallic_map.and_then(|map| map.texture(folder)),
+        roughness_texture: roughness_map.and_then(|map| map.texture(path)),
+        metallic_texture: metallic_map.and_then(|map| map.texture(path)),
     })
 }

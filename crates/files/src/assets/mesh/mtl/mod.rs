@@ -54,7 +54,11 @@ impl MtlMaterial {
     }
 
     fn number(&self, number: MtlNumber) -> Option<f64> {
-        self.numbers[number as usize].map(|number| number.value)
+        self.number_at(number).map(|number| number.value)
+    }
+
+    fn number_at(&self, number: MtlNumber) -> Option<WithLine<f64>> {
+        self.numbers[number as usize]
     }
 
     /// The last map of this kind.
@@ -80,9 +84,10 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
         let line = decoded(line);
-        let statement = statements::parse(&line)
+        let mut warnings = Vec::new();
+        let statement = statements::parse(&line, &mut warnings)
             .map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
-        library.add(statement, index + 1);
+        library.add(statement, index + 1, warnings);
     }
     library.add_duplicates();
     Ok(library)
@@ -92,7 +97,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
 /// invalid ones.
 pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    match statements::parse(&decoded(line)) {
+    match statements::parse(&decoded(line), &mut Vec::new()) {
         Ok(Statement::Map(_, map)) => map.candidate_paths().map(|file| folder.join(file)).collect(),
         Ok(
             Statement::Nothing
@@ -100,14 +105,15 @@ pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
             | Statement::Color(..)
             | Statement::Number(..)
             | Statement::Illumination(_)
-            | Statement::Ignored(_),
+            | Statement::Ignored,
         )
         | Err(_) => Vec::new(),
     }
 }
 
 impl MtlLibrary {
-    fn add(&mut self, statement: Statement, line: usize) {
+    /// Adds a statement and the warnings about it.
+    fn add(&mut self, statement: Statement, line: usize, warnings: Vec<String>) {
         if let Statement::New(name) = statement {
             self.materials.push(MtlMaterial { name, line, ..MtlMaterial::default() });
             return;
@@ -120,8 +126,9 @@ impl MtlLibrary {
             }
             return;
         };
+        material.ignored.extend(warnings.into_iter().map(|words| IgnoredStatement { line, words }));
         match statement {
-            Statement::New(_) | Statement::Nothing => {}
+            Statement::New(_) | Statement::Nothing | Statement::Ignored => {}
             Statement::Color(color, value) => {
                 material.colors[color as usize] = Some(WithLine { value, line });
             }
@@ -133,7 +140,6 @@ impl MtlLibrary {
                 map.line = line;
                 material.maps.push((kind, map));
             }
-            Statement::Ignored(words) => material.ignored.push(IgnoredStatement { line, words }),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Parses lines of an MTL file. Keywords are case-insensitive.
 
-use super::map::{Map, MapKind};
+use super::map::{Map, MapKind, option_ignored};
+use crate::math::limits::LARGEST;
 
 /// A color statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,23 +61,37 @@ impl MtlNumber {
     pub(super) fn keyword(self) -> &'static str {
         Self::ALL[self as usize].1
     }
+
+    /// Smallest and largest value. `None` if a value has no effect or its effect depends on the material.
+    fn range(self) -> Option<[f64; 2]> {
+        match self {
+            Self::Shininess => Some([0.0, LARGEST]),
+            Self::Dissolve
+            | Self::Transparency
+            | Self::Roughness
+            | Self::Metallic
+            | Self::Coat
+            | Self::CoatRoughness => Some([0.0, 1.0]),
+            Self::Ior | Self::Sheen | Self::Anisotropy | Self::AnisotropyRotation => None,
+        }
+    }
 }
 
 /// A parsed line.
 pub(super) enum Statement {
     /// An empty line, a comment, or a statement that does not affect rendering.
     Nothing,
+    /// A statement that is ignored with a warning.
+    Ignored,
     New(String),
     Color(MtlColor, [f64; 3]),
     Number(MtlNumber, f64),
     Illumination(u8),
     Map(MapKind, Map),
-    /// An ignored statement, with its warning.
-    Ignored(String),
 }
 
-/// Parses a line.
-pub(super) fn parse(line: &str) -> Result<Statement, String> {
+/// Parses a line. Adds a warning for each part that cannot be used.
+pub(super) fn parse(line: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let line = line.trim();
     let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     let rest = rest.trim_start();
@@ -89,10 +104,10 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
         return name.map(Statement::New).ok_or_else(|| expected_after("newmtl", "a name"));
     }
     if let Some((color, _)) = MtlColor::ALL.into_iter().find(|(_, name)| is(name)) {
-        return parse_color(keyword, color, rest);
+        return parse_color(keyword, color, rest, warnings);
     }
     if let Some((number, _)) = MtlNumber::ALL.into_iter().find(|(_, name)| is(name)) {
-        return parse_number(keyword, number, rest);
+        return parse_number(keyword, number, rest, warnings);
     }
     if let Some(kind) = MapKind::from_keyword(keyword) {
         return match Map::parse(rest) {
@@ -101,10 +116,13 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
         };
     }
     match keyword.to_ascii_lowercase().as_str() {
-        "illum" => illumination(rest),
+        "illum" => illumination(rest, warnings),
         // This affects only reflection maps, which have their own warning.
         "sharpness" => Ok(Statement::Nothing),
-        _ => Ok(Statement::Ignored(unknown_statement(keyword))),
+        _ => {
+            warnings.push(unknown_statement(keyword));
+            Ok(Statement::Ignored)
+        }
     }
 }
 
@@ -135,27 +153,87 @@ fn words_before_comment(rest: &str) -> Vec<&str> {
     rest.split('#').next().unwrap_or_default().split_whitespace().collect()
 }
 
-fn finite<T: std::str::FromStr + Into<f64>>(word: &str) -> Option<f64> {
-    word.parse().ok().map(T::into).filter(|number: &f64| number.is_finite())
+fn finite(word: &str) -> Option<f64> {
+    word.parse::<f32>().ok().map(f64::from).filter(|number| number.is_finite())
+}
+
+/// Clamps the value of a word to a range, with a warning.
+fn clamp(word: &str, value: f64, [least, most]: [f64; 2], keyword: &str, warnings: &mut Vec<String>) -> f64 {
+    let clamped = value.clamp(least, most);
+    if clamped != value {
+        warnings.push(value_clamped(word, keyword, clamped));
+    }
+    clamped
+}
+
+pub(super) fn value_clamped(word: &str, keyword: &str, limit: f64) -> String {
+    let limit = if limit == LARGEST { "1e18".to_owned() } else { limit.to_string() };
+    format!("{word} in `{keyword}` is clamped to {limit}")
+}
+
+/// Warns about words after the first `count`.
+fn warn_about_excess(words: &[&str], count: usize, keyword: &str, warnings: &mut Vec<String>) {
+    if words.len() > count {
+        warnings.push(excess_words(keyword));
+    }
+}
+
+pub(super) fn excess_words(keyword: &str) -> String {
+    format!("words after the values of `{keyword}` are ignored")
+}
+
+pub(super) fn outside_gamut(keyword: &str) -> String {
+    format!("`{keyword}` is outside the RGB gamut; its negative components are clamped to 0")
 }
 
 /// Parses a color: three numbers or a single gray value.
-fn parse_color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String> {
+fn parse_color(
+    keyword: &str,
+    color: MtlColor,
+    rest: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Statement, String> {
     let words = words_before_comment(rest);
     let (is_xyz, words) = match words.as_slice() {
         ["spectral", ..] => {
-            return Ok(Statement::Ignored(spectrum_unsupported(keyword)));
+            warnings.push(spectrum_unsupported(keyword));
+            return Ok(Statement::Ignored);
         }
         ["xyz", words @ ..] => (true, words),
         words => (false, words),
     };
-    let numbers: Option<Vec<f64>> = words.iter().take(3).map(|word| finite::<f32>(word)).collect();
+    let numbers: Option<Vec<f64>> = words.iter().take(3).map(|word| finite(word)).collect();
     let values = match numbers.as_deref() {
         Some([gray]) => [*gray; 3],
         Some([red, green, blue]) => [*red, *green, *blue],
         Some(_) | None => return Err(expected_after(keyword, THREE_NUMBERS)),
     };
-    Ok(Statement::Color(color, if is_xyz { xyz_to_rgb(values) } else { values }))
+    warn_about_excess(words, 3, keyword, warnings);
+    let values = match (color, is_xyz) {
+        // These colors have no effect.
+        (MtlColor::Ambient | MtlColor::Filter, _) => values,
+        (MtlColor::Diffuse | MtlColor::Specular | MtlColor::Emission, true) => {
+            /// Rounding error of colors on the edge of the gamut.
+            const TINY: f64 = 1e-3;
+            let rgb = xyz_to_rgb(values);
+            if rgb.iter().any(|part| *part < -TINY) {
+                warnings.push(outside_gamut(keyword));
+            }
+            rgb.map(|part| part.clamp(0.0, LARGEST))
+        }
+        (MtlColor::Diffuse | MtlColor::Specular | MtlColor::Emission, false) => {
+            // Report only the first component.
+            let mut reported = Vec::new();
+            let part = |part: usize| {
+                let word = words.get(part).or(words.first()).copied().unwrap_or_default();
+                clamp(word, values[part], [0.0, LARGEST], keyword, &mut reported)
+            };
+            let clamped = [0, 1, 2].map(part);
+            warnings.extend(reported.into_iter().next());
+            clamped
+        }
+    };
+    Ok(Statement::Color(color, values))
 }
 
 /// Converts CIE XYZ to linear Rec. 709 (ITU-R BT.709 primaries, D65 white).
@@ -167,18 +245,36 @@ fn xyz_to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Parses a number. Treats `d -halo` like `d`.
-fn parse_number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, String> {
+/// Parses a number. Treats `d -halo` like `d`, with a warning.
+fn parse_number(
+    keyword: &str,
+    number: MtlNumber,
+    rest: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Statement, String> {
     let words = words_before_comment(rest);
-    let word = match words.as_slice() {
-        ["-halo", word, ..] if number == MtlNumber::Dissolve => Some(word),
-        words => words.first(),
+    let words = match words.as_slice() {
+        ["-halo", words @ ..] if number == MtlNumber::Dissolve => {
+            warnings.push(option_ignored("-halo"));
+            words
+        }
+        words => words,
     };
-    let value = word.and_then(|word| finite::<f32>(word));
-    value.map(|value| Statement::Number(number, value)).ok_or_else(|| expected_after(keyword, ONE_NUMBER))
+    let value = words.first().and_then(|word| Some((*word, finite(word)?)));
+    let (word, value) = value.ok_or_else(|| expected_after(keyword, ONE_NUMBER))?;
+    warn_about_excess(words, 1, keyword, warnings);
+    let value = match number.range() {
+        Some(range) => clamp(word, value, range, keyword, warnings),
+        None => value,
+    };
+    Ok(Statement::Number(number, value))
 }
 
-fn illumination(rest: &str) -> Result<Statement, String> {
-    let number = words_before_comment(rest).first().and_then(|word| word.parse().ok());
-    number.map(Statement::Illumination).ok_or_else(|| expected_after("illum", INTEGER))
+/// Parses an illumination model. Numbers that are not models become 255.
+fn illumination(rest: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
+    let words = words_before_comment(rest);
+    let number = words.first().and_then(|word| word.parse::<i64>().ok());
+    let number = number.ok_or_else(|| expected_after("illum", INTEGER))?;
+    warn_about_excess(&words, 1, "illum", warnings);
+    Ok(Statement::Illumination(u8::try_from(number).unwrap_or(u8::MAX)))
 }

@@ -2,16 +2,26 @@
 
 use super::ignored::{
     AMBIENT_MAP, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY, INVISIBLE_GLASS,
-    SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, map_unsupported, option_ignored, statement_ignored,
+    SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, map_unsupported, statement_ignored,
 };
+use super::map::option_ignored;
 use super::statements::{
     INTEGER, ONE_NUMBER, THREE_NUMBERS, expected_after, spectrum_unsupported, unknown_statement,
 };
 use super::*;
-use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial, rejection};
+use crate::assets::{FileLine, FileMaterial, FileTexture, PhysicalMaterial, rejection};
 use crate::control::{CancelToken, ignore_progress};
 use crate::materials::{Channel, PixelValue};
 use crate::math::{DVec2, Vec2, Vec3};
+
+/// Path of the MTL file whose materials are converted.
+const LIBRARY: &str = "models/a.mtl";
+
+/// A texture without options, defined on a line of [`LIBRARY`].
+fn texture_of(name: &str, line: usize) -> FileTexture {
+    let statement = FileLine { path: PathBuf::from(LIBRARY), line };
+    FileTexture::new(Path::new("models").join(name), statement)
+}
 
 fn path(texture: &Option<FileTexture>) -> Option<&Path> {
     texture.as_ref().map(|texture| texture.path.as_path())
@@ -34,7 +44,7 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token })?.materials;
-    Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
+    Ok(found.iter().map(|found| material(found, Path::new(LIBRARY))).collect())
 }
 
 /// Asserts that `line` is rejected because `expected` is missing after `keyword`.
@@ -46,15 +56,15 @@ fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
 #[test]
 fn every_statement_is_converted() {
     let text = "newmtl red brick\nKa 0.1 0.2 0.3\nKd 0.5 0.4 -0.3\nKs 0.2 0.2 0.2\nKe 4 5 6\nNs 25\nNi 1.5\n\
-                illum 7\nmap_Kd -s 2 2 2 -o 0.5 wall one.png\nmap_Ks sub\\shine.png\nmap_Bump -bm 0.5 old.png\n\
+                illum 2\nmap_Kd -s 2 2 2 -o 0.5 wall one.png\nmap_Ks sub\\shine.png\nmap_Bump -bm 0.5 old.png\n\
                 norm bumps.png\nmap_Ke glow.png\nnewmtl plain\nnewmtl bulb\nmap_Ke glow.png\n";
     let materials = read(text).expect("whole");
     assert_eq!(materials.len(), 3);
-    let file = |name: &str| Some(FileTexture::new(PathBuf::from("models").join(name)));
+    let file = |name: &str, line: usize| Some(texture_of(name, line));
     let wall = FileTexture {
         repeat: Vec2::splat(2.0),
         offset: DVec2::new(0.5, 0.0),
-        ..FileTexture::new(PathBuf::from("models/wall one.png"))
+        ..texture_of("wall one.png", 9)
     };
     let expected = FileMaterial {
         name: "red brick".to_owned(),
@@ -63,13 +73,13 @@ fn every_statement_is_converted() {
         shininess: 25.0,
         emission: Vec3::new(4.0, 5.0, 6.0),
         ior: 1.5,
-        illumination_model: Some(7),
+        illumination_model: Some(2),
         opacity: 1.0,
         opacity_texture: None,
         diffuse_texture: Some(wall),
-        specular_texture: file("sub/shine.png"),
-        emission_texture: file("glow.png"),
-        normal_texture: file("bumps.png"),
+        specular_texture: file("sub/shine.png", 10),
+        emission_texture: file("glow.png", 13),
+        normal_texture: file("bumps.png", 12),
         normal_strength: 1.0,
         physical: None,
     };
@@ -143,19 +153,19 @@ fn pbr_statements_are_converted() {
     assert_eq!(physical("Ps 0.25\n"), Some(plain.clone()));
     assert_eq!(physical("aniso 0.5\n"), Some(plain.clone()));
     let all = "Pr 0.3 # dull\nPm 1.5\nPc -1\nPcr 0.1\nmap_Pr -s 1 1 1 dull.png\nmap_Pm metal.png\n";
-    let file = |name: &str| Some(FileTexture::new(Path::new("models").join(name)));
+    let file = |name: &str, line: usize| Some(texture_of(name, line));
     let expected = PhysicalMaterial {
         roughness: 0.3,
         metallic: 1.0,
         clearcoat: 0.0,
         clearcoat_roughness: 0.1,
-        roughness_texture: file("dull.png"),
-        metallic_texture: file("metal.png"),
+        roughness_texture: file("dull.png", 6),
+        metallic_texture: file("metal.png", 7),
     };
     assert_eq!(physical(all), Some(expected));
     assert_eq!(
         physical("map_Pm metal.png\n"),
-        Some(PhysicalMaterial { metallic_texture: file("metal.png"), ..plain })
+        Some(PhysicalMaterial { metallic_texture: file("metal.png", 2), ..plain })
     );
     assert_rejected("newmtl a\nPr rough\n", 2, "Pr", ONE_NUMBER);
 }
@@ -193,16 +203,19 @@ fn comments_may_follow_a_file_name() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("wall.png"), "").expect("written");
     std::fs::write(folder.path().join("Map #1.png"), "").expect("written");
-    let file = |name: &str| Some(FileTexture::new(folder.path().join(name)));
-    let text = "newmtl a\nmap_Kd -bm 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
+    let text =
+        "newmtl a\nNs 9\nmap_Kd -bm 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token }).expect("whole").materials;
-    let found = material(&found[0], folder.path());
-    assert_eq!(found.diffuse_texture, file("wall.png"));
-    assert_eq!(found.specular_texture, file("Map #1.png"));
-    assert_eq!(found.normal_texture, file("no #2.png"), "expected the whole name if no candidate exists");
+    let found = material(&found[0], &path);
+    let file = |name: &str| folder.path().join(name);
+    assert_eq!(super::tests::path(&found.diffuse_texture), Some(file("wall.png").as_path()));
+    assert_eq!(super::tests::path(&found.specular_texture), Some(file("Map #1.png").as_path()));
+    let whole = file("no #2.png");
+    let normals = super::tests::path(&found.normal_texture);
+    assert_eq!(normals, Some(whole.as_path()), "expected the whole name if no candidate exists");
 }
 
 #[test]
@@ -238,7 +251,7 @@ fn map_options_are_converted() {
         let found = read(&format!("newmtl a\n{statement}\n")).expect(statement).remove(0);
         found.opacity_texture.expect(statement)
     };
-    let plain = || FileTexture::new(PathBuf::from("models/t.png"));
+    let plain = || texture_of("t.png", 2);
     let channel = |channel| Some(PixelValue::Channel(channel));
     for (options, expected) in [
         ("-s 2 3 4", FileTexture { repeat: Vec2::new(2.0, 3.0), ..plain() }),
@@ -285,11 +298,11 @@ fn map_options_are_converted() {
 fn ignored_statements_are_reported_with_line() {
     let of = |statements: &str| warnings_of(format!("newmtl a\n{statements}").as_bytes());
     for (statements, line, words) in [
-        ("map_Kd -t 1 1 1 t.png\n", 2, option_ignored("-t")),
+        ("map_Kd -t 1 1 1 t.png\n", 2, option_ignored("-t 1 1 1")),
         ("\nmap_Kd -cc on t.png\n", 3, option_ignored("-cc on")),
         ("map_Kd -blendu off t.png\n", 2, option_ignored("-blendu off")),
-        ("map_Kd -boost 2 t.png\n", 2, option_ignored("-boost")),
-        ("map_Kd -texres 128 t.png\n", 2, option_ignored("-texres")),
+        ("map_Kd -boost 2 t.png\n", 2, option_ignored("-boost 2")),
+        ("map_Kd -texres 128 t.png\n", 2, option_ignored("-texres 128")),
         ("map_Kd -imfchan r t.png\n", 2, option_ignored("-imfchan")),
         ("map_d -imfchan z t.png\n", 2, option_ignored("-imfchan z")),
         ("norm -mm 0 2 t.png\n", 2, option_ignored("-mm")),
@@ -304,6 +317,7 @@ fn ignored_statements_are_reported_with_line() {
         ("illum 99\n", 2, UNKNOWN_MODEL.to_owned()),
         ("illum 4\n", 2, INVISIBLE_GLASS.to_owned()),
         ("d .5\nTf 1 0 0\n", 3, FILTER_IGNORED.to_owned()),
+        ("Kd 1 1 1\nillum 2\nd 1\nTf 0 1 0\n", 5, FILTER_IGNORED.to_owned()),
         ("Kd 255 0 0\n", 2, GAINS_ENERGY.to_owned()),
         ("Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n", 2, GAINS_ENERGY.to_owned()),
         ("Ks 2 2 2\nillum 3\n", 2, BRIGHT_MIRROR.to_owned()),
@@ -314,7 +328,8 @@ fn ignored_statements_are_reported_with_line() {
         assert_eq!(of(statements), [format!("a.mtl:{line}: {words}")], "{statements}");
     }
     for quiet in [
-        "Kd 1 1 1\nillum 2\nd 1\nTf 0 1 0\n",
+        "Kd 1 1 1\nillum 2\nd 1\nTf 1 1 1\n",
+        "Ka -1 0 0\nd 1\nTr 1\nillum 4\nNi 1.5\nTf 1\n",
         "map_Kd -s 2 2 2 -o 1 1 1 -clamp on -mm 0 1 -t 0 0 0 -blendu on t.png\nmap_Ka t.png\n",
         "Kd 1 1 1\nKs 1 1 1\nNs 10\nillum 1\n",
         "illum 7\nNi 1.5\nTf 1 1 1\n",
@@ -335,6 +350,108 @@ fn ignored_statements_are_reported_with_line() {
 }
 
 #[test]
+fn unusable_values_are_reported_with_line() {
+    let of = |statements: &str| warnings_of(format!("newmtl a\n\n{statements}\n").as_bytes());
+    for (statement, words) in [
+        ("Kd .5 -0.3 .5", "-0.3 in `Kd` is clamped to 0"),
+        ("Kd -1", "-1 in `Kd` is clamped to 0"),
+        ("ke -1", "-1 in `ke` is clamped to 0"),
+        ("Ks 0 0 -2", "-2 in `Ks` is clamped to 0"),
+        ("Ke 2e18", "2e18 in `Ke` is clamped to 1e18"),
+        ("Kd xyz .2 0 0", "`Kd` is outside the RGB gamut; its negative components are clamped to 0"),
+        ("Ns -5", "-5 in `Ns` is clamped to 0"),
+        ("Ns 1e30", "1e30 in `Ns` is clamped to 1e18"),
+        ("d 7", "7 in `d` is clamped to 1"),
+        ("d -0.5", "-0.5 in `d` is clamped to 0"),
+        ("Tr -0.5", "-0.5 in `Tr` is clamped to 0"),
+        ("Pr 7", "7 in `Pr` is clamped to 1"),
+        ("Pm -3", "-3 in `Pm` is clamped to 0"),
+        ("Pc 1.5", "1.5 in `Pc` is clamped to 1"),
+        ("Pcr -1", "-1 in `Pcr` is clamped to 0"),
+        ("d -halo 0.5", "option `-halo` is ignored"),
+        ("Kd 1 0 0 1", "words after the values of `Kd` are ignored"),
+        ("Ns 5 6", "words after the values of `Ns` are ignored"),
+        ("illum 2 3", "words after the values of `illum` are ignored"),
+        ("illum -1", UNKNOWN_MODEL),
+        ("illum 300", UNKNOWN_MODEL),
+        ("d 1\nTr 0.5", "`Tr` is ignored because `d` has priority"),
+        ("Pr .5\nNi 0.9", "`Ni` is ignored because it is not above 1; 1.5 is used"),
+        ("illum 7\nNi 20", "`Ni` is clamped to 10"),
+        ("Pr .5\nKd 255 0 0", "`Kd` is clamped to 1"),
+        ("illum 3\nKd .95 .95 .95\nKs .9 .9 .9", "`Ks` of a mirror over a diffuse color is clamped to 0.66"),
+        ("illum 7\nNi 1.5\nKe 1 1 1", "`Ke` has no effect on glass"),
+        ("illum 7\nNi 1.5\nPr 0\nPm 1", "`Pm` has no effect on glass"),
+        ("illum 3\nKs 1 1 1\nKe 1 1 1", "`Ke` has no effect on mirrors"),
+    ] {
+        let line = 3 + statement.matches('\n').count();
+        assert_eq!(of(statement), [format!("a.mtl:{line}: {words}")], "{statement}");
+    }
+    assert_eq!(of("Kd xyz 0.41239 0.21264 0.01933"), [""; 0], "the red primary has tiny negative components");
+}
+
+#[test]
+fn unusable_map_options_are_reported_with_line() {
+    let of = |statement: &str| warnings_of(format!("newmtl a\n{statement}\n").as_bytes());
+    for (options, ignored) in [
+        ("-s 0 0 0", "-s 0 0 0"),
+        ("-s 2 0", "-s 2 0"),
+        ("-s inf", "-s inf"),
+        ("-s 1e30 1", "-s 1e30 1"),
+        ("-s", "-s"),
+        ("-o nan", "-o nan"),
+        ("-o 1 1 -inf", "-o 1 1 -inf"),
+        ("-o", "-o"),
+        ("-t nan", "-t nan"),
+        ("-mm 0 nan", "-mm 0 nan"),
+        ("-mm", "-mm"),
+        ("-boost nan", "-boost nan"),
+        ("-texres", "-texres"),
+        ("-clamp", "-clamp"),
+        ("-blendu", "-blendu"),
+        ("-cc", "-cc"),
+        ("-imfchan", "-imfchan"),
+        ("-unknown 3", "-unknown 3"),
+        ("-unknown on 1 2", "-unknown on 1 2"),
+        ("-colorspace linear", "-colorspace linear"),
+        ("-type cube_top", "-type cube_top"),
+    ] {
+        let statement = format!("map_d {options} h.png");
+        assert_eq!(of(&statement), [format!("a.mtl:2: option `{ignored}` is ignored")], "{statement}");
+        let found = read(&format!("newmtl a\n{statement}\n")).expect("whole").remove(0);
+        let expected = texture_of("h.png", 2);
+        assert_eq!(found.opacity_texture, Some(expected), "{statement}");
+    }
+    for (option, ignored) in [("-bm nan", "-bm nan"), ("-bm", "-bm"), ("-bm -3", "-bm -3")] {
+        let words = format!("a.mtl:2: option `{ignored}` is ignored");
+        assert_eq!(of(&format!("norm {option} h.png")), [words], "{option}");
+    }
+    // Without a number, the word may be part of the name.
+    let words = "`-dash` is not a map option; it is read as part of the file name";
+    assert_eq!(of("map_Kd -dash wall.png"), [format!("a.mtl:2: {words}")]);
+    assert_eq!(of("map_Kd -dash.png"), [""; 0]);
+}
+
+#[test]
+fn maps_without_effect_are_reported_with_line() {
+    let of = |statements: &str| warnings_of(format!("newmtl a\n{statements}\n").as_bytes());
+    for (statements, line, words) in [
+        ("illum 7\nNi 1.5\nmap_Kd t.png", 4, "`map_Kd` has no effect on glass"),
+        ("illum 7\nNi 1.5\nbump t.png", 4, "`bump` has no effect on glass"),
+        ("illum 7\nNi 1.5\nmap_Pr t.png", 4, "`map_Pr` has no effect on glass"),
+        ("illum 3\nKs 1 1 1\nmap_Ks t.png", 4, "`map_Ks` has no effect on mirrors"),
+        ("illum 3\nKs .1 .1 .1\nKd 1 1 1\nnorm t.png", 5, "`norm` has no effect on mirrors"),
+        ("Pr 0.5\nmap_Ks t.png", 3, "`map_Ks` has no effect on materials with PBR statements"),
+        ("bump h.png\nnorm n.png", 2, "`bump` has no effect because the material has a normal map"),
+        ("d 0.5\nmap_d t.png", 2, "the opacity map replaces `d`"),
+        ("illum 5\nmap_Ks t.png", 3, "`Ks` has no effect without `Ns` above 0"),
+    ] {
+        assert_eq!(of(statements), [format!("a.mtl:{line}: {words}")], "{statements}");
+    }
+    let glass = read("newmtl a\nillum 7\nNi 1.5\nmap_Kd t.png\n").expect("whole").remove(0);
+    assert_eq!(glass.diffuse_texture, None);
+}
+
+#[test]
 fn illumination_models_select_the_reflection() {
     let of =
         |model: u8| read(&format!("newmtl a\nKd .8 0 0\nKs .5 .5 .5\nNs 9\nillum {model}\n")).expect("whole");
@@ -351,12 +468,13 @@ fn latin_1_file_names_are_found() {
     let latin1 = |bytes: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(bytes));
     std::fs::write(latin1(b"caf\xe9.png"), "").expect("written");
     std::fs::write(folder.path().join("\u{e4}.png"), "").expect("written");
-    let mtl = b"newmtl gr\xfcn\nmap_Kd caf\xe9.png\nmap_Ks \xe4.png\nnewmtl b\nmap_Kd caf\xc3\xa9.png\n";
+    let mtl =
+        b"newmtl gr\xfcn\nNs 9\nmap_Kd caf\xe9.png\nmap_Ks \xe4.png\nnewmtl b\nmap_Kd caf\xc3\xa9.png\n";
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, mtl).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token }).expect("whole").materials;
-    let [a, b] = [0, 1].map(|index| material(&found[index], folder.path()));
+    let [a, b] = [0, 1].map(|index| material(&found[index], &path));
     assert_eq!(a.name, "gr\u{fc}n");
     assert_eq!(super::tests::path(&a.diffuse_texture), Some(latin1(b"caf\xe9.png").as_path()));
     assert_eq!(super::tests::path(&a.specular_texture), Some(folder.path().join("\u{e4}.png").as_path()));

@@ -80,7 +80,7 @@ impl MtlLibraries<'_> {
         found.warnings.extend(mtl::warnings(path, ignored, used.into_iter().map(|index| &materials[index])));
         found.images.extend(materials.iter().flat_map(|material| material.image_paths(folder)));
         let first = found.materials.len();
-        found.materials.extend(materials.iter().map(|material| mtl::material(material, folder)));
+        found.materials.extend(materials.iter().map(|material| mtl::material(material, path)));
         indices.into_iter().map(|(name, index)| (name, first + index)).collect()
     }
 }

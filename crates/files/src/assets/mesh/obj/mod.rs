@@ -3,6 +3,7 @@
 
 mod build;
 mod libraries;
+mod missing_uvs;
 mod references;
 mod statements;
 mod vertex;
@@ -17,8 +18,9 @@ use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::FileMaterial;
 use build::{FaceRun, build};
 use libraries::{LibraryContents, MtlLibraries};
+use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
-use statements::{CornerIndices, NONE, Smoothing, StateChange, Statements, face_start};
+use statements::{NONE, Smoothing, StateChange, Statements, face_start};
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     parse_lines(&MeshSource { bytes: &with_line_feeds(source.bytes), ..*source })
@@ -37,7 +39,9 @@ fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
         ..ParsedMesh::default()
     };
     build(&statements, &runs, &mut parsed);
-    parsed.warnings.extend(partial_uvs_warning(source, &statements, &runs));
+    let missing = MissingUvs::find(&statements, &runs, &parsed.materials);
+    parsed.warnings.extend(missing.warning(source));
+    parsed.material_warnings.extend(missing.material_warnings(source, &parsed));
     drop(statements);
     assemble_text(source, parsed, |face| Some(face_start(source, face)))
 }
@@ -116,39 +120,6 @@ fn split_into_runs(statements: &Statements, materials: &[u32]) -> Vec<FaceRun> {
         runs.push(next);
     }
     runs
-}
-
-/// Warns about objects in which only some corners have texture coordinates.
-fn partial_uvs_warning(source: &MeshSource<'_>, statements: &Statements, runs: &[FaceRun]) -> Option<String> {
-    let (mut face, mut corner) = (0, 0);
-    let (mut first, mut count) = (None, 0);
-    for object in runs.chunk_by(|_, next| !next.is_object) {
-        let (mut lacking, mut has_some) = (Vec::new(), false);
-        for _ in 0..object.iter().map(|run| run.faces).sum() {
-            let end = corner + statements.arities[face] as usize;
-            let has_uvs = |corner: &CornerIndices| corner[1] != NONE;
-            let corners = &statements.corners[corner..end];
-            has_some |= corners.iter().any(has_uvs);
-            if !corners.iter().all(has_uvs) {
-                lacking.push(face);
-            }
-            (face, corner) = (face + 1, end);
-        }
-        if has_some {
-            first = first.or(lacking.first().copied());
-            count += lacking.len();
-        }
-    }
-    let line = source.line(face_start(source, first?));
-    Some(uvs_missing(line, count))
-}
-
-fn uvs_missing(first: usize, count: usize) -> String {
-    let faces = match count {
-        1 => format!("line {first}: a face has"),
-        _ => format!("line {first} and {} more faces have", count - 1),
-    };
-    format!("{faces} corners without texture coordinates; these are set to (0, 0)")
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Parses the statements of an OBJ file.
 
-use super::super::parsed::alpha_ignored;
+use super::super::parsed::{alpha_ignored, face_of_corner};
 use super::super::text::expected;
 use super::super::{AssetError, MeshSource};
 use super::vertex::Vertices;
@@ -159,21 +159,11 @@ impl Statements {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line = source.line(face_start(source, self.face_of_corner(first)));
+                let line = source.line(face_start(source, face_of_corner(&self.arities, first)));
                 self.warnings.push(attribute_missing(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
         }
-    }
-
-    /// Index of the face that contains a corner.
-    fn face_of_corner(&self, corner: usize) -> usize {
-        let mut end = 0;
-        let is_before = |arity: &&u32| {
-            end += **arity as usize;
-            end <= corner
-        };
-        self.arities.iter().take_while(is_before).count()
     }
 
     /// Checks the indices of all corners. Must be called after all statements are parsed, because faces may
@@ -190,7 +180,7 @@ impl Statements {
         };
         let index = i64::from(self.corners[place][part]) + 1;
         Err(source.wrong_at(
-            face_start(source, self.face_of_corner(place)),
+            face_start(source, face_of_corner(&self.arities, place)),
             out_of_range(part, index, counts[part]),
         ))
     }
@@ -202,6 +192,9 @@ impl Statements {
         }
         if let Some(start) = self.vertices.most_transparent_vertex() {
             self.warnings.push(alpha_ignored(source.line(start)));
+        }
+        if let Some((start, words)) = self.vertices.color_outside_range() {
+            self.warnings.push(format!("line {}: {words}", source.line(start)));
         }
         if let Some((start, keyword)) = &self.free_form {
             let line = source.line(*start);

@@ -1,7 +1,8 @@
 use super::super::EMPTY_FILE;
 use super::super::assemble::NO_FACES;
-use super::super::parsed::alpha_ignored;
+use super::super::parsed::{alpha_ignored, color_clamped};
 use super::super::text::expected;
+use super::missing_uvs::{corner_of_texture, half_of_texture, uvs_missing};
 use super::statements::{
     CORNER_FORM, attribute_missing, excess_words, free_form, invalid_smoothing, out_of_range,
 };
@@ -196,7 +197,10 @@ fn vertex_colors_are_read_in_all_dialects() {
     assert_eq!(colors(["1 0 0", "0 0.2 0", ""]), (plain.to_vec(), vec![]));
     assert_eq!(colors(["", "0 51 0", "1 1 1"]).0, [[255; 3], [0, 51, 0], [1; 3]]);
     // Fractional colors slightly above 1 are not byte values.
-    assert_eq!(colors(["1.5 0 0", "0 0.2 0", "1 1 1"]).0, plain);
+    let clamped =
+        |line: usize, value: f64, one: f64| vec![format!("line {line}: {}", color_clamped(value, one))];
+    assert_eq!(colors(["1.5 0 0", "0 0.2 0", "1 1 1"]), (plain.to_vec(), clamped(1, 1.5, 1.0)));
+    assert_eq!(colors(["255 0 0", "0 51 -3", "255 255 255"]), (plain.to_vec(), clamped(2, -3.0, 255.0)));
     assert_eq!(colors(["", "", ""]), (vec![], vec![]));
     let ignored = vec![excess_words(1)];
     assert_eq!(colors(["a b c", "a b c", "a b c"]), (vec![], ignored.clone()));
@@ -480,6 +484,31 @@ fn material_names_may_be_latin_1() {
         let loaded = read_with(&[("a.obj", &text), ("a.mtl", mtl)]).expect("whole");
         assert_eq!((loaded.materials[0].diffuse, loaded.material_warnings.len()), (Vec3::X, 0));
     }
+}
+
+#[test]
+fn textures_without_coordinates_are_reported() {
+    let mtl: &[u8] =
+        b"newmtl plain\nKd 1 0 0\nnewmtl wall\nmap_Kd w.png\nnewmtl glass\nillum 7\nNi 1.5\nmap_Kd w.png\n";
+    let warnings = |faces: &str| {
+        let text = format!("mtllib a.mtl\n{SQUARE}{faces}");
+        let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]).expect("whole");
+        let about_uvs = |words: &String| words.contains("texture coordinates");
+        let of_materials = loaded.material_warnings.into_iter().filter(about_uvs).collect::<Vec<_>>();
+        (of_materials, loaded.warnings)
+    };
+    let none: Vec<String> = Vec::new();
+    let half = vec![half_of_texture(9, "wall")];
+    assert_eq!(warnings("usemtl plain\nf 1 2 3\nusemtl wall\nf 1 3 4\n"), (half, none.clone()));
+    assert_eq!(warnings("usemtl plain\nf 1 2 3\nusemtl glass\nf 1 3 4\n"), (none.clone(), none.clone()));
+    let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nusemtl wall\n";
+    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3/3\n")), (none.clone(), none.clone()));
+    assert_eq!(
+        warnings(&format!("{uvs}f 1/1 2/2 3/3\no other\nf 1 3 4\nf 1 2 3\n")),
+        (vec![corner_of_texture(12, "wall")], none.clone())
+    );
+    // Partially missing coordinates are reported regardless of the material.
+    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3\n")), (none, vec![uvs_missing(10, 1)]));
 }
 
 #[test]

@@ -62,7 +62,7 @@ impl Vertices {
             return Err(ZERO_WEIGHT.to_owned());
         }
         if let Some(color) = color {
-            self.add_color(color)?;
+            self.add_color(color, start)?;
         }
         if let Some(alpha) = alpha
             && self.least_alpha.is_none_or(|(least, _)| alpha < least)
@@ -74,11 +74,11 @@ impl Vertices {
     }
 
     /// Adds the color of the next position.
-    fn add_color(&mut self, color: [f64; 3]) -> Result<(), String> {
+    fn add_color(&mut self, color: [f64; 3], start: usize) -> Result<(), String> {
         if !color.iter().all(|part| part.is_finite()) {
             return Err(NONFINITE_COLOR.to_owned());
         }
-        self.range.add(color);
+        self.range.add(color, start);
         self.colors.resize(self.positions.len(), None);
         self.colors.push(Some(color.map(|part| part as f32)));
         Ok(())
@@ -106,7 +106,12 @@ impl Vertices {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
-    /// Color of a position. White if the file does not specify a color.
+    /// A color outside of its range: the byte offset of its vertex, and a warning.
+    pub(super) fn color_outside_range(&self) -> Option<(usize, String)> {
+        self.range.outside()
+    }
+
+    /// Color of a position. White if the file does not specify it.
     pub(super) fn color_of(&self, index: usize) -> [u8; 3] {
         if self.colors.is_empty() {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);

@@ -1,6 +1,6 @@
 //! Colors of a PLY file. Their range depends on their type and largest value.
 
-use super::super::parsed::{ColorRange, color_bytes};
+use super::super::parsed::{ALPHA_IGNORED, ColorRange, Extremes, color_bytes};
 use super::header::Scalar;
 
 /// Colors in file order.
@@ -12,21 +12,41 @@ pub(super) struct PlyColors {
     /// Colors of types other than bytes.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
-    /// Minimum alpha, its type, and a byte offset in the same vertex.
+    /// Extremes of red, green and blue.
+    extremes: [Extremes; 3],
+    /// Minimum alpha, its type, and a byte offset in the same item.
     alpha: Option<(f64, Scalar, usize)>,
 }
 
 impl PlyColors {
     pub(super) fn new(scalars: [Scalar; 3]) -> Self {
         let (bytes, numbers) = Default::default();
-        Self { scalars, bytes, numbers, range: ColorRange::default(), alpha: None }
+        let (range, extremes) = Default::default();
+        Self { scalars, bytes, numbers, range, extremes, alpha: None }
     }
 
-    pub(super) fn push(&mut self, color: [f64; 3]) {
-        if self.scalars == [Scalar::U8; 3] {
+    /// Adds a color, given a byte offset in the same item.
+    pub(super) fn push(&mut self, color: [f64; 3], at: usize) {
+        self.extremes.iter_mut().zip(color).for_each(|(extremes, part)| extremes.add(part, at));
+        if !self.are_bytes() {
+            self.range.add(color, at);
+        }
+        self.store(color);
+    }
+
+    /// Adds white for an item without a color.
+    pub(super) fn push_missing(&mut self) {
+        self.store([f64::INFINITY; 3]);
+    }
+
+    fn are_bytes(&self) -> bool {
+        self.scalars == [Scalar::U8; 3]
+    }
+
+    fn store(&mut self, color: [f64; 3]) {
+        if self.are_bytes() {
             self.bytes.push(color.map(|part| part as u8));
         } else {
-            self.range.add(color);
             self.numbers.push(color);
         }
     }
@@ -37,21 +57,28 @@ impl PlyColors {
         }
     }
 
-    /// Returns the colors as bytes. If any alpha is less than 1, also returns a byte offset in the vertex
-    /// with the minimum alpha, to be used in a warning that alpha is ignored.
-    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<usize>) {
+    /// Returns the colors as bytes, and warnings about ignored alpha and values out of range, each with a byte
+    /// offset in an item concerned.
+    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
+        let max = self.extremes.iter().map(Extremes::max).fold(0.0, f64::max);
         let one = |scalar: Scalar| match scalar {
             Scalar::U8 | Scalar::I8 => scalar.full_intensity(),
             Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
-                let fits = |limit: &f64| self.range.max() <= *limit;
+                let fits = |limit: &f64| max <= *limit;
                 [255.0, 65535.0].into_iter().find(fits).unwrap_or(f64::INFINITY).min(scalar.full_intensity())
             }
             Scalar::F32 | Scalar::F64 => self.range.one(),
         };
-        let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar)).map(|(.., at)| at);
+        let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar));
+        let outside = self.scalars.iter().zip(&self.extremes).find_map(|(scalar, extremes)| {
+            let fraction = extremes.fraction().filter(|_| scalar.is_integer());
+            extremes.outside(one(*scalar)).or(fraction)
+        });
+        let mut warnings: Vec<_> = outside.into_iter().collect();
+        warnings.extend(transparent.map(|(.., at)| (at, ALPHA_IGNORED.to_owned())));
         let ones = self.scalars.map(one);
         let in_bytes = |color: &[f64; 3]| color_bytes(std::array::from_fn(|part| color[part] / ones[part]));
         let colors = self.numbers.iter().map(in_bytes);
-        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, transparent)
+        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, warnings)
     }
 }

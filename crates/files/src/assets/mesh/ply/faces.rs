@@ -26,6 +26,7 @@ enum PropertyRole {
 const UV: [usize; 2] = [0, 1];
 const COLOR: [usize; 3] = [2, 3, 4];
 const TEXTURE: usize = 5;
+const ALPHA: usize = 6;
 
 /// Returns the type and role of each property. `corners` is the index of the vertex list.
 fn property_roles(element: &Element, corners: usize) -> Vec<(PropertyType, PropertyRole)> {
@@ -40,6 +41,7 @@ fn property_roles(element: &Element, corners: usize) -> Vec<(PropertyType, Prope
         (PropertyType::Scalar(_), _) => match vertex_property_slot(name) {
             Some(uv @ 6..=7) => PropertyRole::Value(UV[uv - 6]),
             Some(color @ 8..=10) => PropertyRole::Value(COLOR[color - 8]),
+            Some(super::ALPHA) => PropertyRole::Value(ALPHA),
             Some(_) | None => PropertyRole::Unused,
         },
         (PropertyType::List { .. }, _) => PropertyRole::Unused,
@@ -71,7 +73,7 @@ pub(super) fn read(
     read_items(context, element, numbers, |numbers| {
         let start = numbers.at();
         faces.read(&roles, numbers, vertices)?;
-        faces.add(parsed, start);
+        faces.add(parsed, start, numbers.at());
         Ok(())
     })?;
     faces.finish(context, parsed);
@@ -86,7 +88,11 @@ struct FaceReader {
     corners: Vec<u32>,
     uvs: Vec<f64>,
     parts: Vec<f64>,
-    values: [f64; 6],
+    values: [f64; 7],
+    /// Type of the face's alpha.
+    alpha: Option<Scalar>,
+    /// Type of the colors in lists.
+    list_scalar: Option<Scalar>,
     colors: Option<PlyColors>,
     /// Texture number of the first face.
     texture: Option<f64>,
@@ -107,7 +113,8 @@ impl FaceReader {
         };
         let has_color = COLOR.iter().all(has_value);
         let scalars = COLOR.map(|index| scalar(PropertyRole::Value(index)).unwrap_or(Scalar::U8));
-        let colors = match scalar(PropertyRole::Colors) {
+        let list_scalar = scalar(PropertyRole::Colors);
+        let colors = match list_scalar {
             Some(scalar) => Some(PlyColors::new([scalar; 3])),
             None => has_color.then(|| PlyColors::new(scalars)),
         };
@@ -119,7 +126,9 @@ impl FaceReader {
             corners: Vec::new(),
             uvs: Vec::new(),
             parts: Vec::new(),
-            values: [0.0; 6],
+            values: [0.0; 7],
+            alpha: scalar(PropertyRole::Value(ALPHA)),
+            list_scalar,
             colors,
             texture: None,
             has_several_textures: false,
@@ -168,8 +177,8 @@ impl FaceReader {
         Ok(())
     }
 
-    /// Adds the current face to `parsed`.
-    fn add(&mut self, parsed: &mut ParsedMesh, start: usize) {
+    /// Adds the current face, which is stored between two byte offsets, to `parsed`.
+    fn add(&mut self, parsed: &mut ParsedMesh, start: usize, end: usize) {
         let arity = self.corners.len();
         let is_wrong = |list: &[f64], sizes| {
             !list.is_empty() && arity > 0 && corner_value(list, arity, 0, sizes).is_none()
@@ -188,13 +197,18 @@ impl FaceReader {
                     corner_value(&self.uvs, arity, index, UV_SIZES).and_then(|uv| uv.first_chunk());
                 parsed.corner_uvs.push(DVec2::from(*of_corner.unwrap_or(&of_face)).as_vec2());
             }
-            if let Some(colors) = &mut self.colors {
+            let Some(colors) = &mut self.colors else { continue };
+            let of_corner = corner_value(&self.parts, arity, index, COLOR_SIZES);
+            match of_corner.and_then(|color| color.first_chunk()) {
+                Some(color) => colors.push(*color, end),
+                None if self.has_color => colors.push(COLOR.map(|index| self.values[index]), end),
                 // Missing colors are white.
-                let of_face =
-                    if self.has_color { COLOR.map(|index| self.values[index]) } else { [f64::INFINITY; 3] };
-                let of_corner = corner_value(&self.parts, arity, index, COLOR_SIZES)
-                    .and_then(|color| color.first_chunk());
-                colors.push(*of_corner.unwrap_or(&of_face));
+                None => colors.push_missing(),
+            }
+            let list_alpha = of_corner.and_then(|color| Some((*color.get(3)?, self.list_scalar?)));
+            let alpha = list_alpha.or(self.alpha.map(|scalar| (self.values[ALPHA], scalar)));
+            if let Some((alpha, scalar)) = alpha {
+                colors.add_alpha(alpha, scalar, end);
             }
         }
         parsed.faces.end_face(arity);
@@ -213,7 +227,9 @@ impl FaceReader {
         }
         let Some(colors) = self.colors else { return };
         if parsed.colors.is_empty() {
-            (parsed.corner_colors, _) = colors.finish();
+            let (colors, warnings) = colors.finish();
+            parsed.corner_colors = colors;
+            parsed.warnings.extend(context.located(warnings));
         } else {
             parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }
@@ -240,7 +256,7 @@ const COLOR_SIZES: [usize; 2] = [3, 4];
 /// the face.
 fn corner_value(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
     match sizes.into_iter().find(|size| list.len() == size * arity) {
-        Some(size) => list.get(index * size..),
+        Some(size) => list.get(index * size..(index + 1) * size),
         None => sizes.contains(&list.len()).then_some(list),
     }
 }

@@ -106,6 +106,8 @@ pub(super) struct PlyHeader {
     pub(super) elements: Vec<Element>,
     /// Warning about skipped lines.
     pub(super) warning: Option<String>,
+    /// Warning about textures.
+    pub(super) texture_warning: Option<String>,
     /// Byte offset of the first byte after the header.
     pub(super) body: usize,
 }
@@ -133,6 +135,8 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
     let mut elements = Vec::new();
     // Number of skipped lines, and a description of the first one.
     let mut skipped = (0_u32, String::new());
+    // Number of textures, and the line and name of the first one.
+    let mut textures = (0_u32, 0, String::new());
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
             break; // The size limit falls within this line.
@@ -146,7 +150,15 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
                 let hint = warning.iter().map(|warning| format!("; {warning}")).collect::<String>();
                 source.wrong_at(start, format!("{NO_FORMAT}{hint}"))
             })?;
-            return Ok(PlyHeader { encoding, elements, warning, body: end });
+            let (count, first, name) = textures;
+            let texture_warning = (count > 0).then(|| texture_ignored(first, &name, count));
+            return Ok(PlyHeader { encoding, elements, warning, texture_warning, body: end });
+        }
+        if let Some(name) = texture_name(&line) {
+            if textures.0 == 0 {
+                (textures.1, textures.2) = (source.line(start), name.to_owned());
+            }
+            textures.0 += 1;
         }
         // Do not skip unknown keywords after the first element. They may be misspelled properties.
         if elements.is_empty() && words.first().is_some_and(|first| !KEYWORDS.contains(first)) {
@@ -171,6 +183,20 @@ pub(super) fn skipped_lines(first: &str, count: u32) -> String {
         1 => format!("{first}; line skipped"),
         _ => format!("{first}; skipped this line and {} more", count - 1),
     }
+}
+
+/// Name of the image in a comment `TextureFile wall.png`, as MeshLab writes it.
+fn texture_name(line: &str) -> Option<&str> {
+    let comment = line.trim().strip_prefix("comment")?.trim_start();
+    let (keyword, name) = comment.split_once(char::is_whitespace)?;
+    keyword.eq_ignore_ascii_case("TextureFile").then(|| name.trim_start())
+}
+
+/// Warning about `count` textures, of which the first one is named on line `first`.
+pub(super) fn texture_ignored(first: usize, name: &str, count: u32) -> String {
+    let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
+    let name = shown(name.as_bytes());
+    format!("line {first}: the texture {name}{more} is ignored; set a `material` with a texture in a scene")
 }
 
 pub(super) fn too_long() -> String {

@@ -8,7 +8,7 @@ mod header;
 pub mod write;
 
 use super::assemble::assemble_text;
-use super::parsed::{ALPHA_IGNORED, ParsedMesh};
+use super::parsed::ParsedMesh;
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3};
@@ -78,6 +78,11 @@ impl ErrorContext<'_> {
         }
     }
 
+    /// Adds the line number to warnings with a byte offset.
+    fn located(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
+        warnings.into_iter().map(|(at, words)| format!("{}{words}", self.line_prefix(at)))
+    }
+
     /// Label of a face in warnings, with the line number in text files.
     fn face_label(&self, at: usize, index: usize) -> String {
         format!("{}face {}", self.line_prefix(at), index + 1)
@@ -98,8 +103,11 @@ fn read(
     }
     // Ignore strips if there are faces: both describe the same triangles.
     let has_faces = count_of("face") > 0;
-    let mut parsed =
-        ParsedMesh { warnings: header.warning.iter().cloned().collect(), ..ParsedMesh::default() };
+    let mut parsed = ParsedMesh {
+        warnings: header.warning.iter().cloned().collect(),
+        material_warnings: header.texture_warning.iter().cloned().collect(),
+        ..ParsedMesh::default()
+    };
     let mut before_faces = None;
     for element in &header.elements {
         check_plausible_counts(source, element, header.encoding, numbers.at())?;
@@ -286,7 +294,7 @@ fn read_vertices(
             parsed.second_uvs.push(DVec2::new(second_u, second_v).as_vec2());
         }
         if let Some(colors) = &mut colors {
-            colors.push([red, green, blue]);
+            colors.push([red, green, blue], numbers.at());
             if let Some(scalar) = alpha_scalar {
                 colors.add_alpha(alpha, scalar, numbers.at());
             }
@@ -294,9 +302,9 @@ fn read_vertices(
         Ok(())
     })?;
     if let Some(colors) = colors {
-        let (colors, transparent) = colors.finish();
+        let (colors, warnings) = colors.finish();
         parsed.colors = colors;
-        parsed.warnings.extend(transparent.map(|at| format!("{}{ALPHA_IGNORED}", context.line_prefix(at))));
+        parsed.warnings.extend(context.located(warnings));
     }
     Ok(())
 }

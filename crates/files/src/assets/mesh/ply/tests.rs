@@ -1,12 +1,12 @@
 use std::path::Path;
 
-use super::super::parsed::{FACE_COLORS_IGNORED, alpha_ignored};
+use super::super::parsed::{FACE_COLORS_IGNORED, alpha_ignored, color_clamped, color_not_integer};
 use super::super::text::expected;
 use super::body::END_OF_FILE;
 use super::faces::{SEVERAL_TEXTURES, wrong_list_length};
 use super::header::{
-    NO_END, NO_FORMAT, PROPERTY_FIRST, invalid_count, invalid_statement, skipped_lines, too_long,
-    unknown_encoding, unknown_keyword, unknown_type,
+    NO_END, NO_FORMAT, PROPERTY_FIRST, invalid_count, invalid_statement, skipped_lines, texture_ignored,
+    too_long, unknown_encoding, unknown_keyword, unknown_type,
 };
 use super::*;
 use crate::assets::read::Monitor;
@@ -422,6 +422,93 @@ fn alpha_below_one_causes_a_warning() {
         assert!(warnings(scalar, opaque).is_empty(), "{scalar} {opaque}");
         assert_eq!(warnings(scalar, faded), [alpha_ignored(14)]);
     }
+}
+
+#[test]
+fn unusable_vertex_colors_are_reported_with_line() {
+    let properties =
+        |scalar: &str| ["red", "green", "blue"].map(|name| format!("property {scalar} {name}\n")).concat();
+    for (scalar, tails, line, words, color) in [
+        ("uchar", ["0 0 0", "0 300 0", "0 0 0", "0 0 0"], 14, color_clamped(300.0, 255.0), [0, 255, 0]),
+        ("uchar", ["0 0 0", "0 0 0", "0 0 -5", "0 0 0"], 15, color_clamped(-5.0, 255.0), [0; 3]),
+        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, color_not_integer(0.5), [0; 3]),
+        ("float", ["0 0.5 0", "0 1.5 0", "0 0 0", "0 0 0"], 14, color_clamped(1.5, 1.0), [0, 255, 0]),
+        ("float", ["0 0 0", "0 -0.5 0", "0 0 0", "0 0 0"], 14, color_clamped(-0.5, 1.0), [0; 3]),
+        ("float", ["0 9 0", "0 300 0", "0 0 0", "0 0 0"], 14, color_clamped(300.0, 255.0), [0, 255, 0]),
+        ("double", ["0 1 0", "0 nan 0", "0 0 0", "0 0 0"], 14, color_clamped(f64::NAN, 1.0), [0; 3]),
+        ("float", ["0 1 0", "0 inf 0", "0 0 0", "0 0 0"], 14, color_clamped(f64::INFINITY, 1.0), [0, 255, 0]),
+        (
+            "ushort",
+            ["0 1 0", "0 70000 0", "0 0 0", "0 0 0"],
+            14,
+            color_clamped(70000.0, 65535.0),
+            [0, 255, 0],
+        ),
+        ("int", ["0 1 0", "0 -1 0", "0 0 0", "0 0 0"], 14, color_clamped(-1.0, 255.0), [0; 3]),
+    ] {
+        let found = loaded(&square((&properties(scalar), tails), "", &["3 0 1 2"]));
+        assert_eq!(found.warnings, [format!("line {line}: {words}")], "{scalar} {tails:?}");
+        if line == 14 {
+            assert_eq!(found.mesh.colors[1], color, "{scalar} {tails:?}");
+        }
+    }
+}
+
+#[test]
+fn nonfinite_attributes_are_reported_with_line() {
+    let warnings = |names: [&str; 2], tails: [&str; 4]| {
+        let properties = names.map(|name| format!("property float {name}\n")).concat();
+        loaded(&square((&properties, tails), "", &["3 0 1 2", "3 0 2 3"])).warnings
+    };
+    let usual = ["0 0", "1 0", "1 1", "0 1"];
+    assert_eq!(warnings(["u", "v"], usual), [""; 0]);
+    let said = warnings(["u", "v"], ["0 0", "1 0", "1 1", "0 inf"]);
+    assert_eq!(
+        said,
+        ["line 17: face 2 has non-finite texture coordinates; such coordinates are set to (0, 0)"]
+    );
+}
+
+#[test]
+fn unusable_face_colors_are_reported_with_line() {
+    let parts = |scalar: &str, names: &[&str]| {
+        names.iter().map(|name| format!("property {scalar} {name}\n")).collect::<String>()
+    };
+    let warnings = |face: &str, lines: &[&str]| loaded(&square(PLAIN, face, lines)).warnings;
+    let rgb = ["red", "green", "blue"];
+    let clamped =
+        |line: usize, value: f64, one: f64| vec![format!("line {line}: {}", color_clamped(value, one))];
+    let (own, list) = (parts("uchar", &rgb), "property list uchar float color\n");
+    let rows = |face: &str, lines: &[&str]| {
+        square(PLAIN, face, lines)
+            .lines()
+            .position(|line| line == lines[0])
+            .map(|row| row + 1)
+            .expect("a row")
+    };
+    let lines = ["3 0 1 2 0 0 0", "3 0 2 3 0 300 0"];
+    assert_eq!(warnings(&own, &lines), clamped(rows(&own, &lines) + 1, 300.0, 255.0));
+    let lines = ["3 0 1 2 3 0 0 0.5", "3 0 2 3 3 -1 0 0"];
+    assert_eq!(warnings(list, &lines), clamped(rows(list, &lines) + 1, -1.0, 1.0));
+    let lines = ["3 0 1 2 4 0 0 1 1", "3 0 2 3 4 0 0 1 0.5"];
+    assert_eq!(warnings(list, &lines), [alpha_ignored(rows(list, &lines) + 1)]);
+    let with_alpha = parts("uchar", &["red", "green", "blue", "alpha"]);
+    let lines = ["3 0 1 2 0 0 0 255", "3 0 2 3 0 0 0 254"];
+    assert_eq!(warnings(&with_alpha, &lines), [alpha_ignored(rows(&with_alpha, &lines) + 1)]);
+}
+
+#[test]
+fn texture_comments_are_reported_with_line() {
+    let text = square(PLAIN, "", &["3 0 1 2"]);
+    let with = |comments: &str| {
+        let found = loaded(&text.replace("element vertex", &format!("{comments}element vertex")));
+        (found.warnings, found.material_warnings)
+    };
+    assert_eq!(with("comment made by hand\ncomment TextureFiles\n"), (vec![], vec![]));
+    let one = vec![texture_ignored(3, "old wall.png", 1)];
+    assert_eq!(with("comment TextureFile old wall.png\n"), (vec![], one));
+    let two = vec![texture_ignored(3, "a.png", 2)];
+    assert_eq!(with("comment TextureFile a.png\ncomment TextureFile b.png\n"), (vec![], two));
 }
 
 #[test]

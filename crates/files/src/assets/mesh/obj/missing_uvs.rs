@@ -1,0 +1,89 @@
+//! Warns about faces without texture coordinates.
+
+use std::collections::BTreeMap;
+
+use super::super::MeshSource;
+use super::super::parsed::ParsedMesh;
+use super::build::FaceRun;
+use super::statements::{CornerIndices, NONE, Statements, face_start};
+use crate::assets::FileMaterial;
+
+/// Faces that have corners without texture coordinates.
+#[derive(Default)]
+pub(super) struct MissingUvs {
+    /// Index of the first face in objects that have some texture coordinates, and the number of such faces.
+    partial: Option<(usize, usize)>,
+    /// Index of the first face in objects without texture coordinates, for each material with textures.
+    textured: BTreeMap<u32, usize>,
+}
+
+impl MissingUvs {
+    pub(super) fn find(statements: &Statements, runs: &[FaceRun], materials: &[FileMaterial]) -> Self {
+        let has_textures =
+            |material: u32| materials.get(material as usize).is_some_and(FileMaterial::has_textures);
+        let mut found = Self::default();
+        let (mut face, mut corner) = (0, 0);
+        for object in runs.chunk_by(|_, next| !next.is_object) {
+            // The faces that lack coordinates, with their materials.
+            let (mut lacking, mut has_some) = (Vec::new(), false);
+            for material in object.iter().flat_map(|run| std::iter::repeat_n(run.material, run.faces)) {
+                let end = corner + statements.arities[face] as usize;
+                let has_uvs = |corner: &CornerIndices| corner[1] != NONE;
+                let corners = &statements.corners[corner..end];
+                has_some |= corners.iter().any(has_uvs);
+                if !corners.iter().all(has_uvs) {
+                    lacking.push((face, material));
+                }
+                (face, corner) = (face + 1, end);
+            }
+            if has_some {
+                if let Some((face, _)) = lacking.first() {
+                    found.partial.get_or_insert((*face, 0)).1 += lacking.len();
+                }
+                continue;
+            }
+            for (face, material) in lacking.into_iter().filter(|(_, material)| has_textures(*material)) {
+                found.textured.entry(material).or_insert(face);
+            }
+        }
+        found
+    }
+
+    /// Warning about objects in which only some corners have texture coordinates.
+    pub(super) fn warning(&self, source: &MeshSource<'_>) -> Option<String> {
+        let (first, count) = self.partial?;
+        Some(uvs_missing(source.line(face_start(source, first)), count))
+    }
+
+    /// Warnings about textured objects without texture coordinates, one for each material.
+    pub(super) fn material_warnings(&self, source: &MeshSource<'_>, parsed: &ParsedMesh) -> Vec<String> {
+        let warning = |(material, face): (&u32, &usize)| {
+            let line = source.line(face_start(source, *face));
+            let name = &parsed.materials[*material as usize].name;
+            if parsed.uvs.is_empty() { half_of_texture(line, name) } else { corner_of_texture(line, name) }
+        };
+        self.textured.iter().map(warning).collect()
+    }
+}
+
+pub(super) fn uvs_missing(first: usize, count: usize) -> String {
+    let faces = match count {
+        1 => format!("line {first}: a face has"),
+        _ => format!("line {first} and {} more faces have", count - 1),
+    };
+    format!("{faces} corners without texture coordinates; these are set to (0, 0)")
+}
+
+/// Warning about a material with textures in a file without texture coordinates.
+pub(super) fn half_of_texture(line: usize, material: &str) -> String {
+    format!(
+        "line {line}: the file has no texture coordinates: each triangle shows half of every texture of \"{material}\""
+    )
+}
+
+/// Warning about faces without texture coordinates in a file that has some.
+pub(super) fn corner_of_texture(line: usize, material: &str) -> String {
+    format!(
+        "line {line}: faces without texture coordinates show only the point (0, 0) of every texture of \"{material}\""
+    )
+}
