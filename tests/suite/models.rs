@@ -111,6 +111,35 @@ fn physical_mtl_matches_principled_material() {
     }
 }
 
+#[test]
+fn mtl_maps_scale_like_constants() {
+    let dir = TestDir::new();
+    dir.write("white.ppm", "P3 1 1 255 255 255 255\n");
+    dir.write("dark.ppm", "P3 1 1 255 90 90 90\n");
+    dir.write(
+        "a.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n",
+    );
+    let of = |mtl: &str| {
+        dir.write("a.mtl", format!("newmtl m\n{mtl}"));
+        picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n")
+    };
+    let highlight = of("Kd 0 0 0\nKs 1 1 1\nNs 20\n");
+    assert!(highlight.iter().any(|value| *value > 0.01), "the highlight must be visible");
+    for (map, constant) in [
+        ("Kd 0 0 0\nNs 20\nmap_Ks white.ppm\n", highlight),
+        ("Kd 0 0 0\nNs 20\nmap_Ks -mm 0.25 0.5 white.ppm\n", of("Kd 0 0 0\nKs 0.75 0.75 0.75\nNs 20\n")),
+        // Values below 0 become 0.
+        ("map_Kd -mm -0.5 1 dark.ppm\n", of("Kd 0 0 0\n")),
+        ("map_Kd -mm -0.5 1 white.ppm\n", of("Kd 0.5 0.5 0.5\n")),
+        ("Kd 0 0 0\nKe 1 1 1\nmap_Ke -mm -0.5 1 dark.ppm\n", of("Kd 0 0 0\n")),
+    ] {
+        let mapped = of(map);
+        let differ = |(a, b): (&f32, &f32)| (a - b).abs() > 1e-5 * b.abs();
+        assert!(!mapped.iter().zip(&constant).any(differ), "{map}");
+    }
+}
+
 /// MeshLab and some other programs invert `Tr`, so that 1 instead of 0 is opaque.
 #[test]
 fn misused_mtl_statements_are_corrected() {

@@ -312,7 +312,7 @@ fn check_warns_about_unlit_meshes() {
     let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\n";
     dir.write("dark.toml", scene);
     let said = |name: &str| String::from_utf8_lossy(&dir.run(&format!("check {name}")).stderr).into_owned();
-    assert_mentions(&said("dark.toml"), &["warning", "dark.toml"]);
+    assert_mentions(&said("dark.toml"), &["warning", "dark.toml", "lights"]);
     dir.write("lit.toml", format!("{scene}[[light]]\n"));
     assert!(!mentions(&said("lit.toml"), "warning"), "{}", said("lit.toml"));
 }

@@ -143,7 +143,7 @@ fn impossible_turntables_are_rejected() {
     assert_mentions(&stderr, &["27.94 GiB"]);
     let stderr =
         dir.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
-    assert_mentions(&stderr, &["error", "frames", "--memory"]);
+    assert_mentions(&stderr, &["error", "frames", "30.00 MiB", "--memory"]);
 }
 
 #[test]

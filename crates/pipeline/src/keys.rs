@@ -7,7 +7,6 @@ use crate::math::DVec3;
 use crate::plan::Plan;
 use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Key};
-use crate::world::emissive_meshes;
 
 /// Returns the textures, meshes and orbiter that descriptions refer to by index.
 pub(crate) fn referents<'a>(
@@ -18,25 +17,32 @@ pub(crate) fn referents<'a>(
     FingerprintContext { textures: &scene.textures, meshes, orbiter }
 }
 
-/// Returns the key of a mesh's tree. `is_emissive` states whether an object's material makes all of it emit.
-pub(crate) fn tree(mesh: &Key, (accel, is_emissive): (Accel, bool)) -> Key {
-    FingerprintHasher::new("tree").key(mesh).choice(accel).flag(is_emissive).finish()
+/// Returns the key of a mesh with distinct lights. `is_emissive` states whether an object's material makes
+/// all of the mesh emit.
+pub(crate) fn distinct_lights(mesh: &Key, is_emissive: bool) -> Key {
+    FingerprintHasher::new("distinct lights").key(mesh).flag(is_emissive).finish()
+}
+
+/// Returns the key of a mesh's tree. `is_distinct` states whether the mesh's lights were made distinct.
+pub(crate) fn tree(mesh: &Key, accel: Accel, is_distinct: bool) -> Key {
+    FingerprintHasher::new("tree").key(mesh).choice(accel).flag(is_distinct).finish()
 }
 
 /// Returns the key of all trees, with each object offset by its lift. `lifts` is empty if no object is
-/// offset.
+/// offset. `are_distinct` states for each mesh file whether its lights were made distinct.
 pub(crate) fn geometry(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     (origin, lifts): (DVec3, &[DVec3]),
+    are_distinct: impl Iterator<Item = bool>,
 ) -> Key {
     let mut key = FingerprintHasher::new("lifted");
     key.key(&from(&shapes(scene, of), origin));
     for lift in lifts {
         key.dvec3(*lift);
     }
-    for is_emissive in emissive_meshes(scene) {
-        key.flag(is_emissive);
+    for is_distinct in are_distinct {
+        key.flag(is_distinct);
     }
     with_tree_kind(&key.finish(), scene.render.accel)
 }
@@ -207,7 +213,7 @@ mod tests {
         let scene = loaded_of(text).scene;
         let of = referents(&scene, &[], None);
         (
-            geometry(&scene, &of, (DVec3::ZERO, &[])),
+            geometry(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
             lights(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
             world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
         )
@@ -240,7 +246,7 @@ mod tests {
         assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
         let lifted = |lift: DVec3| {
             let scene = loaded_of(BALL).scene;
-            geometry(&scene, &referents(&scene, &[], None), (DVec3::ZERO, &[lift]))
+            geometry(&scene, &referents(&scene, &[], None), (DVec3::ZERO, &[lift]), std::iter::empty())
         };
         assert_ne!(lifted(DVec3::X), lifted(DVec3::Y));
     }

@@ -165,8 +165,13 @@ impl Texels {
             let sum: DVec4 = (0..self.len()).map(|place| self.premultiplied(place).as_dvec4()).sum();
             return unpremultiply((sum / self.len() as f64).as_vec4());
         }
-        let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
-        let sum: DVec3 = rows.map(|(x, y)| self.get(x, y).as_dvec3()).sum();
+        self.mean_of(|texel| texel)
+    }
+
+    /// Mean of a function of the texels.
+    pub fn mean_of(&self, function: impl Fn(Vec3) -> Vec3) -> Vec3 {
+        let places = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        let sum: DVec3 = places.map(|(x, y)| function(self.get(x, y)).as_dvec3()).sum();
         (sum / self.len() as f64).as_vec3()
     }
 

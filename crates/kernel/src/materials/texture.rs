@@ -65,6 +65,9 @@ pub struct ScaleAndOffset {
 }
 
 impl ScaleAndOffset {
+    /// Leaves values as they are.
+    pub const IDENTITY: Self = Self { gain: Vec3::ONE, base: Vec3::ZERO };
+
     /// A scale without an offset. `None` if the scale is 1.
     pub fn new(gain: Vec3) -> Option<Self> {
         Self::with_base(gain, Vec3::ZERO)
@@ -75,10 +78,15 @@ impl ScaleAndOffset {
         (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
     }
 
-    /// The scaled value plus the offset.
+    /// The scaled value plus the offset, at least 0.
     #[inline]
     fn apply(&self, value: Vec3) -> Vec3 {
-        value * self.gain + self.base
+        (value * self.gain + self.base).max(Vec3::ZERO)
+    }
+
+    /// Multiplies the result by a factor.
+    pub fn scaled_by(self, factor: f32) -> Self {
+        Self { gain: self.gain * factor, base: self.base * factor }
     }
 }
 
@@ -280,7 +288,7 @@ impl Texture {
         if let Some(factor) = self.factor {
             let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
             for (channel, lanes) in row.iter_mut().enumerate() {
-                lanes.iter_mut().for_each(|lane| *lane = *lane * gain[channel] + base[channel]);
+                lanes.iter_mut().for_each(|lane| *lane = (*lane * gain[channel] + base[channel]).max(0.0));
             }
         }
         row
@@ -343,7 +351,14 @@ impl Texture {
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
-        self.factor.map_or(mean, |factor| factor.apply(mean))
+        match self.factor {
+            // Texels below 0 are clamped before they are averaged.
+            Some(factor) if factor.base.min_element() < 0.0 => {
+                self.texels.mean_of(|texel| factor.apply(texel))
+            }
+            Some(factor) => factor.apply(mean),
+            None => mean,
+        }
     }
 
     /// The (fractional, nonnegative) mip level at which the footprint is one texel wide.

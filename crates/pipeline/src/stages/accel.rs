@@ -6,8 +6,9 @@ use std::sync::Arc;
 use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
-use super::meshes::Meshes;
+use super::meshes::{CachedMesh, Meshes};
 use super::{FileReadContext, StageResult, Stop};
+use crate::assets::LoadedMesh;
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{FingerprintContext, Key};
@@ -17,6 +18,8 @@ use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, with_distin
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     trees: NamedCache<Key, MeshTree>,
+    /// Meshes with distinct lights. `None` if the mesh in the file can be used.
+    distinct: NamedCache<Key, Option<Arc<LoadedMesh>>>,
     geometry: NamedCache<Key, Geometry>,
     /// Offsets for lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
@@ -27,15 +30,18 @@ pub(crate) struct AccelCache {
 impl AccelCache {
     pub(crate) fn end_request(&mut self, success: bool, request: u64) {
         self.trees.end_request(success, request);
+        self.distinct.end_request(success, request);
         self.geometry.end_request(success, request);
     }
 
     pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
-        self.trees.eviction_candidates().chain(self.geometry.eviction_candidates())
+        let meshes = self.trees.eviction_candidates().chain(self.distinct.eviction_candidates());
+        meshes.chain(self.geometry.eviction_candidates())
     }
 
     pub(crate) fn evict_unused_before(&mut self, request: u64) {
         self.trees.evict_unused_before(request);
+        self.distinct.evict_unused_before(request);
         self.geometry.evict_unused_before(request);
     }
 
@@ -66,11 +72,13 @@ pub(crate) fn accel(
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<AccelResult>, Stop> {
-    let (meshes, kept) = trees(scene, meshes, cache, reading)?;
+    let distinct = distinct_lights(scene, meshes, cache);
+    let (meshes, kept) = trees(scene, (meshes, &distinct), cache, reading)?;
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
-    let key = keys::geometry(scene, of, (origin, &lifts));
+    let are_distinct = distinct.iter().map(Option::is_some);
+    let key = keys::geometry(scene, of, (origin, &lifts), are_distinct);
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
@@ -92,26 +100,40 @@ pub(crate) fn accel(
     })
 }
 
+/// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
+fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Vec<Option<Arc<LoadedMesh>>> {
+    let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
+        let key = keys::distinct_lights(&mesh.key, is_emissive);
+        let found = cache.distinct.get(&key, key).unwrap_or_else(|| {
+            let found = Arc::new(with_distinct_lights(&mesh.mesh, is_emissive).map(Arc::new));
+            let bytes = found.as_ref().as_ref().map_or(0, |distinct| distinct.mesh.memory_bytes());
+            cache.distinct.insert(key, key, (found.clone(), bytes));
+            found
+        });
+        (*found).clone()
+    };
+    meshes.iter().zip(emissive_meshes(scene)).map(distinct).collect()
+}
+
 /// Returns the trees of all meshes and the number of trees that were cached.
 fn trees(
     scene: &Scene,
-    meshes: &Meshes,
+    (meshes, distinct): (&Meshes, &[Option<Arc<LoadedMesh>>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
     let mut kept = 0;
     let accel = scene.render.accel;
     let mut trees = Vec::with_capacity(meshes.len());
-    for (mesh, is_emissive) in meshes.iter().zip(emissive_meshes(scene)) {
-        let key = keys::tree(&mesh.key, (accel, is_emissive));
+    for (mesh, distinct) in meshes.iter().zip(distinct) {
+        let key = keys::tree(&mesh.key, accel, distinct.is_some());
         let tree = match cache.trees.get(&key, key) {
             Some(tree) => {
                 kept += 1;
                 tree
             }
             None => {
-                let distinct = with_distinct_lights(&mesh.mesh, is_emissive);
-                let loaded = distinct.map_or_else(|| mesh.mesh.clone(), Arc::new);
+                let loaded = distinct.as_ref().unwrap_or(&mesh.mesh).clone();
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.

@@ -224,9 +224,16 @@ fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
-    let strength = own.specular * (2.0 / (own.shininess + 2.0));
+    let scale = 2.0 / (own.shininess + 2.0);
     let specular = match own.has_highlight() {
-        true => file_color(images, own, own.specular_texture.as_ref(), strength),
+        true => match file_color(images, own, own.specular_texture.as_ref(), own.specular) {
+            Color::Constant(specular) => Color::Constant(specular * scale),
+            Color::Texture(texture) => {
+                let mut texture = Arc::unwrap_or_clone(texture);
+                texture.factor = Some(texture.factor.unwrap_or(ScaleAndOffset::IDENTITY).scaled_by(scale));
+                Color::Texture(Arc::new(texture))
+            }
+        },
         false => Color::Constant(Vec3::ZERO),
     };
     Rough::Phong(Phong {

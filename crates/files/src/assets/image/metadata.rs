@@ -15,6 +15,8 @@ pub(super) enum AlphaUsage {
     UnusedIfZero,
     /// Unused sample.
     Unused,
+    /// One bit, which the decoder drops.
+    Dropped,
 }
 
 /// A warning about an ignored part of a file.

@@ -191,7 +191,7 @@ fn load_source(
     monitor.tick(0, length)?;
     let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
-        if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
+        if let Some(words) = convert::alpha_warning(&image, encoding, &metadata) {
             metadata.warn(words);
         }
         Ok((convert::texels(image, encoding, &metadata), metadata.warnings))

@@ -37,18 +37,30 @@ pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patch
         Ok(_) | Err(_) if alpha_bits == 0 => AlphaUsage::Unused,
         Ok(_) | Err(_) => AlphaUsage::Straight,
     };
+    // `image` does not decode the alpha bit of 16-bit colors.
+    let has_alpha_bit = color_bits(&header) == Some(16) && alpha != AlphaUsage::Unused;
+    let alpha = if has_alpha_bit { AlphaUsage::Dropped } else { alpha };
     header[DESCRIPTOR] =
         header[DESCRIPTOR] & !ALPHA_BITS | possible_alpha_bits(&header).map_err(decoding_error)?;
     file.seek(SeekFrom::Start(HEADER as u64))?;
     Ok((TgaDecoder::new(Cursor::new(header).chain(file))?, alpha))
 }
 
+/// Number of bits per color. `None` for gray images and unknown types.
+fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
+    match header[2] {
+        1 | 9 => Some(header[7]),
+        2 | 10 => Some(header[16]),
+        _ => None,
+    }
+}
+
 /// Number of bits per pixel that may contain alpha.
 fn possible_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
-    let (kind, map_bits, pixel_bits) = (header[2], header[7], header[16]);
-    let bits = match kind {
-        1 | 9 => map_bits,
-        2 | 3 | 10 | 11 => pixel_bits,
+    let kind = header[2];
+    let bits = match (kind, color_bits(header)) {
+        (_, Some(bits)) => bits,
+        (3 | 11, None) => header[16],
         _ => return Err(format!("image type {kind} is not supported; save it as PNG")),
     };
     match (kind, bits) {

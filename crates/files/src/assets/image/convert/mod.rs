@@ -102,7 +102,7 @@ fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
     };
     match metadata.alpha {
         AlphaUsage::Straight | AlphaUsage::Premultiplied => Some(index),
-        AlphaUsage::Unused => None,
+        AlphaUsage::Unused | AlphaUsage::Dropped => None,
         AlphaUsage::UnusedIfZero => (!is_channel_constant(image, index, 0.0)).then_some(index),
     }
 }
@@ -116,7 +116,7 @@ fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
-pub(super) fn constant_alpha_warning(
+pub(super) fn alpha_warning(
     image: &DynamicImage,
     encoding: ImageEncoding,
     metadata: &ImageMetadata,
@@ -124,6 +124,9 @@ pub(super) fn constant_alpha_warning(
     let ImageEncoding::Number { of: PixelValue::Opacity | PixelValue::Mask { .. }, .. } = encoding else {
         return None;
     };
+    if metadata.alpha == AlphaUsage::Dropped {
+        return Some(ALPHA_BIT_IGNORED);
+    }
     let alpha = alpha(image, metadata)?;
     if is_channel_constant(image, alpha, 0.0) {
         return Some(INVISIBLE);
@@ -138,7 +141,9 @@ pub(super) fn constant_alpha_warning(
     }
 }
 
-/// Warnings about constant alpha.
+/// Warnings about alpha.
+pub(super) const ALPHA_BIT_IGNORED: &str =
+    "the alpha bit of 16-bit TGA pixels is ignored; save the image as PNG or as a 32-bit TGA";
 pub(super) const INVISIBLE: &str = "alpha is 0 everywhere; the surface is invisible";
 pub(super) const LUMINANCE_USED: &str = "alpha is 1 everywhere; luminance is used as the opacity";
 pub(super) const OPAQUE: &str =

@@ -71,7 +71,7 @@ fn masks_without_alpha_use_the_luminance() {
     }
     let warning = |image: DynamicImage, of| {
         let encoding = ImageEncoding::Number { of, is_srgb: false };
-        convert::constant_alpha_warning(&image, encoding, &ImageMetadata::default())
+        convert::alpha_warning(&image, encoding, &ImageMetadata::default())
     };
     assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));
     assert_eq!(warning(red(), mask(false)), Some(convert::OPAQUE));

@@ -80,6 +80,18 @@ fn sixteen_bit_gray_has_alpha() {
 }
 
 #[test]
+fn ignored_alpha_bit_causes_a_warning() {
+    let warnings = |file: &[u8], of: PixelValue| {
+        warnings_of("a.tga", file, ImageEncoding::Number { of, is_srgb: false })
+    };
+    let pixels = [0x1f, 0x80, 0x1f, 0x00];
+    let warned = warnings(&row([2, 16, 1], &pixels), PixelValue::Opacity);
+    assert!(warned.len() == 1 && warned[0].contains("alpha bit"), "{warned:?}");
+    assert_eq!(warnings(&row([2, 16, 0], &pixels), PixelValue::Opacity), [""; 0]);
+    assert_eq!(warnings(&row([2, 16, 1], &pixels), PixelValue::Luminance), [""; 0]);
+}
+
+#[test]
 fn impossible_alpha_bits_are_ignored() {
     for (kind, bits, pixels, expected) in [
         (2, 24, vec![10, 20, 30], [30, 20, 10]),
