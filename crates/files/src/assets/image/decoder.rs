@@ -2,6 +2,11 @@
 
 use std::io::{BufRead, Seek, SeekFrom};
 
+use ::image::codecs::bmp::BmpDecoder;
+use ::image::codecs::jpeg::JpegDecoder;
+use ::image::codecs::pnm::PnmDecoder;
+use ::image::codecs::webp::WebPDecoder;
+use ::image::error::ImageFormatHint;
 use ::image::metadata::Orientation;
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
@@ -20,9 +25,10 @@ pub(super) struct OpenedImage {
     pub(super) texel_bytes: u64,
 }
 
-/// Creates the decoder for the detected format.
+/// Creates the decoder for the detected format. [`ImageReader::into_decoder`] would add decoders that are never
+/// used to the program.
 pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
-    mut reader: ImageReader<R>,
+    reader: ImageReader<R>,
     encoding: ImageEncoding,
     memory_bytes: u64,
 ) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
@@ -46,32 +52,49 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             let (decoder, alpha) = tga::open(reader.into_inner())?;
             Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
         }
+        Some(ImageFormat::Jpeg) => {
+            with_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
+        }
+        Some(ImageFormat::Pnm) => with_profile(PnmDecoder::new(reader.into_inner())?, encoding, memory_bytes),
+        Some(ImageFormat::Bmp) => {
+            let (decoder, mut metadata) =
+                with_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
+            metadata.alpha = AlphaUsage::UnusedIfZero;
+            Ok((decoder, metadata))
+        }
+        Some(ImageFormat::WebP) => {
+            let mut file = reader.into_inner();
+            // Errors are reported by the decoder below.
+            let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
+            file.seek(SeekFrom::Start(0))?;
+            let (decoder, mut metadata) = with_profile(WebPDecoder::new(file)?, encoding, memory_bytes)?;
+            metadata.warn_of_frames(frames);
+            Ok((decoder, metadata))
+        }
         format => {
-            let mut metadata = ImageMetadata::default();
-            if format == Some(ImageFormat::Bmp) {
-                metadata.alpha = AlphaUsage::UnusedIfZero;
-            }
-            if format == Some(ImageFormat::WebP) {
-                let mut file = reader.into_inner();
-                // Errors are reported by the decoder below.
-                let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
-                file.seek(SeekFrom::Start(0))?;
-                metadata.warn_of_frames(frames);
-                reader = ImageReader::with_format(file, ImageFormat::WebP);
-            }
-            // Width and height are checked in `check_size`, with better messages.
-            let mut limits = Limits::default();
-            limits.max_alloc = Some(memory_bytes);
-            reader.limits(limits);
-            let mut decoder = reader.into_decoder()?;
-            if encoding.uses_file_color_space()
-                && let Some(profile) = decoder.icc_profile()?
-            {
-                metadata.add_profile(Some(&profile), !decoder.color_type().has_color());
-            }
-            Ok((Box::new(decoder), metadata))
+            let hint = format.map_or(ImageFormatHint::Unknown, ImageFormatHint::Exact);
+            Err(ImageError::Unsupported(hint.into()))
         }
     }
+}
+
+/// Sets a decoder's memory limit, and reads the color profile if the encoding uses it.
+fn with_profile(
+    mut decoder: impl ImageDecoder + 'static,
+    encoding: ImageEncoding,
+    memory_bytes: u64,
+) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
+    // Width and height are checked in `check_size`, with better messages.
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(memory_bytes);
+    decoder.set_limits(limits)?;
+    let mut metadata = ImageMetadata::default();
+    if encoding.uses_file_color_space()
+        && let Some(profile) = decoder.icc_profile()?
+    {
+        metadata.add_profile(Some(&profile), !decoder.color_type().has_color());
+    }
+    Ok((Box::new(decoder), metadata))
 }
 
 /// Orientation of an image from its Exif data. Some programs also write JPEG's Exif prefix in other formats,
