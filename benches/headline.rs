@@ -1,4 +1,4 @@
-//! Headline figures: run times of whole processes on all threads, including file input and output.
+//! Headline figures: run times of whole processes on all threads, including file I/O.
 //!
 //! `cargo bench --bench headline` generates meshes and scenes in a temporary folder, renders each scene three
 //! times and prints the fastest run: wall-clock and CPU time, and the time spent on loading, building and
@@ -83,7 +83,8 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Renders once. Returns wall-clock and CPU seconds, and the seconds of the meshes, accel and render stages.
+/// Renders once. Returns wall-clock and CPU seconds, and the seconds spent in the meshes, accel and render
+/// stages.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Error>> {
     let processor = || -> nix::Result<f64> {
         let usage = getrusage(UsageWho::RUSAGE_CHILDREN)?;
@@ -105,7 +106,7 @@ fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Er
     Ok([all, processor()? - before, stage("meshes"), stage("accel"), stage("render")])
 }
 
-/// A scene with a floor, a light and the given meshes.
+/// Returns a scene with a floor, a light and the meshes in `files`.
 fn meshes(samples: u32, shadow_samples: u32, files: &[&str]) -> String {
     let mut scene = format!(
         r#"[render]
@@ -142,8 +143,8 @@ material = "lamp"
     scene
 }
 
-/// An OFF file of a bumpy ball on the ground at `x`, with 2·rings·columns triangles minus the degenerate
-/// triangles at the poles.
+/// Generates an OFF file that contains a bumpy ball on the ground at `x`, with 2·rings·columns triangles
+/// minus the degenerate triangles at the poles.
 fn ball(rings: u32, columns: u32, x: f64) -> String {
     use std::f64::consts::{PI, TAU};
     let mut text = format!("OFF\n{} {} 0\n", (rings + 1) * columns, 2 * rings * columns - 2 * columns);

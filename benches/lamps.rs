@@ -1,12 +1,12 @@
-//! Time to reach the same error with an increasing number of lights and constant total power.
+//! Measures the time needed to reach a fixed error as the number of lights grows at constant total power.
 //!
 //! `cargo bench --bench lamps` renders a room with 10, 100, 1000 and 10,000 small lights using both
 //! integrators: first a reference with many samples, then three images with four samples per pixel.
 //!
 //! The error is inversely proportional to the number of samples, so seconds × relMSE / 1e-2 would be the time
 //! to reach a relMSE of 1e-2 if fractional sample counts were possible. The last columns show the smallest
-//! whole number of samples with a relMSE of at most 1e-2, and the time of the lights and render stages with
-//! that many samples. `-- whitted 10 1000` selects rows.
+//! whole number of samples with a relMSE of at most 1e-2, and the time that the lights and render stages take
+//! with that many samples. `-- whitted 10 1000` selects rows.
 
 #![allow(clippy::print_stdout)]
 
@@ -80,7 +80,7 @@ fn fastest_render(folder: &Path, samples: u32) -> Result<RenderFigures, Box<dyn 
     Ok(RenderFigures { lights, seconds, rays, relmse: error_of(folder)? })
 }
 
-/// Renders once. Returns the seconds of the lights and render stages, and the number of shadow rays.
+/// Renders once. Returns the seconds spent in the lights and render stages, and the number of shadow rays.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     command.current_dir(folder).args(["scene.toml", "--once", "--report", "report.json"]).args(options);
@@ -104,7 +104,7 @@ fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     errors["relmse"].as_f64().ok_or_else(|| "no relMSE".into())
 }
 
-/// A room with objects and `count` small sphere lights outside the camera's view.
+/// Returns a room with objects and `count` small sphere lights outside the camera's view.
 fn scene(integrator: &str, count: u32) -> String {
     let mut scene = format!(
         r#"[render]

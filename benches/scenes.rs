@@ -1,5 +1,5 @@
-//! CPU time of `check` for large scene files: a million spheres, and files that repeat a valid or invalid
-//! element N and 4N times. A ratio well above 4 reveals a quadratic algorithm.
+//! CPU time that `check` needs for large scene files: a million spheres, and files that repeat a valid or
+//! invalid element N and 4N times. A ratio well above 4 reveals a quadratic algorithm.
 //!
 //! `cargo bench --bench scenes [NAME…]`
 
@@ -13,7 +13,7 @@ use nix::sys::time::TimeValLike;
 
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
-/// Generates a scene file with the given number of elements.
+/// Generates a scene file with the requested number of elements.
 type Family = fn(usize) -> String;
 
 const FAMILIES: [(&str, Family); 14] = [
@@ -63,7 +63,7 @@ fn million() -> String {
     each(8, |i| format!("[materials.m{i}]\ndiffuse = [0.5, 0.5, 0.3]\n")) + &each(1_000_000, sphere)
 }
 
-/// CPU seconds of `check` for a file.
+/// Returns the CPU seconds that `check` takes for a file.
 fn seconds(folder: &Path, text: &str) -> f64 {
     let scene = folder.join("scene.toml");
     std::fs::write(&scene, format!("{HEAD}{text}")).expect("written");

@@ -22,7 +22,7 @@
 //! | [`world`] | the immutable structures that rays are traced against |
 //! | [`film`] | pixel sums, convergence and noise estimates, tone mapping |
 //! | [`integrators`] | whitted, path, photons, AOVs |
-//! | [`compare`] | error metrics of an image compared with a reference |
+//! | [`compare`] | error metrics for an image compared with a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, file watching, scenes generated for models |
 //! | [`tui`] | the terminal front end |
@@ -59,7 +59,8 @@
 //!    state.
 //! 3. `tui/update/request.rs` creates a request, and `tui/run.rs` sends it. The header (`tui/view/header.rs`)
 //!    changes first: it is redrawn as in step 9 and shows that a render is running.
-//! 4. `pipeline/worker.rs` has a mailbox for one request. A newer request cancels the current render.
+//! 4. `pipeline/worker.rs` holds at most one pending request in its mailbox. A newer request cancels the
+//!    current render.
 //! 5. `pipeline/engine/mod.rs` runs the stages: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes,
 //!    glass, textures, accel, lights and photons. A stage reuses its result if its key in `pipeline/keys.rs`
 //!    is unchanged. If the scene has errors, the render ends here and the last image stays on the screen.
@@ -68,7 +69,7 @@
 //!    photons, `engine/mod.rs` shows a coarse image before tracing photons.
 //! 7. `integrators/mod.rs` renders a tile (see below). `pipeline/render/film_state.rs` adds the samples to
 //!    the film.
-//! 8. `pipeline/render/preview.rs` puts a preview into the slot, and `cli/live.rs` notifies the front end.
+//! 8. `pipeline/render/preview.rs` puts a preview into its slot, and `cli/live.rs` notifies the front end.
 //! 9. `tui/presenter.rs` takes the preview when a frame is due, `tui/view/preview.rs` converts it to cells,
 //!    `tui/display.rs` limits the cells per frame, `tui/paint/mod.rs` encodes them in the fewest bytes, and
 //!    `tui/writer.rs` writes the bytes.
@@ -86,9 +87,9 @@
 //! 3. `transport/packet.rs` intersects a packet with the scene: `world/geometry.rs`, then the trees in
 //!    `accel/wide_bvh/`, or `geometry/triangle_list.rs` if there are few triangles.
 //! 4. `transport/packet.rs` collects hits on simple materials in packets of sixteen vertices
-//!    (`transport/batch.rs`). All BSDFs in a packet have the same kind (`materials/rough/mod.rs`).
-//! 5. Other hits are handled one at a time: `transport/walk.rs` skips boundaries between parts of one glass
-//!    body (`transport/crossing.rs`), and `transport/vertex.rs` evaluates the surface.
+//!    (`transport/batch.rs`). All BSDFs in a packet are of the same kind (`materials/rough/mod.rs`).
+//! 5. Other hits are handled one at a time: `transport/walk.rs` skips boundaries within a single glass body
+//!    (`transport/crossing.rs`), and `transport/vertex.rs` evaluates the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` generates the rays for the next round.
 //! 7. `direct/queue.rs` computes direct light for packets: `direct/all_lights.rs` or `direct/light_tree.rs`
 //!    samples lights, `direct/mis.rs` computes MIS weights, and `direct/shadow_rays.rs` traces shadow rays.

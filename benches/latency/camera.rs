@@ -13,7 +13,7 @@ const HELD: Duration = Duration::from_secs(2);
 /// Key repeat interval.
 const REPEAT: Duration = Duration::from_millis(33);
 
-/// Measures one scene and returns a line of results.
+/// Measures one scene and returns the results as a line of text.
 pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
     let path = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let arguments = [path, "--samples", "100000", "-o", "out.png"];
@@ -30,8 +30,8 @@ pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
     Ok(format!("first {}  held {:5.1} images per second", figures(times), held(&mut terminal)?))
 }
 
-/// Holds camera keys with keyboard repeat, back and forth. Refined images arrive only after the next press,
-/// so each burst of bytes is an image from a new camera position.
+/// Holds opposite camera keys alternately, with keyboard repeat. Refined images arrive only after the next
+/// press, so each burst of bytes is an image from a new camera position.
 fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     terminal.cells();
     let begin = Instant::now();
@@ -44,7 +44,7 @@ fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     Ok(terminal.bursts() as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// Whether a different image is shown, ignoring changes in noise.
+/// Returns whether a different image is shown, ignoring changes in noise.
 fn is_other(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {

@@ -1,4 +1,4 @@
-//! Time until the worker starts on a newer request, for every kind of work in progress.
+//! Time until the worker starts on a newer request, whatever kind of work is in progress.
 
 use std::path::Path;
 use std::time::{Duration, Instant};

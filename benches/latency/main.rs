@@ -7,10 +7,10 @@
 //! key is pressed, and stops when the terminal has read the first bytes that change the image.
 //!
 //! `settled` saves the file while nothing is rendering, `busy` while the previous image is still rendering.
-//! `cancel` measures the time until the worker starts on a newer request, for every kind of work in progress.
-//! `camera` presses camera keys in every bundled scene while the previous image is rendering, and prints the
-//! time to the first changed cell and the images per second while a key is held. Set `GLIMT` to measure a
-//! different build.
+//! `cancel` measures the time until the worker starts on a newer request, whatever kind of work is in
+//! progress. `camera` presses camera keys in every bundled scene while the previous image is rendering, and
+//! prints the time to the first changed cell and the images per second while a key is held. Set `GLIMT` to
+//! measure a different build.
 
 #![allow(clippy::print_stdout)]
 
@@ -87,7 +87,7 @@ impl Mode {
         }
     }
 
-    /// Whether the image has changed, ignoring changes in noise while it is rendering.
+    /// Returns whether the image has changed. While it is rendering, changes in noise are ignored.
     fn is_other(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));

@@ -1,12 +1,12 @@
-//! Edits of the bundled scenes.
+//! Edits to the bundled scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::BenchResult;
 
-/// A bundled scene and its edits. Each has a kind, the text to replace and the replacement, in which `{}`
-/// stands for a new number between 0.1 and 1 each time. An edit without `{}` darkens the texture file of
+/// A bundled scene and its edits. Each edit has a kind, the text to replace, and a replacement in which `{}`
+/// becomes a different number between 0.1 and 1 each time. An edit without `{}` darkens the texture file with
 /// that name.
 pub struct EditedScene {
     pub name: &'static str,

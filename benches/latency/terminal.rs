@@ -28,7 +28,7 @@ pub struct TimedTerminal {
     screen: vt100::Parser,
 }
 
-/// The colors of every image cell. `None` for text.
+/// The colors of every image cell, or `None` for cells with text.
 pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
 
 impl TimedTerminal {
@@ -82,7 +82,7 @@ impl TimedTerminal {
         cells(self.screen.screen())
     }
 
-    /// Time at which the image first satisfies `differs`. Starts checking after `pause`.
+    /// Returns the time at which the image first satisfies `differs`. Starts checking after `pause`.
     pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> BenchResult<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
@@ -103,7 +103,7 @@ impl TimedTerminal {
         Err(format!("the image did not change\n{}", self.screen.screen().contents()).into())
     }
 
-    /// Number of bursts that are large enough for an image. Bursts are separated by pauses.
+    /// Counts the bursts of output that are large enough for an image. Bursts are separated by pauses.
     pub fn bursts(&mut self) -> usize {
         const LEAST: usize = 300;
         const GAP: Duration = Duration::from_millis(8);

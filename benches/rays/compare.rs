@@ -1,4 +1,4 @@
-//! Comparison of hits with the expected hits in a file.
+//! Compares traced hits with expected hits from a file.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use glimt::math::DVec3;
 
 use crate::meshes;
 
-/// Traces the rays in one file and counts differences from the expected results in another: hits (`.hits`),
-/// or one byte per ray, nonzero if the ray is occluded.
+/// Traces the rays in one file and counts differences from the expected results in another. These are either
+/// hits (`.hits`) or one byte per ray, which is nonzero if the ray is occluded.
 pub fn compare(tree: &WideBvh, mesh: &TriangleMesh, rays: &Path, answers: &Path) -> std::io::Result<()> {
     let rays_read = meshes::ray_file(rays)?;
     let name =
@@ -50,7 +50,7 @@ fn report<'a>(mesh: &TriangleMesh, differing: impl Iterator<Item = &'a Ray>) {
     println!("    hit or miss differs {}, {on_edge} of them within 4 ulp of an edge", differing.len());
 }
 
-/// Whether the ray passes within 4 ulp of a triangle edge, in the coordinates that the edge test compares.
+/// Returns whether the ray passes within 4 ulp of a triangle edge, measured in the edge test's coordinates.
 fn passes_edge(mesh: &TriangleMesh, ray: &Ray) -> bool {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
     (0..mesh.triangles.len() as u32).any(|id| {

@@ -56,7 +56,7 @@ struct RayHit {
     padding: [u32; 3],
 }
 
-/// `RTCRay16` followed by `RTCHit16`: one row per member.
+/// `RTCRay16` followed by `RTCHit16`, with an array of sixteen values per member.
 #[repr(C, align(64))]
 struct RayHit16 {
     rows: [[f32; 16]; 12],
@@ -218,14 +218,14 @@ impl Embree {
 }
 
 impl EmbreeScene<'_> {
-    /// Builds the acceleration structure. This call is timed as the build.
+    /// Builds the acceleration structure. The build time is the duration of this call.
     pub fn commit(&mut self) {
         // SAFETY: the scene is alive.
         unsafe { self.embree.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(self.scene) };
         self.memory_bytes = MEMORY_BYTES.load(Ordering::Relaxed).max(0) as usize;
     }
 
-    /// Closest hit: t, primitive, u, v.
+    /// Returns the closest hit: t, primitive, u, v.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<(f32, u32, f32, f32)> {
         let mut query = query(ray);
@@ -234,7 +234,7 @@ impl EmbreeScene<'_> {
         (query.geometry != NONE).then_some((query.t_far, query.primitive, query.u, query.v))
     }
 
-    /// Whether anything is hit.
+    /// Returns whether the ray hits anything.
     #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
         let mut query = query(ray);
@@ -243,7 +243,7 @@ impl EmbreeScene<'_> {
         query.t_far < 0.0
     }
 
-    /// Number of rays that hit a primitive. Traces sixteen rays at a time and ignores the remainder.
+    /// Counts the rays that hit a primitive. Traces sixteen rays at a time and ignores the remainder.
     pub fn closest16(&self, rays: &[Ray], coherent: bool) -> usize {
         let arguments = Arguments {
             flags: if coherent { RAY_QUERY_FLAG_COHERENT } else { 0 },

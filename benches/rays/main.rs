@@ -13,8 +13,8 @@
 //! - `--rays FILE --hits FILE` (or `--occluded FILE`) counts differences from expected results. May be
 //!   repeated.
 //!
-//! glimt and Embree alternate chunk by chunk, and the fastest run of each chunk counts, so that other load
-//! affects both equally.
+//! glimt and Embree alternate chunk by chunk, and the fastest run of each chunk counts, so that load from
+//! other programs affects both equally.
 
 #![allow(clippy::print_stdout)]
 
@@ -46,7 +46,7 @@ struct BenchOptions {
     isa: Option<String>,
     build_only: bool,
     high: bool,
-    /// Ray files to time, and whether to find any hit instead of the closest.
+    /// Ray files to time, each with whether to find any hit instead of the closest.
     timed: Vec<(PathBuf, bool)>,
     /// Ray files and their expected results.
     given: Vec<(PathBuf, PathBuf)>,
@@ -282,7 +282,7 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// Prints a measurement, Embree's measurement, and their ratio.
+/// Prints glimt's and Embree's measurements, and their ratio.
 fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
     match peer {
         Some(peer) => println!("  {name:<10} {unit:>9} {own:>9.3} {peer:>9.3}  ratio {:.3}", own / peer),

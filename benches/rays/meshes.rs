@@ -52,7 +52,8 @@ pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     Ok(loaded.mesh)
 }
 
-/// Parses a `.mesh` file in little endian: `u32` vertex count, `u32` triangle count, `f32` positions, `u32` indices.
+/// Parses a little-endian `.mesh` file: `u32` vertex count, `u32` triangle count, `f32` positions, `u32`
+/// indices.
 fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
     let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "file too short for its counts");

@@ -1,11 +1,11 @@
 //! Measures the cost of unused features, which must be zero, by interleaving renders with and without them.
 //!
-//! `cargo bench --bench skips` prints these columns for each pair: the minimum seconds without the feature,
-//! the median time ratio over all rounds and its standard error, the instruction ratio for smaller images if
-//! valgrind is installed, and whether the images are bit-identical. The exit code is 1 if the instruction
-//! counts (without valgrind, the times) differ by more than 1 % or the bits differ. Load from other programs
-//! affects times but not instruction counts. `-- WORD` selects pairs, `-- rounds=N` sets the number of
-//! rounds.
+//! `cargo bench --bench skips` prints these columns for each pair: the minimum seconds without the
+//! feature, the median time ratio over all rounds with its standard error, the instruction ratio for smaller
+//! images if valgrind is installed, and whether the images are bit-identical. The exit code is 1 if the
+//! instruction counts (without valgrind, the times) differ by more than 1 % or the bits differ. Load from
+//! other programs affects times but not instruction counts. `-- WORD` selects pairs, `-- rounds=N` sets the
+//! number of rounds.
 
 #![allow(clippy::print_stdout)]
 
@@ -25,7 +25,7 @@ use row::SceneFiles;
 /// Maximum deviation of the instruction or time ratio from 1.
 const BOUND: f64 = 0.01;
 
-/// Width, height and samples. A render takes a fifth of a second.
+/// Image width, height and samples per pixel. A render takes a fifth of a second.
 const SIZE: [u32; 3] = [640, 480, 16];
 
 fn main() -> ExitCode {
@@ -114,7 +114,7 @@ fn instructions(picture: &SceneFiles) -> Option<f64> {
     count.split_whitespace().next()?.parse::<f64>().ok().map(|count| count * 1e-6)
 }
 
-/// The reason for a stage's status in the report.
+/// Returns the reason that the report gives for a stage's status.
 fn why(report: &serde_json::Value, stage: &str) -> String {
     let stages = report["stages"].as_array().into_iter().flatten();
     let said = stages.filter(|one| one["name"] == stage);

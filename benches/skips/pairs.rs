@@ -49,7 +49,7 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
-/// All pairs, with the given image size and samples per pixel.
+/// Returns all pairs, rendered with this image size and number of samples per pixel.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];
@@ -85,8 +85,8 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
         },
         pair("depth of field without an aperture", plain().by("--dof off"), plain().by("--dof on")),
         pair("aperture with depth of field off", plain(), lens("--dof off")),
-        pair("soft shadows of point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
-        pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
+        pair("soft shadows from point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
+        pair("shadow samples for point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
         pair("shadows with path", path().by("--shadows off"), path().by("--shadows soft")),
         FeaturePair {
             skipped: Some(("textures", reasons::NO_TEXTURES)),

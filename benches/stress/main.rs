@@ -1,4 +1,4 @@
-//! Stress tests: compares extreme scenes with plain reference scenes of known result or cost.
+//! Stress tests: compares extreme scenes with plain reference scenes whose result or cost is known.
 //!
 //! `cargo bench --bench stress` renders all cases, prints the table and writes it to
 //! `benches/stress/table.md`; `-- WORD` prints only the rows whose name contains the word. The exit code
@@ -40,11 +40,11 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(faulty > 0 || !is_written))
 }
 
-const HEAD: &str = "# Scenes at the limits
+const HEAD: &str = "# Extreme scenes
 
 `cargo bench --bench stress` writes this table. A difference is the relative RMS error of the row's worst image against its reference.
 A mean is the relative deviation of the image's mean from the expected value. Seconds cover all stages except reading and writing, on one
-thread, for all images and references of the row. Rows with a ratio may take at most three times as long as the reference. No row has
+thread, for all images and references in the row. Rows with a ratio may take at most three times as long as the reference. No row has
 non-finite samples, crashes or hangs except where noted.
 
 | case | images | measure | value | bound | s | reference, s | ratio | |

@@ -28,7 +28,7 @@ impl SceneFiles {
 /// How to compare a row's images.
 #[derive(Clone, Copy)]
 pub(crate) enum RowMeasure {
-    /// √(Σ(t·a − b)²/Σb²), where a is the image, b the reference and t the given factor.
+    /// √(Σ(t·a − b)²/Σb²), where a is the image, b the reference and t this factor.
     Difference(f64),
     /// Relative deviation of the image's mean from the expected value.
     Mean(f64),
@@ -40,7 +40,7 @@ pub(crate) struct StressRow {
     pub(crate) pairs: Vec<(SceneFiles, SceneFiles)>,
     pub(crate) figure: RowMeasure,
     pub(crate) bound: f64,
-    /// Whether the case requires as much work as the reference, so that it may take at most three times as
+    /// Whether the case requires as much work as the reference and may therefore take at most three times as
     /// long.
     pub(crate) is_timed: bool,
 }

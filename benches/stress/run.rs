@@ -17,7 +17,7 @@ pub(crate) const MOST_SLOWER: f64 = 3.0;
 #[derive(Clone)]
 pub(crate) struct Rendered {
     pub(crate) pixels: Vec<f32>,
-    /// Seconds of all stages except reading and writing.
+    /// Seconds spent in all stages except reading and writing.
     pub(crate) seconds: f64,
     pub(crate) non_finite: u64,
     /// The render report.
@@ -26,10 +26,10 @@ pub(crate) struct Rendered {
 
 /// Measured results for one table row.
 pub(crate) struct RowResult {
-    /// The largest error of all pairs.
+    /// The largest error over all pairs.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
-    /// Total seconds of the cases and of their references.
+    /// Total seconds for the cases, and for their references.
     pub(crate) seconds: [f64; 2],
 }
 
@@ -51,7 +51,7 @@ impl RowResult {
     }
 }
 
-/// Renders all images of a row `rounds` times, interleaved, and uses the shortest times.
+/// Renders all images in a row `rounds` times, interleaved, and keeps the shortest times.
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
@@ -155,7 +155,7 @@ fn render_in(folder: &Path, picture: &SceneFiles) -> Result<Rendered, String> {
     })
 }
 
-/// Seconds of all stages except parse and write.
+/// Returns the seconds spent in all stages except parse and write.
 fn seconds(report: &serde_json::Value) -> f64 {
     let stages = report["stages"].as_array().into_iter().flatten();
     let counts = |stage: &&serde_json::Value| stage["name"] != "parse" && stage["name"] != "write";

@@ -29,7 +29,7 @@ const GROUND: [u8; 3] = [0; 3];
 #[rustfmt::skip]
 const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
-/// A way to display an image, in glimt and chafa.
+/// A display mode, with the corresponding settings for glimt and chafa.
 struct DisplayMode {
     name: &'static str,
     preview: PreviewChoice,
@@ -101,7 +101,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The errors of the cells that `draw` produces for an image, excluding a border.
+/// Returns the sharp and blurred errors of the cells that `draw` produces for an image, excluding a border.
 fn errors(
     file: &Path,
     draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
@@ -242,7 +242,7 @@ impl LinearImage {
         Self { pixels, ..*self }
     }
 
-    /// RMS distance in Oklab, as a percentage of the distance from black to white.
+    /// Returns the RMS distance in Oklab, as a percentage of the distance from black to white.
     fn error(&self, other: &Self) -> f32 {
         let squares = self
             .pixels

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::watched::{COLUMNS, Connection, ROWS, WatchedTerminal};
 
-/// Percentages of the render at which to compare the screen, and the maximum difference on a scale of 0 to
+/// Render progress in percent at which to compare the screen, with the maximum difference on a scale of 0 to
 /// 255.
 const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 
@@ -29,7 +29,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     println!(
         "mean absolute difference from the final screen on a scale of 0 to 255: cornell_glass, 256 samples,"
     );
-    println!("{COLUMNS}×{ROWS} cells, a terminal that answers immediately; bars {LOOKS:?}\n");
+    println!("{COLUMNS}×{ROWS} cells, a terminal that answers immediately; bounds {LOOKS:?}\n");
     println!("{:<14} {:>7} {:>7} {:>7} {:>9} {:>9}", "", "10 %", "25 %", "50 %", "seconds", "kB/s");
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell_glass.toml");
@@ -73,7 +73,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     Ok(format!("{:>7} {:>7} {:>7} {seconds:>9.1} {rate:>9.0}", figures[0], figures[1], figures[2]))
 }
 
-/// Mean absolute difference of pixels. `None` if the sizes differ.
+/// Returns the mean absolute difference between pixels. `None` if the sizes differ.
 fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
     let pairs = a.iter().zip(b).filter(|(a, b)| **a != [0; 3] || **b != [0; 3]);
     let (mut sum, mut count) = (0, 0);

@@ -1,11 +1,11 @@
-//! Number of bytes sent to the terminal.
+//! Measures the number of bytes sent to the terminal.
 //!
-//! `cargo bench --bench terminal` renders bundled scenes and edited versions, replays their previews as the
-//! front end receives them, and prints the number of bytes sent by glimt's painter, by plain ratatui on
-//! crossterm, which draws every preview, and, if installed, by chafa, which draws only the last preview. `--
-//! fidelity` prints the fidelity of the output for each color depth and character set. `-- follow` prints the
-//! difference between a fast terminal's screen during a render and its final screen. `-- orbit` prints the
-//! utilization of a slow connection while a key moves the camera.
+//! `cargo bench --bench terminal` renders bundled scenes and edited versions, replays their previews as
+//! the front end receives them, and prints the number of bytes sent by glimt's painter. For comparison, it
+//! does the same for plain ratatui on crossterm, which draws every preview, and for chafa (if installed),
+//! which draws only the last preview. `-- fidelity` prints the fidelity of the output for each color depth
+//! and character set. `-- follow` prints the difference between a fast terminal's screen during a render and
+//! its final screen. `-- orbit` prints the utilization of a slow connection while a key moves the camera.
 
 #![allow(clippy::print_stdout)]
 
@@ -264,7 +264,7 @@ fn drain(painter: &mut Painter) -> usize {
     std::iter::from_fn(|| Some(painter.slice(24_000).len()).filter(|bytes| *bytes > 0)).sum()
 }
 
-/// Number of cells that differ, or all cells if nothing was shown before.
+/// Returns the number of cells that differ, or of all cells if nothing was shown before.
 fn changed(before: Option<&Picture>, after: &Picture) -> usize {
     let width = after.width as usize;
     let differs = |i: usize| match before.and_then(|before| before.pixels.get(i)) {

@@ -7,18 +7,17 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Connection, WatchedTerminal};
 
-/// Key repeat interval. The key is held for `BEFORE`, then for another `HELD`, during which the connection is
-/// measured.
+/// Key repeat interval. The key is first held for `BEFORE`, then for `HELD` while the connection is measured.
 const REPEAT: Duration = Duration::from_millis(33);
-/// Number of presses in one direction. The camera stays in front of the scene, because the image is black
-/// behind a room's wall and there is nothing to send.
+/// Number of presses in one direction, few enough that the camera stays in front of the scene. Behind a
+/// room's wall, the image would be black, with nothing to send.
 const SWING: u32 = 8;
 const BEFORE: Duration = Duration::from_secs(2);
 const HELD: Duration = Duration::from_secs(6);
 
 /// Prints one line per scene.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!("camera keys held for {} s over a 1 Mbit/s, 150 ms connection", HELD.as_secs());
+    println!("camera keys held for {} s over a connection with 1 Mbit/s and 150 ms", HELD.as_secs());
     println!("{:<16} {:>14} {:>22}", "", "used", "max. unacknowledged bytes");
     for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
         let (share, most) = orbit(scene)?;

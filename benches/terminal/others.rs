@@ -1,4 +1,4 @@
-//! Other renderers of the same cells.
+//! Other programs that draw the same cells.
 
 use std::cell::Cell;
 use std::error::Error;

@@ -62,7 +62,7 @@ impl FarEnd {
         cells.flat_map(parts).collect()
     }
 
-    /// Displayed progress in percent, 100 at the end.
+    /// Returns the progress shown on the screen, in percent; 100 once the render has finished.
     pub(crate) fn percent(&self) -> Option<u32> {
         let row =
             self.cells.screen().rows(0, COLUMNS).find(|row| row.contains("glimt") || !row.is_empty())?;

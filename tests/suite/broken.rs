@@ -231,7 +231,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (3, 11, "file not found: …/files/orbiter.txt"),
             (6, 8, "file not found: …/files/brick.ppm"),
             (9, 8, "…/files/folder.ppm is a folder, not a file"),
-            (12, 8, "`file` is empty; expected the path of a file"),
+            (12, 8, "`file` is empty; expected a file path"),
             (20, 8, "file not found: …/files/knots.obj"),
         ],
     ),
@@ -430,7 +430,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (
                 14,
                 12,
-                "warning: this material reflects more light than falls on it; diffuse + specular is 1.100 in red",
+                "warning: this material reflects more light than it receives; diffuse + specular is 1.100 in red",
             ),
             (16, 12, r#"warning: the material "blue" is not used"#),
         ],

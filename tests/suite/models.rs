@@ -231,7 +231,7 @@ fn unusable_model_values_warn() {
     for scene in ["a.obj", "a.toml"] {
         let said = dir.expect(&format!("{scene} {small}"), 0);
         for warning in [
-            "a.obj: line 6: the file has no texture coordinates: each triangle shows half of every texture of \"wall\"",
+            "a.obj: line 6: the file has no texture coordinates, so each triangle shows half of every texture in \"wall\"",
             "a.obj: a.mtl:2: `Tf` is ignored; use `tint` in a material of the scene",
             "a.obj: a.mtl:3: 7 in `Pr` is clamped to 1",
             "a.obj: a.mtl:4: option `-s 0 0 0` is ignored",

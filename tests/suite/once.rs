@@ -571,7 +571,8 @@ fn new_writes_to_stdout_for_a_dash() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
     let said = String::from_utf8(output.stderr).expect("UTF-8");
-    let words = "note: write glimt.schema.json next to the scene with: glimt schema > glimt.schema.json\n";
+    let words =
+        "note: to create glimt.schema.json next to the scene, run: glimt schema > glimt.schema.json\n";
     assert_eq!(said, words);
 }
 

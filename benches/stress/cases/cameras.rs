@@ -127,7 +127,7 @@ fn images() -> Vec<StressRow> {
         SceneFiles::new(render + CAMERA + around + &light)
     };
     let row = |(width, height, samples)| {
-        let name = format!("{width} × {height} image, samples per pixel: {samples}, vs. 256 × 256");
+        let name = format!("{width} × {height} image at {samples} spp vs. 256 × 256 at 1 spp");
         StressRow::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
     };
     [(1, 1, 65_536), (65_536, 1, 1), (1, 65_536, 1)].map(row).into()

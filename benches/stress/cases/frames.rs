@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::super::frame::Frame;
 use super::{CaseSet, SceneFiles, StressRow};
 
-/// Bound on the difference between images of moved scenes.
+/// Upper bound on the difference between the images of a scene and of its moved copy.
 const MOVED: f64 = 1e-3;
 
 /// Samples per pixel.
@@ -59,7 +59,7 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
 const PHOTONS: &str = "PHOTONS";
 
 /// Every shape with every material and both acceleration structures, far from the origin. The long variant
-/// also scales them.
+/// also scales the scenes.
 fn shape_rows(extent: CaseSet) -> Vec<StressRow> {
     let trees: &[&str] = if extent == CaseSet::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
@@ -80,7 +80,7 @@ fn shape_rows(extent: CaseSet) -> Vec<StressRow> {
     let mut rows = Vec::new();
     for shape in SHAPES {
         rows.push(StressRow::alike(
-            format!("{shape} with every material, moved by 1e8 scene sizes"),
+            format!("{shape} with every material, moved by 1e8 times the scene size"),
             pairs(shape, Frame::moved(1e8)),
             MOVED,
         ));
@@ -111,14 +111,14 @@ fn light_rows(extent: CaseSet) -> Vec<StressRow> {
         let moved = pairs(&[Frame::moved(1e8)]);
         let scaled = pairs(&[Frame::scaled(-30), Frame::scaled(30)]);
         [
-            StressRow::alike(format!("light: {light}, moved by 1e8 scene sizes"), moved, MOVED),
+            StressRow::alike(format!("light: {light}, moved by 1e8 times the scene size"), moved, MOVED),
             StressRow::alike(format!("light: {light}, scaled by 2^−30 and 2^30"), scaled, 0.0),
         ]
     });
     rows.collect()
 }
 
-/// A mesh file with vertices 1e8 scene sizes from the origin.
+/// A mesh file with vertices 1e8 times the scene size from the origin.
 fn georeferenced(ending: &'static str) -> StressRow {
     let name = match ending {
         "obj" => "far.obj",
@@ -132,7 +132,8 @@ fn georeferenced(ending: &'static str) -> StressRow {
         with_files(&scene).with(name, ball(ending, frame, [0.0, 0.0, -5.0], 0.75))
     };
     let pairs = vec![(picture(Frame::moved(1e8)), picture(Frame::PLAIN))];
-    StressRow::alike(format!(".{ending} mesh with vertices 1e8 scene sizes from the origin"), pairs, MOVED)
+    let title = format!(".{ending} mesh with vertices 1e8 times the scene size from the origin");
+    StressRow::alike(title, pairs, MOVED)
 }
 
 const SHAPES: [&str; 10] =
@@ -144,7 +145,7 @@ const LIGHTS: [&str; 9] = [
     "point",
     "spot",
     "directional",
-    "steady point",
+    "point without falloff",
     "sun",
     "constant sky",
     "sky with an image",
@@ -223,7 +224,9 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
         "directional" => {
             "[[light]]\ntype = \"directional\"\ndirection = [0.5, -1, -0.75]\nirradiance = 0.1\n".to_owned()
         }
-        "steady point" => format!("[[light]]\nposition = {above}\nintensity = 0.1\nfalloff = \"none\"\n"),
+        "point without falloff" => {
+            format!("[[light]]\nposition = {above}\nintensity = 0.1\nfalloff = \"none\"\n")
+        }
         "sun" => {
             "[[light]]\ntype = \"directional\"\ndirection = [0.5, -1, -0.75]\nirradiance = 0.1\nangle = 5\n"
                 .to_owned()
@@ -280,7 +283,7 @@ fn with_files(scene: &str) -> SceneFiles {
     SceneFiles::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
 }
 
-/// A mesh file of a faceted ball.
+/// Generates a mesh file that contains a faceted ball.
 fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     const RINGS: usize = 9;
     const STEPS: usize = 14;
@@ -309,7 +312,7 @@ fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     mesh(ending, &points, &faces)
 }
 
-/// A mesh file with the given points and triangles.
+/// Formats points and triangles as a mesh file.
 pub(super) fn mesh(ending: &str, points: &[String], faces: &[[usize; 3]]) -> String {
     let (from, mut text) = match ending {
         "obj" => (1, String::new()),

@@ -60,7 +60,7 @@ fn powered(light: &str, power: f64) -> SceneFiles {
 }
 
 /// A light of size 1e-9 above the scene, compared with a point light with intensity radiance × projected
-/// area. The lit area is directly below the light, so that the cosine of a flat light is nearly 1.
+/// area. The lit area is directly below the light, so that the cosine at a flat light is nearly 1.
 fn tiny(kind: &str) -> StressRow {
     let size = 1e-9;
     // The radiance must stay finite.

@@ -26,7 +26,7 @@ use crate::pipeline::turntable::{self, TurntableFrame};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
-/// Examples for the long help and the manual page. Lines fit 80 columns.
+/// Examples for the long help and the manual page, in lines of at most 80 columns.
 pub(super) const EXAMPLES: &str = "  \
   glimt new ball.toml                     write a commented scene
   glimt ball.toml                         render it live while you edit it
@@ -45,12 +45,12 @@ pub(super) const EXAMPLES: &str = "  \
 `glimt new` writes a scene with every key, commented. \
 If a scene is named like a command, add its folder: glimt ./check";
 
-/// Exit codes of all commands.
+/// Exit codes shared by all commands.
 pub(super) const EXIT_CODES: &str = "\
 0 success; 1 failure; 2 invalid arguments or scene; \
 130, 143 or 129 terminated by SIGINT, SIGTERM or SIGHUP.";
 
-/// Help width in columns: `COLUMNS`, the terminal's width, or 80.
+/// Returns the help width in columns: `COLUMNS` if set, else the terminal's width, else 80.
 fn help_columns() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     columns.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
@@ -84,7 +84,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// The command's color option.
+    /// Returns the command's `--color` option.
     pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
@@ -145,7 +145,7 @@ pub enum Subcommand {
     /// Measure the error of an image against a reference
     #[command(after_long_help = COMPARE_HELP)]
     Compare(CompareArgs),
-    /// Measure error against time for rendering methods
+    /// Measure how the error of rendering methods falls over time
     #[command(after_long_help = bench::HELP)]
     Bench(Box<BenchArgs>),
     /// Merge the parts of an image rendered with --shard
@@ -161,7 +161,7 @@ pub enum Subcommand {
         #[arg(value_parser = one_of::<Shell>(), value_name = "SHELL")]
         shell: Shell,
     },
-    /// Print the manual page of glimt or a command as roff
+    /// Print the manual page for glimt or a command as roff
     #[command(after_long_help = MAN_HELP)]
     Man {
         /// The command
@@ -174,7 +174,7 @@ pub enum Subcommand {
         #[arg(add = candidates::key_path_completer())]
         key: Option<String>,
     },
-    /// Print the JSON Schema of scenes, for editors
+    /// Print the JSON Schema for scenes, for use in editors
     #[command(after_long_help = SCHEMA_HELP)]
     Schema {
         /// JSON Schema draft
@@ -234,7 +234,7 @@ choice! {
 }
 
 impl Draft {
-    /// The key for definitions.
+    /// Returns the schema keyword under which definitions are stored.
     pub(super) fn definitions(self) -> &'static str {
         match self {
             Self::Four => "definitions",
@@ -242,7 +242,7 @@ impl Draft {
         }
     }
 
-    /// The URI of the draft, for `$schema`.
+    /// Returns the draft's URI, the value of `$schema`.
     pub(super) fn uri(self) -> &'static str {
         match self {
             Self::Four => "http://json-schema.org/draft-04/schema#",
@@ -261,7 +261,7 @@ Queries the terminal's features and waits at most one second for answers. The ex
 choice! {
     /// Shells with completions.
     pub enum Shell {
-        /// GNU bash, 4.4 or later.
+        /// GNU bash 4.4 or later.
         Bash = "bash",
         /// The Z shell.
         Zsh = "zsh",
@@ -343,7 +343,7 @@ pub struct CompareArgs {
     pub a: PathBuf,
     /// The reference image, with the same size
     pub b: PathBuf,
-    /// Exit with 1 if relMSE is above X
+    /// Exit with code 1 if relMSE is above X
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = error_bound)]
     pub max_relmse: Option<f64>,
     /// Write the error as an image
@@ -423,7 +423,7 @@ pub struct RenderArgs {
     /// Use --resume with more --samples to continue.
     #[arg(long, help_heading = "Long renders")]
     pub keep_checkpoint: bool,
-    /// Refuse to use more memory, such as 8GiB or 500MB
+    /// Memory limit, such as 8GiB or 500MB; larger renders are refused
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = memory, help_heading = "Long renders")]
     pub memory: Option<u64>,
 
@@ -441,7 +441,7 @@ pub struct RenderArgs {
     pub error: Option<f32>,
     /// Stop after this time
     ///
-    /// Until then, glimt samples the pixels where this reduces the error most.
+    /// Until then, glimt takes more samples wherever they reduce the error most.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Image")]
     pub time: Option<f64>,
     /// Render only this rectangle: left, top, width, height
@@ -451,7 +451,7 @@ pub struct RenderArgs {
     #[arg(long, value_parser = one_of::<View>(), hide_possible_values = true, long_help = listed::<View>("Render a view: the beauty image or an AOV"), value_name = "NAME", help_heading = "Image")]
     pub view: Option<View>,
     /// Side of a model: front, back, left, right, top, bottom, iso
-    #[arg(long, value_parser = one_of::<Side>(), hide_possible_values = true, long_help = listed::<Side>("View a model from this side instead of its own camera"), value_name = "SIDE", help_heading = "Image")]
+    #[arg(long, value_parser = one_of::<Side>(), hide_possible_values = true, long_help = listed::<Side>("View a model from this side instead of through its own camera"), value_name = "SIDE", help_heading = "Image")]
     pub from: Option<Side>,
     /// Up axis of a model: x, y, z
     #[arg(long, value_parser = one_of::<UpAxis>(), hide_possible_values = true, long_help = listed::<UpAxis>("Up axis of a model. The default is z for STL and for PLY files from Blender, otherwise y"), value_name = "AXIS", help_heading = "Image")]
@@ -480,7 +480,7 @@ pub struct RenderArgs {
     /// Applies after the first diffuse or glossy reflection of a path. 0 disables the limit.
     #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Rendering")]
     pub clamp: Option<f32>,
-    /// Photon mapping in whitted: indirect light, caustics
+    /// Photon mapping in whitted: indirect light and caustics
     #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub photons: Option<Switch>,
     /// Depth of field, if the camera has an aperture
@@ -516,7 +516,7 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// The overrides given by these options.
+    /// Returns the overrides specified by these options.
     pub(super) fn overrides(&self) -> Overrides {
         let mut overrides = Overrides {
             sets: self.sets.clone(),
@@ -603,7 +603,7 @@ impl From<Switch> for bool {
     }
 }
 
-/// Creates a parser for the names of a choice.
+/// Creates a parser that accepts the names of a choice's values.
 fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
     let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
     let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
@@ -615,13 +615,13 @@ fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
 
 const UNAVAILABLE: &str = "not available in this version";
 
-/// Long help that lists the values of a choice, in clap's format.
+/// Returns long help that lists a choice's values, in clap's format.
 fn listed<C: Choice>(about: &str) -> String {
     let values: String = C::ALL.iter().map(|one| format!("\n- {}: {}", one.name(), one.meaning())).collect();
     format!("{about}\n\nPossible values:{values}")
 }
 
-/// Long help for `--output`, with the extensions of all supported formats.
+/// Returns the long help for `--output`, with the extensions of all supported formats.
 fn outputs_help() -> String {
     // Skip jpeg: it is the same format as jpg.
     let still: Vec<_> = Format::extensions().filter(|ending| *ending != "jpeg").collect();
@@ -647,7 +647,7 @@ fn any_whole(text: &str) -> Result<u32, String> {
     whole(text, 0..=u32::MAX)
 }
 
-/// Parses an option that overrides an integer key of `[render]`.
+/// Parses an option that overrides an integer key in `[render]`.
 fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| match Render::key(key).map(|key| key.range) {
         Some(KeyRange::Whole(range)) => whole(text, range),
@@ -657,7 +657,8 @@ fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone +
     }
 }
 
-/// Parses an option that overrides a number key of `[render]`. `expected` is the error message for an invalid value.
+/// Parses an option that overrides a number key in `[render]`. `expected` is the error message for an invalid
+/// value.
 fn number_of(
     key: &'static str,
     expected: &'static str,
@@ -699,7 +700,7 @@ fn checkpoint_interval(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses the render time after which to notify.
+/// Parses the minimum render time for notifications.
 fn notification_time(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
@@ -728,7 +729,7 @@ fn memory(text: &str) -> Result<u64, String> {
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
 }
 
-/// Parses `I/N`: a part's number and the number of parts.
+/// Parses `I/N`: the number of a part and the total number of parts.
 fn shard(text: &str) -> Result<(u32, u32), String> {
     let numbers =
         text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
@@ -750,7 +751,7 @@ fn error_bound(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Layers of EXR files, without duplicates.
+/// Layers to write to EXR files, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers(pub Vec<OutputLayer>);
 

@@ -1,5 +1,6 @@
 //! Output to stderr and stdout outside of the terminal UI. Ignores errors when writing to stderr. Errors when
-//! writing to stdout, such as a full disk, determine the exit code. Sanitizes all text that is not trusted.
+//! writing to stdout, for example because the disk is full, determine the exit code. Sanitizes all untrusted
+//! text.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
@@ -17,7 +18,7 @@ use crate::tui::ColorChoice;
 pub(super) struct Console {
     style: Style,
     pub(super) is_terminal: bool,
-    /// The first error from stdout other than a closed pipe.
+    /// The first error from writing to stdout, other than a closed pipe.
     stdout_error: Rc<RefCell<Option<io::Error>>>,
 }
 
@@ -46,7 +47,7 @@ impl Console {
         }
     }
 
-    /// Prints a line to stderr. Replaces line breaks within the text with visible characters.
+    /// Prints a line to stderr. Makes line breaks within the text visible.
     pub(super) fn print_message(&self, text: &str) {
         let line = format!("{}\n", visible(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
@@ -84,7 +85,7 @@ impl Console {
         }
     }
 
-    /// The program's exit code: failure if writing to stdout failed.
+    /// Returns the program's exit code: `exit`, or failure if writing to stdout failed.
     pub(super) fn end(&self, exit: Exit) -> Exit {
         match self.stdout_error.take() {
             Some(error) if exit == Exit::DONE => {

@@ -37,7 +37,7 @@ use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
 /// Makes any use of rayon's global thread pool panic in debug builds, because that pool ignores `--threads`
-/// and panics if the system is out of threads. Rayon does not retry after its initialization fails here.
+/// and panics if the system is out of threads. The initialization here fails, and rayon does not retry it.
 #[cfg(debug_assertions)]
 fn forbid_global_pool() {
     let refuse = |_| Err(std::io::Error::other("the global pool is not used"));
@@ -99,7 +99,7 @@ fn render(order: lower::RenderRequest, console: &Console) -> Exit {
     }
 }
 
-/// Text printed without arguments.
+/// Text printed if there are no arguments.
 const GETTING_STARTED: &str = "\
 glimt renders a scene file in the terminal and updates it on every save.
 
@@ -109,7 +109,7 @@ glimt renders a scene file in the terminal and updates it on every save.
 
 Run `glimt -h` for all commands and options.";
 
-/// Runs glimt without arguments.
+/// Handles an invocation without arguments.
 fn run_without_arguments() -> Exit {
     Console::new(crate::tui::ColorChoice::Auto).print_message_lines(GETTING_STARTED);
     Exit::WRONG
@@ -141,13 +141,13 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
     Exit::WRONG
 }
 
-/// Error message if the first argument looks like a mistyped command.
+/// Returns an error message if the first argument looks like a mistyped command.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
     // A later argument may be the value of an option.
     mistyped_command(Path::new(arguments.get(1)?))
 }
 
-/// Error message if the scene argument looks like a mistyped command.
+/// Returns an error message if the scene argument looks like a mistyped command.
 fn mistyped_command(word: &Path) -> Option<String> {
     let first = word.to_string_lossy();
     if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
@@ -162,7 +162,7 @@ fn mistyped_command(word: &Path) -> Option<String> {
     Some(format!("no such command or scene: {:?}; {help}", visible(&first)))
 }
 
-/// An extra argument after the scene that is neither an option nor a command.
+/// Returns an extra argument after the scene that is neither an option nor a command.
 fn extra_argument(error: &clap::Error) -> Option<&str> {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {

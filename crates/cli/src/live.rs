@@ -19,8 +19,8 @@ use crate::system::threads::{describe_start_failure, spawn};
 use crate::tui::messages::WAITING_FOR_FILE;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
-/// How long to wait at exit for an image to be written. After this time, glimt exits if it received a signal.
-/// If the user quit with a key, glimt prints a message and keeps waiting.
+/// How long to wait at exit until an image is written. After that, glimt exits if it received a signal. If
+/// the user quit with a key, it prints a message and keeps waiting.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Line printed if glimt exits before the image is written.
@@ -113,10 +113,10 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     })
 }
 
-/// Lines printed after the terminal UI exits: unreported writes, the summary, the checkpoint and lost
-/// changes. The summary is printed only after `q`, and only if all writes were reported, or if a write failed
-/// but earlier files exist. `lost` contains the outputs changed by other programs. `call` is this command
-/// line.
+/// Returns the lines to print after the terminal UI exits: unreported writes, the summary, the checkpoint and
+/// lost changes. The summary is printed only after `q`, and only if all writes were reported or if a write
+/// failed but earlier files exist. `lost` contains the outputs changed by other programs. `call` is this
+/// command line.
 fn closing_lines(
     writes: &SharedWriteLog,
     ended: &TuiOutcome,
@@ -145,7 +145,7 @@ fn closing_lines(
     lines
 }
 
-/// This command line, quoted for a shell.
+/// Returns this command line, quoted for a shell.
 fn shell_command_line() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
@@ -154,7 +154,8 @@ fn shell_command_line() -> String {
     format!("glimt {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// Error if the scene does not exist at startup. If the scene disappears later, glimt waits for it.
+/// Returns an error if the scene does not exist at startup. If the scene disappears later, glimt waits for
+/// it.
 fn missing_scene_error(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
@@ -162,15 +163,15 @@ fn missing_scene_error(scene: &Path) -> Option<Diagnostic> {
     text_now(scene).err().map(|problem| *problem).filter(is_absence)
 }
 
-/// Results of writing images, shared between threads.
+/// A log of written images, shared between threads.
 #[derive(Clone, Debug, Default)]
 struct SharedWriteLog(Arc<Mutex<WriteLog>>);
 
-/// Results of writing images.
+/// A log of written images.
 #[derive(Debug, Default)]
 struct WriteLog {
-    /// One line per image since the last write command, and whether that image was written after the UI
-    /// exited.
+    /// For each image since the last write command, its line and a flag that is set if it was written after
+    /// the UI exited.
     lines: Vec<(bool, String)>,
     /// Whether an image was written since the last write command.
     has_written: bool,
@@ -186,7 +187,7 @@ impl SharedWriteLog {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Records that the user gave a write command.
+    /// Records a write command from the user.
     fn record_write_command(&self) {
         let mut log = self.lock_log();
         log.lines.clear();
@@ -256,13 +257,13 @@ impl SharedWriteLog {
         }
     }
 
-    /// The checkpoint written after the UI exited, or an error message.
+    /// Returns the checkpoint written after the UI exited, or an error message.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
         self.lock_log().checkpoint.clone()
     }
 
-    /// Lines about images not reported by the UI: images written after it exited, or all images since an
-    /// unanswered write command.
+    /// Returns lines about the images that the UI did not report: images written after it exited, or all
+    /// images since an unanswered write command.
     fn unreported_lines(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
         let log = self.lock_log();
         let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);

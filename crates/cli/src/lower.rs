@@ -14,7 +14,7 @@ use crate::tui::{ColorChoice, PreviewChoice};
 /// The file name for standard output.
 pub(super) const STDOUT_NAME: &str = "-";
 
-/// Default niceness of render threads in the terminal UI, so that the UI and other programs stay responsive.
+/// Default niceness of render threads in the terminal UI. Keeps the UI and other programs responsive.
 const UI_NICENESS: u8 = 10;
 
 /// A validated render request.
@@ -94,7 +94,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<RenderRequest, String> {
     })
 }
 
-/// Checks that every frame of a turntable has its own file and that no options for single images are given.
+/// Checks that every frame of a turntable has its own file and that no single-image options are used.
 fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     if !args.once {
         return Err("--turntable needs --once: the terminal UI shows one image".to_owned());
@@ -129,12 +129,12 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
 /// Adds a path to `known`. Rejects duplicates.
 fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
     if !known.insert(path) {
-        return Err(format!("-o {} is given twice", path.display()));
+        return Err(format!("-o {} is specified twice", path.display()));
     }
     Ok(())
 }
 
-/// Checks that all extensions are known and that no output is given twice.
+/// Checks that all extensions are known and that no output is specified twice.
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     let mut known = HashSet::new();
     for path in outputs {
@@ -261,7 +261,7 @@ mod tests {
         }
     }
 
-    /// Options accept and reject the same values as the corresponding keys of `[render]`.
+    /// Checks that options accept and reject the same values as the corresponding `[render]` keys.
     #[test]
     fn options_have_the_same_ranges_as_keys() {
         let command = Args::command();
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_named_like_commands_need_a_folder() {
+    fn scenes_named_like_commands_need_a_path() {
         let parsed =
             |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("valid arguments");
         assert!(matches!(parsed(&["check", "a.toml"]).command, Some(Subcommand::Check { .. })));

@@ -1,6 +1,6 @@
-//! Redraws the image of `merge --watch` in place.
+//! Redraws the `merge --watch` image in place.
 
-/// Lines at the bottom of the terminal, replaced on every update.
+/// A block of lines at the bottom of the terminal that is replaced on every update.
 #[derive(Debug, Default)]
 pub(super) struct TerminalBlock {
     rows: usize,
@@ -9,8 +9,8 @@ pub(super) struct TerminalBlock {
 }
 
 impl TerminalBlock {
-    /// Returns the output that replaces the block with `lines`. If the terminal's width has changed, keeps
-    /// the old lines, because the terminal may have rewrapped them.
+    /// Returns the terminal output that replaces the block with `lines`. If the terminal's width has changed,
+    /// keeps the old lines, because the terminal may have rewrapped them.
     pub(super) fn redraw(&mut self, lines: &str, columns: usize) -> String {
         let up = if self.rows > 0 && self.columns == columns {
             format!("\x1b[{}A\r\x1b[J", self.rows)

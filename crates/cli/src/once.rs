@@ -100,7 +100,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     ended.signal_number().map_or(exit, Exit::signal)
 }
 
-/// The render requests: a single request, or one per frame of a turntable.
+/// Returns the render requests: a single request, or one per turntable frame.
 fn render_requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
@@ -134,7 +134,7 @@ struct ImagesWrittenSoFar {
     checkpoint: Option<PathBuf>,
 }
 
-/// The time at which to exit without waiting for the worker: [`EXIT_TIMEOUT`] after the first query.
+/// The time at which glimt exits without waiting for the worker: [`EXIT_TIMEOUT`] after the first query.
 #[derive(Debug, Default)]
 struct ExitDeadline {
     end: Option<Instant>,
@@ -331,10 +331,11 @@ fn warning(message: &str, help: &str) -> Diagnostic {
     }
 }
 
-/// Warnings about options without effect. The terminal UI has its own messages for these.
+/// Returns warnings about options that have no effect. The terminal UI has its own messages for these
+/// options.
 fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
-        let help = "set `aperture` of [camera], such as 0.1";
+        let help = "set `aperture` in [camera], for example to 0.1";
         warning("--dof on has no effect: the camera's aperture is 0", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
@@ -366,7 +367,8 @@ fn report_done(
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// A warning about files left over from an earlier, longer turntable. `None` if there are no such files.
+/// Returns a warning about files left over from an earlier, longer turntable. `None` if there are no such
+/// files.
 fn left_over_warning(last: &Path, turn: TurntableFrame) -> Option<String> {
     let left = leftover_frames(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);

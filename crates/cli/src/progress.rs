@@ -20,7 +20,7 @@ pub(super) trait Reporter {
     /// Clears temporary output. May be called repeatedly.
     fn end(&mut self) {}
 
-    /// Whether written files and other results are also reported as text.
+    /// Whether the caller also reports written files and other results as text.
     fn says_results(&self) -> bool {
         true
     }

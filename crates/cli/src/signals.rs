@@ -9,7 +9,7 @@ use signal_hook::iterator::Signals;
 use crate::system::describe_error;
 use crate::system::threads::{describe_start_failure, spawn};
 
-/// The first signal received, if any.
+/// The first signal received, or 0.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReceivedSignal(Arc<AtomicI32>);
 
@@ -19,7 +19,7 @@ impl ReceivedSignal {
     }
 }
 
-/// A signal's name for messages. `None` for SIGHUP, because the terminal is gone.
+/// Returns a signal's name for use in messages. `None` for SIGHUP, because the terminal is gone.
 pub(super) fn signal_name(number: i32) -> Option<&'static str> {
     match number {
         SIGINT => Some("SIGINT"),
@@ -37,7 +37,7 @@ pub(super) fn install_signal_handlers(
 ) -> Result<ReceivedSignal, String> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(|error| {
         let why = describe_error(&error);
-        format!("cannot listen to signals: {why}; raise the limit on open files (`ulimit -n`)")
+        format!("cannot listen for signals: {why}; raise the limit on open files (`ulimit -n`)")
     })?;
     let received = ReceivedSignal::default();
     let recorder = received.clone();

@@ -1,4 +1,4 @@
-//! Reads meshes, and reads, writes and compares images. See the crate `glimt` for an overview.
+//! Reads meshes, and reads, writes and compares images. See the `glimt` crate for an overview.
 
 pub mod assets;
 pub mod compare;

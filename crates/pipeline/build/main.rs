@@ -1,4 +1,4 @@
-//! Sets `GLIMT_BUILD`, a hash of the sources that affect images.
+//! Sets `GLIMT_BUILD` to a hash of the sources that affect images.
 
 #![allow(clippy::print_stdout, reason = "build scripts communicate with cargo over stdout")]
 

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Hashes the content and relative path of every file in `roots`, which are folders or single files. Ignores
-/// tests and line endings. A missing root counts as empty, so that a crate can be built outside the
+/// Hashes the relative path and content of every file in `roots`, each of which is a folder or a single file.
+/// Ignores tests and line endings. A missing root counts as empty, so that a crate can be built outside the
 /// workspace.
 pub fn source_hash(roots: &[PathBuf]) -> u64 {
     let mut hash = Fnv1a::default();
@@ -43,7 +43,7 @@ impl Default for Fnv1a {
 }
 
 impl Fnv1a {
-    /// Adds the bytes, skipping carriage returns, followed by a terminator that never occurs in UTF-8 text.
+    /// Hashes the bytes, skipping carriage returns, followed by a terminator that never occurs in UTF-8 text.
     fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'\r').chain(&[0xff]) {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);

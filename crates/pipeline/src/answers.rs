@@ -71,7 +71,7 @@ pub struct Picked {
     pub pixel: [u32; 2],
     /// The visible object. `None` if the ray hits nothing.
     pub thing: Option<PickedObject>,
-    /// Current linear color of the pixel. `None` before its first sample.
+    /// Current linear pixel color. `None` before the first sample.
     pub color: Option<[f32; 3]>,
 }
 
@@ -116,9 +116,9 @@ pub struct SavedCamera {
     pub path: PathBuf,
     /// Whether the file was written. `false` if it already contained this camera.
     pub is_new: bool,
-    /// Whether loading the file with the command-line overrides yields exactly this camera.
+    /// Whether loading the file with the command-line overrides would yield exactly this camera.
     pub is_own: bool,
-    /// Whether a new scene file was created next to a model. The model remains open.
+    /// Whether a new scene file was created next to the model, which remains open.
     pub of_model: bool,
     /// The edit that the `u` key undoes. `None` if nothing was written or the file is new.
     pub edit: Option<CameraEdit>,

@@ -14,7 +14,7 @@ use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{FingerprintContext, Key};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
-/// A world and its key. The key covers everything that affects the world's images.
+/// A world and its key, which covers everything that affects the world's images.
 pub(super) type KeyedWorld = (Key, Arc<World>);
 
 /// A request's camera: the scene's camera with the request's changes applied.

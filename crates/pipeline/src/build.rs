@@ -1,4 +1,4 @@
-//! Identity of this build.
+//! Identifies this build.
 
 /// The glimt version and a hash of the sources that affect images. Two builds with the same string render
 /// bit-identical images.
@@ -15,7 +15,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn build_consists_of_version_and_hash() {
+    fn build_id_contains_version_and_hash() {
         let hash =
             BUILD.strip_prefix(env!("CARGO_PKG_VERSION")).and_then(|rest| rest.strip_prefix(" (build "));
         let hash = hash.and_then(|rest| rest.strip_suffix(')')).expect("a hash");

@@ -55,7 +55,7 @@ struct CacheEntry<T> {
     request: u64,
 }
 
-/// An unused value: the number of the most recent request that used it, and its size in bytes.
+/// Number of the last request that used an unused value, and the value's size in bytes.
 pub(super) type EvictionCandidate = (u64, usize);
 
 impl<N, T> Default for NamedCache<N, T> {
@@ -82,7 +82,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
         self.entries.insert(name, CacheEntry { key, value, bytes, used: true, proven: false, request: 0 });
     }
 
-    /// Ends a request. If it failed, the values used by the last successful request remain protected, so
+    /// Ends a request. If it failed, the values used by the last successful request stay protected, so that
     /// fixing a typo does not reload anything.
     pub(super) fn end_request(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
@@ -103,9 +103,9 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
     }
 }
 
-/// Returns the number of the earliest request whose unused values, together with the unused values of all
-/// later requests, fit into `most_bytes`. All values of a request are evicted together, because half a scene
-/// is of little use and trees keep their meshes alive.
+/// Returns the earliest request that can keep its unused values: they fit into `most_bytes` together with the
+/// unused values of all later requests. A request's values are all evicted together, because half a scene is
+/// of little use and trees keep their meshes alive.
 pub(super) fn first_request_that_fits(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
@@ -142,7 +142,7 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// Ends a request and evicts unused values until the rest fit into `most_bytes`.
+    /// Ends a request and evicts unused values until the remaining ones fit into `most_bytes`.
     fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.end_request(success, request);
         pool.evict_unused_before(first_request_that_fits(pool.eviction_candidates(), most_bytes));
@@ -185,7 +185,7 @@ mod tests {
         let mut is_kept = |name| pool.get(&name, key("1")).is_some();
         assert!(!is_kept("a") && !is_kept("b"), "newer values take 20 of 30 bytes");
         assert!(is_kept("c") && is_kept("d") && is_kept("e"));
-        // Reuse the second request's values, which makes the third request's unused value the oldest.
+        // Reuse the second request's values, so that the third request's unused value is now the oldest.
         end_request(&mut pool, true, 4, 30);
         pool.insert("g", key("1"), (Arc::new(1), 30));
         end_request(&mut pool, true, 5, 30);

@@ -42,7 +42,7 @@ pub fn check(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
     IncrementalChecker::default().check(path, sets, &CancelToken::new())
 }
 
-/// Checks scenes repeatedly without rereading unchanged files.
+/// Checks scenes repeatedly, rereading only files that have changed.
 pub struct IncrementalChecker(Engine);
 
 impl Default for IncrementalChecker {
@@ -108,7 +108,7 @@ fn summarize(
     let has_own = scene.objects.iter().any(|object| object.material.is_none());
     if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
         let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());
-        let help = "the mesh's own materials do not emit; add a [[light]] or an [environment]".to_owned();
+        let help = "the mesh's own materials emit no light; add a [[light]] or an [environment]".to_owned();
         warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
     }
     SceneSummary {

@@ -1,5 +1,6 @@
-//! Identity of an image: the names and values of everything that affects it, independent of machine and
-//! folder. Unlike stage keys, which include paths and timestamps, the identity refers to files by content.
+//! Identity of an image: the names and values of everything that affects it, independent of the machine and
+//! the folder. Unlike stage keys, which include paths and timestamps, the identity refers to files by
+//! content.
 
 use std::path::{Path, PathBuf};
 
@@ -57,7 +58,7 @@ impl ImageDependencies<'_> {
         add("filter", render.filter.name().to_owned());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
-        // All parts must have the same view. For checkpoints, it is enough if the samples are the same.
+        // All parts must have the same view. Checkpoints only need the same samples.
         let sampled = if self.divided.is_some() { view } else { view.sampled() };
         add("view", sampled.name().to_owned());
         add(
@@ -127,7 +128,7 @@ fn key(content: &str, part: Option<u32>) -> Key {
     key.finish()
 }
 
-/// Returns the path relative to the scene's folder, or just the file name if it is outside that folder.
+/// Returns the path relative to the scene's folder, or only the file name if the path is outside that folder.
 pub(super) fn relative_path(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
@@ -135,7 +136,7 @@ pub(super) fn relative_path(path: &Path, scene: &Path) -> String {
     inside.unwrap_or_else(name).to_string_lossy().into_owned()
 }
 
-/// Returns the file's hash in hexadecimal, or the reason it has none.
+/// Returns the file's hash in hexadecimal, or the reason why there is none.
 fn hash_or_reason(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),

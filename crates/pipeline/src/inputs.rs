@@ -47,13 +47,13 @@ impl Inputs {
             Camera::LookAt { .. } => {}
         }
         for texture in &scene.textures {
-            add(&texture.file.value, &texture.file.span, format!("the file of texture `{}`", texture.name));
+            add(&texture.file.value, &texture.file.span, format!("the file for texture `{}`", texture.name));
         }
         if let Some(file) = scene.environment.as_ref().and_then(|environment| environment.file.as_ref()) {
             add(&file.value, &file.span, "the environment map".to_owned());
         }
         for mesh in &scene.mesh_files {
-            add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
+            add(&mesh.value, &mesh.span, "one of the scene's mesh files".to_owned());
         }
         for path in &parsed.named {
             let role = "a file that the scene references without the current overrides".to_owned();
@@ -72,7 +72,7 @@ impl Inputs {
             };
             let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
             for companion in &kept.mesh.companions {
-                add(&companion.path, format!("a {kind} of {name}"));
+                add(&companion.path, format!("a {kind} used by {name}"));
             }
             for picture in &kept.mesh.pictures {
                 add(picture, format!("an image referenced by {name} or its materials"));
@@ -95,14 +95,14 @@ impl Inputs {
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }
 
-    /// Paths of the files relative to the scene's folder, sorted. Excludes the scene.
+    /// Returns the sorted paths of all files except the scene, relative to the scene's folder.
     pub(super) fn relative_paths(&self, scene: &Path) -> Vec<String> {
         let others = self.0.iter().filter(|input| input.path != scene);
         let paths: BTreeSet<_> = others.map(|input| relative_path(&input.path, scene)).collect();
         paths.into_iter().collect()
     }
 
-    /// Indexes the files by their current state on disk.
+    /// Indexes the files according to their current state on disk.
     pub(super) fn index_by_identity(&self) -> InputIndex<'_> {
         let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
@@ -120,14 +120,14 @@ impl Inputs {
     }
 }
 
-/// Inputs indexed by file identity and by similarity.
+/// Inputs indexed by file identity, with fingerprints for finding similar files.
 pub(super) struct InputIndex<'a> {
     by_identity: HashMap<FileIdentity, &'a Input>,
     alike: Vec<(FileFingerprint, &'a Input)>,
 }
 
 impl<'a> InputIndex<'a> {
-    /// Returns the input that a path refers to or may refer to.
+    /// Returns the input that a path refers to, or probably refers to.
     pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
             return Some(input);

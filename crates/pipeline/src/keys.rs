@@ -1,5 +1,5 @@
 //! Keys for the scene data used by later stages. They exclude names and positions in the file, so that
-//! comments, key order and unused tables do not affect them.
+//! changes to comments, key order and unused tables do not affect them.
 
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
@@ -8,7 +8,7 @@ use crate::plan::Plan;
 use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Key};
 
-/// Returns the textures, meshes and orbiter that descriptions refer to by index.
+/// Returns the textures, meshes and orbiter that scene descriptions refer to by index.
 pub(crate) fn referents<'a>(
     scene: &'a Scene,
     meshes: &'a [Key],
@@ -17,18 +17,18 @@ pub(crate) fn referents<'a>(
     FingerprintContext { textures: &scene.textures, meshes, orbiter }
 }
 
-/// Returns the key of a mesh with distinct lights. `is_emissive` states whether an object's material makes
-/// all of the mesh emit.
+/// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
+/// the entire mesh emissive.
 pub(crate) fn distinct_lights(mesh: &Key, is_emissive: bool) -> Key {
     FingerprintHasher::new("distinct lights").key(mesh).flag(is_emissive).finish()
 }
 
-/// Returns the key of a mesh's tree. `is_distinct` states whether the mesh's lights were made distinct.
+/// Returns the key for a mesh's tree. `is_distinct` states whether the mesh's lights were made distinct.
 pub(crate) fn tree(mesh: &Key, accel: Accel, is_distinct: bool) -> Key {
     FingerprintHasher::new("tree").key(mesh).choice(accel).flag(is_distinct).finish()
 }
 
-/// Returns the key of all trees, with each object offset by its lift. `lifts` is empty if no object is
+/// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is
 /// offset. `are_distinct` states for each mesh file whether its lights were made distinct.
 pub(crate) fn geometry(
     scene: &Scene,
@@ -47,7 +47,7 @@ pub(crate) fn geometry(
     with_tree_kind(&key.finish(), scene.render.accel)
 }
 
-/// Returns the key of the shapes and their emitting sides, which determine the lights that are moved off
+/// Returns the key for the shapes and their emitting sides, which determine the lights to be moved off
 /// coplanar surfaces.
 pub(crate) fn coplanar(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     let mut key = FingerprintHasher::new("coplanar");
@@ -82,7 +82,7 @@ fn shapes(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of the shapes and their glass materials.
+/// Returns the key for the shapes and their glass materials.
 pub(crate) fn glass(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     let mut key = FingerprintHasher::new("glass");
     key.key(&shapes(scene, of));
@@ -96,7 +96,7 @@ pub(crate) fn glass(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of all lights: emission, position and object. `sky` is the environment map's key.
+/// Returns the key for all lights: emission, position and object. `sky` is the environment map's key.
 /// `patterns` are the keys of emission textures.
 pub(crate) fn lights(
     scene: &Scene,
@@ -145,13 +145,13 @@ fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of a world. It excludes the tree type, because all types produce the same hits. Views that
-/// visualize trees include the type in their own keys.
+/// Returns the key for a world. It excludes the tree type, because all types produce the same hits. Views
+/// that visualize trees include the type in their own keys.
 pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &FingerprintContext<'_>) -> Key {
     FingerprintHasher::new("world").key(surfaces).add(camera, of).finish()
 }
 
-/// Returns the key of photons: surfaces relative to `origin`, emission and maximum depth.
+/// Returns the key for photons: surfaces relative to `origin`, emission and maximum depth.
 pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = FingerprintHasher::new("photons");
@@ -159,7 +159,7 @@ pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: P
     key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
 }
 
-/// Returns the key of all surfaces, lights and textures.
+/// Returns the key for all surfaces, lights and textures.
 pub(crate) fn surfaces(scene: &Scene, of: &FingerprintContext<'_>, textures: &[Key]) -> Key {
     let mut key = FingerprintHasher::new("surfaces");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of));
@@ -176,7 +176,7 @@ pub(crate) fn surfaces(scene: &Scene, of: &FingerprintContext<'_>, textures: &[K
     key.finish()
 }
 
-/// Returns the key of everything that affects a film's sums, except the number of samples.
+/// Returns the key for everything that affects a film's sums, except the sample count.
 pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     let mut key = FingerprintHasher::new("render");
     key.key(&world).add(settings, &FingerprintContext::default());
@@ -186,7 +186,7 @@ pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) 
     key.finish()
 }
 
-/// Returns the key of the image developed from a film. With a time limit, noise varies between films, so the
+/// Returns the key for the image developed from a film. With a time limit, noise varies between films, so the
 /// key includes `film_number`.
 pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
     let Render { samples, error, .. } = plan.settings.render;
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn emission_affects_lights_and_position_trees() {
+    fn trees_depend_on_position_but_not_emission() {
         let lit = keys(&BALL.replace("diffuse", "emission"));
         assert_eq!(lit.0, keys(BALL).0);
         assert_ne!(lit.1, keys(BALL).1);
@@ -340,7 +340,7 @@ mod tests {
         let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
         assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
         assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
-        // These settings do not change the samples taken: sample count, display settings and tree type.
+        // Sample count, display settings and tree type do not change the samples taken.
         for same in [
             Render { samples: samples + 1, ..render_settings },
             Render { exposure: exposure + 1.0, ..render_settings },

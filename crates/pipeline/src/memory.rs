@@ -1,4 +1,5 @@
-//! Estimates a render's memory use in advance. A render that does not fit is rejected with a breakdown.
+//! Estimates a render's memory use in advance. A render that would not fit in memory is rejected with a
+//! breakdown.
 //!
 //! Film and image sizes are exact, and mesh and texture sizes are known once they are loaded. Tree and photon
 //! sizes are conservative estimates based on measured peak memory per triangle and per emitted photon.
@@ -14,30 +15,30 @@ use crate::system::memory::{MemoryLimit, limit};
 
 /// Bytes used by the program itself.
 const PROGRAM: u64 = 24 << 20;
-/// Bytes per render thread: stack and buffers. Rough glass needs the most.
+/// Stack and buffer size per render thread, in bytes. Rough glass needs the most.
 const THREAD: u64 = 640 << 10;
 /// Bytes per object in the acceleration structures.
 const OBJECT: u64 = 250;
-/// Bytes per emitted photon while a pass's maps are being built.
+/// Bytes per emitted photon while the maps for a pass are being built.
 const PHOTON: u64 = 220;
 /// Maximum size of the cached photon maps in bytes.
 const KEPT_MAPS: u64 = 128 << 20;
 
-/// Maximum size in bytes of an animation's frames without `--memory`.
+/// Maximum total size of an animation's frames in bytes, unless `--memory` is set.
 const MAX_FRAMES: u64 = 4 << 30;
 /// Name of the memory item for animation frames.
 const FRAMES: &str = "the frames";
 /// Name of the memory item for the film of the scene's own image.
 const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
-/// Suggested fix if the film or the image is the largest item.
+/// Suggested fix if the film or the image needs the most memory.
 const SMALLER_IMAGE: &str = "render a smaller image, or parts of it with --crop";
 /// Suggested fix if the limit is below 1 MiB.
 const MISSING_UNIT: &str = "sizes without a unit are in bytes; add a unit, for example 8GiB";
 /// Suggested fix if nothing can be reduced.
 const ALLOW_MORE: &str = "allow more";
 
-/// Name and size in bytes of a memory item.
+/// Name of a memory item and its size in bytes.
 type MemoryItem = (&'static str, u64);
 
 /// Estimated memory use of a render.
@@ -59,7 +60,7 @@ impl MemoryEstimate {
             ("the threads", threads),
         ];
         if !plan.layers.is_empty() {
-            // Layers are rendered one film at a time, but all their images are kept.
+            // Layers are rendered one film at a time, but all of their images are kept.
             items.push(("the layers", film + picture * plan.layers.len() as u64));
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
@@ -90,7 +91,7 @@ impl MemoryEstimate {
         Self(items)
     }
 
-    /// Adds the film of the scene's own image, which is kept while another image is shown.
+    /// Adds the film for the scene's own image, which is kept while another image is shown.
     pub(super) fn with_own_film(mut self, bytes: u64) -> Self {
         self.0.push((OWN_FILM, bytes));
         self
@@ -105,8 +106,8 @@ impl MemoryEstimate {
         self.0.iter().filter(|(name, _)| *name == OWN_FILM).map(|(_, bytes)| bytes).sum()
     }
 
-    /// Rejects a render that exceeds the memory limit set on the command line or by the system. Returns the
-    /// number of bytes left.
+    /// Rejects a render that would exceed the memory limit set on the command line or by the system. Returns
+    /// the number of bytes left.
     ///
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
@@ -157,7 +158,7 @@ impl MemoryEstimate {
         let try_anyway =
             format!(", raise the limit, or try anyway with --memory {}", format_memory_option(all));
         Err(Stop::work(format!(
-            "the render needs about {} of memory ({}), more than the {} of {setting}; {remedy}{}",
+            "the render needs about {} of memory ({}), more than the {} allowed by {setting}; {remedy}{}",
             format_bytes(all),
             items.join(", "),
             format_bytes(most),
@@ -231,7 +232,7 @@ mod tests {
             other => panic!("{other:?}"),
         };
         // 64 million pixels at 40 bytes (film) and 15 bytes (image).
-        for fact in [" 3.30 GiB ", " 2.38 GiB", " 1.00 GiB of --memory", SMALLER_IMAGE] {
+        for fact in [" 3.30 GiB ", " 2.38 GiB", " 1.00 GiB allowed by --memory", SMALLER_IMAGE] {
             assert!(said.contains(fact), "{fact}: {said}");
         }
         let said = |memory: u64| {
@@ -261,14 +262,14 @@ mod tests {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
-        for fact in [" 41 MiB ", " 8 MiB of the control group (x); ", "--memory 1GiB"] {
+        for fact in [" 41 MiB ", " 8 MiB allowed by the control group (x); ", "--memory 1GiB"] {
             assert!(said.contains(fact), "{fact}: {said}");
         }
         assert!(check(&Overrides { memory: Some(1 << 30), ..Overrides::default() }).is_ok());
     }
 
     #[test]
-    fn separate_blocks_are_counted() {
+    fn film_estimate_includes_block_sums() {
         let photons = Overrides { photons: Some(true), samples: Some(64), ..Overrides::default() };
         let film = |overrides: &Overrides| MemoryEstimate::for_image(&planned(overrides)).0[1].1;
         let pixels = 640 * 480;

@@ -1,4 +1,4 @@
-//! Messages that tests check for.
+//! Messages that tests look for.
 
 /// No image is written because some pixels lack samples.
 pub const INCOMPLETE_IMAGE: &str = "the render stopped before every pixel had a sample";
@@ -23,7 +23,7 @@ pub const CLAMP_EFFECT: &str =
 /// Effect of the default `clamp` value for models.
 pub const CLAMP_EFFECT_ON_MODELS: &str = "limits light from shiny surfaces (fewer fireflies, slightly dark)";
 
-/// The file at a checkpoint's path has another format.
+/// The file at a checkpoint's path is not in the checkpoint format.
 pub const NOT_A_CHECKPOINT: &str = "is not a checkpoint";
 /// A file is damaged.
 pub const DAMAGED: &str = "damaged";

@@ -23,7 +23,7 @@ use crate::system::threads::core_count;
 pub(super) struct Plan {
     /// Path of the scene file or model.
     pub(super) path: PathBuf,
-    /// File name of the scene. It is stored in part files.
+    /// File name of the scene, which is stored in part files.
     pub(super) name: String,
     /// The scene, with the acceleration structure from the overrides. All other overrides are in `settings`.
     pub(super) scene: Arc<Scene>,
@@ -41,14 +41,15 @@ pub(super) struct Plan {
     pub(super) turn: Option<TurntableFrame>,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// For a model, the side facing the camera, and the up axis. `None` if not set on the command line.
+    /// The side of a model that faces the camera, and the model's up axis. `None` if not set on the command
+    /// line.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
     /// Output files for later turntable frames.
     pub(super) later_outputs: Vec<PathBuf>,
     pub(super) named_by: OutputNameSource,
-    /// Default file name pattern for turntable frames, with `#` for the number. `None` without a turntable or
-    /// if the user named the files.
+    /// Default file name pattern for turntable frames, with `#` for the number. `None` if this is not a
+    /// turntable or the user named the files.
     pub(super) default_names: Option<PathBuf>,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
@@ -140,9 +141,9 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 /// Maximum number of photons per pass, limited by memory.
 pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 
-/// The default photon count is the number of pixels, clamped to this range. With fewer photons, the
-/// additional error outweighs the time saved. More photons leave less time for further passes and delay the
-/// first image.
+/// Range for the default photon count, which is the number of pixels clamped to this range. With fewer
+/// photons, the additional error outweighs the time saved. More photons leave less time for further passes
+/// and delay the first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
 /// Returns the photon settings for this image size.
@@ -156,8 +157,8 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// Returns the scene with acceleration structure `accel`. Copies the scene only if necessary, because scenes
-/// may be large.
+/// Returns the scene with acceleration structure `accel`. Copies the scene only if necessary, because it may
+/// be large.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
@@ -192,7 +193,7 @@ fn output_paths(
     )
 }
 
-/// Returns the report's path, which contains the frame number if this is a turntable.
+/// Returns the report's path. For a turntable, it includes the frame number.
 fn report_path(overrides: &Overrides) -> Option<PathBuf> {
     let path = overrides.report.as_ref()?;
     let numbered = overrides.turn.and_then(|turn| turntable::frame_path(path, turn));
@@ -216,8 +217,8 @@ impl OutputFiles {
                 moving.push(path);
                 continue;
             }
-            // For the first frame, also list the files of later frames, so that conflicts are detected before
-            // hours of rendering.
+            // For the first frame, also list the files for later frames, so that conflicts are detected
+            // before hours of rendering.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
             let of = |number| turntable::frame_path(&path, TurntableFrame { number, ..turn });
             later_outputs.extend(others.filter_map(of));
@@ -286,8 +287,8 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
     }
 }
 
-/// Checks that an image with these settings can be rendered in parts and that there is exactly one output
-/// file.
+/// Checks that an image with these settings can be rendered in parts and that exactly one output file is
+/// specified.
 fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
     let refused = |message: &str, help: &str| {
         let (message, help) = (message.to_owned(), Some(help.to_owned()));
@@ -331,7 +332,7 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
     })
 }
 
-/// Returns the tone mapping for a view. Exposure and tone curve only apply to light, not to data.
+/// Returns the tone mapping for a view. Exposure and tone curve apply only to light, not to data.
 fn tone_mapping(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.source() {
         AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
@@ -353,7 +354,7 @@ fn tone_mapping(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     }
 }
 
-/// Returns the number of render threads: as requested, or one per core.
+/// Returns the number of render threads: the requested number, or one per core.
 pub(super) fn thread_count(overrides: &Overrides) -> usize {
     overrides.threads.filter(|count| *count > 0).unwrap_or_else(core_count)
 }

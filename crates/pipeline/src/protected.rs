@@ -1,10 +1,10 @@
-//! Existing files that an image must not replace, unless the user asks for it with `--force`.
+//! Existing files that an image must not replace unless the user passes `--force`.
 
 use std::path::{Path, PathBuf};
 
 use crate::output::{may_replace_image, part, scene_of_image, scene_path};
 
-/// Which existing files an image keeps.
+/// Which existing files an image must not replace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Protection {
     /// All except images of this scene, because the output has the default name.
@@ -15,7 +15,7 @@ pub(crate) enum Protection {
     Nothing,
 }
 
-/// A file that an image keeps.
+/// A file that an image must not replace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ProtectedFile {
     /// The image of another scene.
@@ -25,7 +25,7 @@ pub(crate) enum ProtectedFile {
 }
 
 impl Protection {
-    /// Returns whether the file at a path is kept, and why.
+    /// Returns why an image must not replace the file at a path, or `None` if it may.
     pub(crate) fn applies_to(&self, at: &Path) -> Option<ProtectedFile> {
         match self {
             Self::OtherImages(_) if may_replace_image(at).reason_to_keep().is_some() => {
@@ -38,7 +38,7 @@ impl Protection {
     }
 }
 
-/// Returns the scene of an image written by glimt, unless it is this scene.
+/// Returns the scene recorded in an image written by glimt, unless it is this scene.
 pub(crate) fn other_scene(scene: &Path, at: &Path) -> Option<String> {
     scene_of_image(at).filter(|named| !scene_path::is_same(named, scene, at))
 }

@@ -56,7 +56,7 @@ pub enum Command {
 /// A request to render an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// Number of the request. Must be greater than the numbers of all earlier requests.
+    /// Number of the request. Must be greater than the number of every earlier request.
     pub generation: u64,
     /// The scene file.
     pub scene: PathBuf,
@@ -69,12 +69,12 @@ pub struct Request {
     /// Overrides for the scene's own image if this request shows another one. The film and checkpoint of the
     /// scene's own image are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
-    /// Number of times the scene's files have been saved. An image that [`Command::Write`] wrote with changes
-    /// made with keys is kept until a request with another number reads a valid scene.
+    /// Number of times the scene's files have been saved. An image with keyboard changes that was written by
+    /// [`Command::Write`] is kept until a request with a different number reads a valid scene.
     pub saves: u64,
     /// Render again even if nothing has changed.
     pub force: bool,
-    /// Region to render first. Does not affect the final image.
+    /// Region to render first. Does not affect the finished image.
     pub first: Option<Section>,
 }
 
@@ -90,14 +90,15 @@ pub enum WriteMode {
     Must,
 }
 
-/// Maximum preview size, assuming square pixels.
+/// Maximum preview size on a display with square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
     /// Maximum width in pixels.
     pub width: u32,
     /// Maximum height in pixels.
     pub height: u32,
-    /// Center of a section to show at 1:1, as large as fits. `None` shows the whole image.
+    /// Center of the section to show at 1:1. The section is as large as the maximum size allows. `None` shows
+    /// the whole image.
     pub around: Option<ImagePosition>,
 }
 
@@ -123,9 +124,10 @@ pub enum Event {
         generation: u64,
         /// The scene and all files it references.
         files: Vec<FileRead>,
-        /// This request read the first `read` files in the list. The others were read by earlier requests.
+        /// Number of files at the start of the list that this request read. The others were read by earlier
+        /// requests.
         read: usize,
-        /// A time before the first read.
+        /// A point in time before the first read.
         since: Instant,
     },
     /// All warnings. Sent before the image is rendered.
@@ -152,7 +154,7 @@ pub enum Event {
         camera: Viewpoint,
         /// The scene's exposure in stops.
         exposure: f32,
-        /// The scene's values for other settings that can be changed with keys.
+        /// The scene's values for the other settings that keys can change.
         own: AdjustableSettings,
     },
     /// The scene file was read.
@@ -182,12 +184,13 @@ pub enum Event {
         path: PathBuf,
         /// Size of the file in bytes.
         bytes: u64,
-        /// Whether the image is the scene's own image, without changes made with keys.
+        /// Whether the image is the scene's own image, without keyboard changes.
         is_own: bool,
-        /// Sample counts of an image written before its render finished. `None` for a finished image.
+        /// Sample counts of an image that was written before its render finished. `None` for a finished
+        /// image.
         unfinished: Option<SampleCounts>,
     },
-    /// State of the scene's own image, for a request that shows another one.
+    /// State of the scene's own image, sent for a request that shows another one.
     OwnImage {
         /// Request number.
         generation: u64,
@@ -203,15 +206,15 @@ pub enum Event {
         /// The file and the reason.
         message: String,
     },
-    /// A file was replaced, but some of its metadata could not be preserved.
+    /// A file was replaced, but some of its metadata was lost.
     NotKept {
         /// Request number.
         generation: u64,
         /// The file and the lost metadata.
         message: String,
     },
-    /// No files are written because at least one must not be overwritten: it is an input, is listed twice, or
-    /// was not written by glimt. Rendering continues.
+    /// No files are written because at least one of them must not be overwritten: it is an input, is listed
+    /// twice, or was not written by glimt. Rendering continues.
     Refused {
         /// Request number.
         generation: u64,
@@ -241,7 +244,7 @@ pub enum Event {
     CameraKept {
         /// Request number.
         generation: u64,
-        /// The file with the camera, or why it was not written.
+        /// The file to which the camera was saved, or why it was not written.
         outcome: Result<SavedCamera, String>,
     },
     /// Answer to [`Command::UndoCamera`].
@@ -277,7 +280,7 @@ pub enum Event {
         failure: Failure,
     },
     /// The render of the last valid scene ended. That scene was rendered because the request's own scene
-    /// could not be read, as reported by [`Event::Failed`].
+    /// could not be read, which [`Event::Failed`] has already reported.
     LastGoodEnded {
         /// Request number.
         generation: u64,
@@ -294,7 +297,7 @@ pub enum Event {
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnImageState {
-    /// The image has been written to all its output files.
+    /// The image has been written to all of its output files.
     Written,
     /// Some of the image's samples have been rendered.
     Begun {
@@ -322,7 +325,7 @@ pub enum CheckpointUpdate {
     Resumed {
         /// Path of the checkpoint.
         path: PathBuf,
-        /// Lowest sample count among pixels that need more samples.
+        /// Lowest sample count among the pixels that need more samples.
         samples: u32,
     },
     /// The checkpoint to resume from does not exist, so the render starts from scratch.
@@ -368,7 +371,7 @@ pub enum Failure {
 pub enum LastValidSceneOutcome {
     /// The image is finished.
     Finished {
-        /// Whether the image had already been finished, so nothing was rendered or written.
+        /// Whether the image was already finished, so that nothing had to be rendered or written.
         unchanged: bool,
     },
     /// The image is unfinished because the render was stopped or no valid scene has been read yet.
@@ -382,7 +385,7 @@ pub struct AssetProgress {
     pub name: String,
     /// Work units done.
     pub done: u64,
-    /// Total work units. Loading is finished when `done == total`.
+    /// Total number of work units. Loading is finished when `done == total`.
     pub total: u64,
 }
 
@@ -397,11 +400,11 @@ pub struct RenderProgress {
     pub earlier_seconds: f64,
     /// Estimated remaining seconds. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
-    /// Current average samples per pixel, rounded down.
+    /// Average samples per pixel so far, rounded down.
     pub samples: u32,
-    /// Exact average samples per pixel.
+    /// Exact average samples per pixel so far.
     pub mean_samples: f64,
-    /// Expected final average samples per pixel.
+    /// Expected average samples per pixel at the end.
     pub total_samples: u32,
     /// Whether every pixel will have `total_samples` samples, because there is no noise target or time limit.
     pub is_total_fixed: bool,
@@ -416,8 +419,8 @@ pub struct NoiseProgress {
     pub now: f64,
     /// Seconds from the start of the render stage to the measurement.
     pub seconds: f64,
-    /// The next lower round noise level and the seconds until it is reached. `None` if the render ends before
-    /// that, or if photons or a noise target (`error`) make the noise unpredictable.
+    /// The next lower round noise level, and the number of seconds until it is reached. `None` if the render
+    /// ends before that, or if photons or a noise target (`error`) make the noise unpredictable.
     pub next: Option<(f64, f64)>,
 }
 
@@ -431,13 +434,14 @@ pub struct LatestPreview {
     pub generation: u64,
     /// The preview image, no larger than the requested size.
     pub picture: Arc<Picture>,
-    /// Range of values shown from black to white: the smallest to the largest distance, or 0 to the maximum.
+    /// Range of values displayed as black to white: from the smallest to the largest distance, or from 0 to
+    /// the maximum.
     pub range: Option<[f32; 2]>,
     /// Section of the image shown at 1:1. `None` for the whole image.
     pub section: Option<Section>,
-    /// Whether the preview lacks the light from photons because they are still being traced.
+    /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
-    /// The image that the preview shows. `None` if it lacks the light from photons.
+    /// The image that the preview shows. `None` if the preview lacks light from photons.
     pub source: Option<PreviewSource>,
 }
 
@@ -446,6 +450,6 @@ pub struct LatestPreview {
 pub struct PreviewSource {
     /// Previews with the same key show the same image, although their sizes and sample counts may differ.
     pub image: Key,
-    /// Whether the image has all its samples.
+    /// Whether the image has all of its samples.
     pub is_finished: bool,
 }

@@ -135,7 +135,8 @@ impl QueryContext {
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
-        // Values not changed with keys come from the old camera, so writing them would overwrite newer values.
+        // Values that were not changed with keys come from the old camera, so writing them would overwrite
+        // newer values.
         if *own != self.own {
             return Err(CAMERA_CHANGED.to_owned());
         }
@@ -151,7 +152,7 @@ impl QueryContext {
     }
 }
 
-/// Restores the text from before the camera edit. Fails if the file has changed since.
+/// Undoes a camera edit by restoring the previous text. Fails if the file has changed since the edit.
 fn undo_camera_edit(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
@@ -170,7 +171,7 @@ fn is_gone(path: &Path) -> bool {
     path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Whether the file contains exactly this text.
+/// Whether a file's text is exactly `text`.
 fn has_text(path: &Path, text: &str) -> bool {
     text_now(path).is_ok_and(|now| *now == *text)
 }
@@ -199,8 +200,8 @@ fn replace_scene_text(
         .map_err(|error| error.to_string())
 }
 
-/// Writes the scene generated for a model, with this camera, to a file next to the model. Never replaces a
-/// file.
+/// Writes the scene generated for a model, but with this camera, to a file next to the model. Never replaces
+/// a file.
 fn write_scene_of_model(loaded: &LoadedScene, camera: &Viewpoint) -> Result<SavedCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();

@@ -88,7 +88,7 @@ pub struct LightsReport {
     pub picks: u64,
     /// Number of nodes in the light tree.
     pub tree_nodes: u64,
-    /// Bytes used by the trees over lights and over emissive triangles.
+    /// Bytes used by the light tree and the trees over emissive triangles.
     pub memory_bytes: u64,
 }
 
@@ -103,7 +103,7 @@ pub struct PhotonsReport {
     pub emitted: u64,
     /// Photons stored.
     pub stored: u64,
-    /// Texture lookups by photons.
+    /// Texture lookups for photons.
     #[serde(skip)]
     pub lookups: u64,
     /// Seconds spent emitting and storing photons.

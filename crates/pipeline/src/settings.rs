@@ -14,7 +14,7 @@ macro_rules! overrides {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Scene setting overrides for this run. `None` keeps the scene's value.
+        /// Overrides of scene settings for this run. `None` keeps the scene's value.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Overrides {
             /// Overrides of scene keys in the form `TABLE.KEY=VALUE`, applied before all other overrides.
@@ -23,9 +23,9 @@ macro_rules! overrides {
             pub outputs: Vec<PathBuf>,
             /// JSON file for the report of each finished request.
             pub report: Option<PathBuf>,
-            /// Whether the report, and images with default names, may replace files not written by glimt.
+            /// Whether the report, and images with default names, may replace files that glimt did not write.
             pub replaces_foreign: bool,
-            /// Time limit in seconds. When it is reached, the render stops and keeps its current samples.
+            /// Time limit in seconds. Once it is reached, the render stops and keeps its current samples.
             pub time_seconds: Option<f64>,
             /// Whether to use photon maps.
             pub photons: Option<bool>,

@@ -20,7 +20,7 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Overall progress fractions at the start and end of the render, if the render is only part of the work.
+    /// Overall progress fractions at the start and end of the render, if it is only part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 
@@ -106,7 +106,7 @@ impl Sink {
         });
     }
 
-    /// Sends a preview without the light from photons, before the photons are traced.
+    /// Sends a preview without light from photons, before the photons are traced.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
@@ -152,7 +152,7 @@ impl Sink {
     }
 }
 
-/// Number of progress steps into which loading an asset is divided.
+/// Number of progress steps per loaded asset.
 const PARTS: u64 = 100;
 
 #[cfg(test)]

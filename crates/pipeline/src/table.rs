@@ -10,7 +10,7 @@ use crate::system::cpu_time::process_cpu_seconds;
 /// Runs the stages of one request and records their reports.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
-    /// Token used to pause work. Pauses do not count toward stage times.
+    /// Token for pausing work. Pauses do not count toward stage times.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
     /// Whether events are suppressed.

@@ -26,7 +26,7 @@ pub(super) struct OutputTarget<'a> {
 }
 
 impl<'a> OutputTarget<'a> {
-    /// Creates the target for an image of the plan.
+    /// Creates the target for one of the plan's images.
     pub(super) fn for_image(plan: &Plan, path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Picture(plan.named_by) }
     }
@@ -43,7 +43,7 @@ enum TargetKind {
     Report,
 }
 
-/// Returns which existing files the plan's image keeps.
+/// Returns which existing files the plan's image must not replace.
 pub(super) fn protection(plan: &Plan) -> Protection {
     match plan.named_by {
         _ if plan.replaces_foreign => Protection::Nothing,
@@ -52,11 +52,11 @@ pub(super) fn protection(plan: &Plan) -> Protection {
     }
 }
 
-/// Returns one diagnostic for each of the plan's files that must not be written. The result may differ later,
-/// because symbolic links and files can change.
+/// Returns one diagnostic for each of the plan's files that must not be written. Later calls may return other
+/// diagnostics, because symbolic links and files can change.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.index_by_identity();
-    // Later frames have distinct files because of their numbers.
+    // Later frames have distinct files, because each name contains the frame number.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
         if let Some(identity) = FileIdentity::of(target.path) {
@@ -69,7 +69,7 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     each.chain(linked_frames(plan)).collect()
 }
 
-/// Returns diagnostics for turntable frames that symbolic links map to the same file, where a later frame
+/// Returns diagnostics for turntable frames that symbolic links direct to the same file, where a later frame
 /// would replace an earlier one.
 fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
@@ -101,8 +101,8 @@ pub(super) fn write_guarded<'a, T>(
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
         let inputs = inputs.index_by_identity();
-        // Targets were compared when the write stage started. Since then, only symbolic links can have
-        // changed.
+        // Targets were compared with each other when the write stage started. Since then, only symbolic links
+        // can have changed.
         let twin = |target: OutputTarget<'_>, at: &FileIdentity| {
             if real == target.path {
                 return None;
@@ -143,7 +143,7 @@ fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
-/// Returns why a target that resolves to `at` must not be written. `twin` finds another target that is the
+/// Returns the reason for not writing a target that resolves to `at`. `twin` finds another target that is the
 /// same file.
 fn find_conflict<'a>(
     plan: &'a Plan,
@@ -161,14 +161,14 @@ fn find_conflict<'a>(
         }
         if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
             let (name, output) = (target.path.display(), output.display());
-            let message = format!("cannot write {name}: it is the checkpoint of {output}");
+            let message = format!("cannot write {name}: it is the checkpoint for {output}");
             return Some(call_error(message, Some(conflict_help(plan, target.kind).to_owned())));
         }
     }
     if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
 }
 
-/// Whether a file is the checkpoint of an output.
+/// Whether a file is the checkpoint for an output.
 fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
     FileIdentity::of(&checkpoint_path(output)).as_ref() == Some(identity)
 }

@@ -24,10 +24,11 @@ pub(super) type Kernel = fn(
     &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
 
-/// Maximum time between calls of the callback.
+/// Maximum time between calls to the callback.
 pub(super) const TICK: Duration = Duration::from_millis(20);
 
-/// Minimum time between reports from a thread. Waking the calling thread takes longer than the smallest jobs.
+/// Minimum time between two reports from a thread. Waking the calling thread takes longer than the smallest
+/// jobs.
 const AT_ONCE: Duration = Duration::from_micros(300);
 
 /// State shared by all jobs.
@@ -40,7 +41,7 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps for all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Index of the jobs' first sample among the samples of the entire image.
+    /// Index of the jobs' first sample in the entire image.
     pub(super) first: u32,
 }
 
@@ -91,7 +92,7 @@ impl Tracer<'_> {
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
-        // Bound the channel so that results do not pile up while a preview is being created.
+        // Bound the channel so that results do not pile up while a preview is created.
         let (sender, results) = mpsc::sync_channel(2 * threads);
         let (next, stopped, keep) = (&next, &stopped, &keep);
         self.pool.in_place_scope(move |scope| {
@@ -131,12 +132,12 @@ impl Tracer<'_> {
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
-        // Do not call `check`, which blocks while work is paused. This would delay orders.
+        // Do not call `check`. It blocks while work is paused, which would delay orders.
         if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }
 
-/// Stops the other threads on a panic, because their work will be discarded.
+/// Stops the other threads after a panic, because their work will be discarded.
 struct StopOnPanic<'a>(&'a AtomicBool);
 
 impl Drop for StopOnPanic<'_> {
@@ -147,9 +148,9 @@ impl Drop for StopOnPanic<'_> {
     }
 }
 
-/// Returns the number of samples per pixel after the next pass: 1, 2, 4, … at first, to show an image early,
-/// then increasing in steps that keep the time per tile short. `pixels` is the image size. A pass ends at
-/// every power of two, because noise is judged there.
+/// Returns the number of samples per pixel after the next pass. It is 1, 2, 4, … at first, so that an image
+/// appears early, and then increases in steps that keep the time per tile short. `pixels` is the image size.
+/// A pass ends at every power of two, because noise is evaluated there.
 pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
     let longest = longest_pass(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
@@ -163,7 +164,7 @@ fn longest_pass(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs needed to raise a pixel from `done` to `total` samples using [`next_pass`].
+/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`next_pass`].
 /// Each job has at most `at_once` samples.
 pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = longest_pass(pixels);

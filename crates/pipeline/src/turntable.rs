@@ -1,4 +1,4 @@
-//! Turntables: frames of a camera orbiting `look_at`, written as numbered files or as an animation.
+//! Turntables: frames from a camera orbiting `look_at`, written as numbered files or as an animation.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -100,17 +100,17 @@ fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> O
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
-/// Returns the first file to which two frames would be written. `None` if each frame has its own file.
+/// Returns the first file that two frames would share. `None` if each frame has its own file.
 pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
     let all = |number| outputs.iter().filter_map(move |path| frame_path(path, TurntableFrame { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
-/// Returns existing files numbered beyond the last frame, which are left over from a longer turntable.
+/// Returns existing files numbered beyond the last frame, which were left behind by a longer turntable.
 pub fn leftover_frames(last: &Path, turn: TurntableFrame) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
-    // Find the frame number, which is the last run of digits with this value.
+    // Find the frame number: the last run of digits with this value.
     let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
     let is_end = |at: &usize| name[*at].is_ascii_digit() && ends_run(*at);
     let run = |end: usize| name[..end].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |at| at + 1);

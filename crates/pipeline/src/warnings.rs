@@ -21,7 +21,7 @@ enum Cause {
     View,
 }
 
-/// Returns warnings about a scene's effective settings, which include `overrides`.
+/// Returns warnings about a scene's effective settings, which already include `overrides`.
 pub(super) fn settings_warnings(
     loaded: &LoadedScene,
     scene: &Scene,

@@ -12,8 +12,8 @@ pub enum Eta {
 }
 
 impl Eta {
-    /// Returns the remaining time. `None` while the estimate is unreliable, in the first 1 % or half second of the
-    /// render.
+    /// Returns the remaining time. Returns `None` during the first 1 % or the first half second of the
+    /// render, while the estimate is unreliable.
     pub fn of(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
@@ -21,7 +21,7 @@ impl Eta {
         Some(if seconds > DAY { Self::OverADay } else { Self::Seconds(seconds) })
     }
 
-    /// Formats the time for a line that is rarely redrawn.
+    /// Formats the time for a line that is seldom redrawn.
     pub fn words(self) -> String {
         match self {
             Self::Seconds(time) => seconds(time),
@@ -30,8 +30,8 @@ impl Eta {
     }
 }
 
-/// Formats the average samples per pixel, rounded down. Shows tenths if an integer would contradict the
-/// displayed percentage.
+/// Formats the average number of samples per pixel, rounded down. Shows tenths if an integer would contradict
+/// the displayed percentage.
 pub fn format_mean_samples(progress: &RenderProgress) -> String {
     /// With totals of at least this many samples, one sample is at most one percent.
     const FINE: u32 = 100;

@@ -41,7 +41,7 @@ pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 
-/// A running worker. Dropping it stops the worker, which may take as long as writing a file.
+/// A running worker. Dropping it stops the worker, which may take as long as it takes to write a file.
 #[derive(Debug)]
 pub struct Handle {
     /// Events from the worker.
@@ -64,7 +64,7 @@ impl Handle {
         self.remote.clone()
     }
 
-    /// Returns the worker's file contents, which a watcher of the same files can share.
+    /// Returns the worker's file contents, which can be shared with a watcher of the same files.
     pub fn contents(&self) -> Arc<Contents> {
         Arc::clone(&self.contents)
     }
@@ -115,9 +115,9 @@ pub struct CommandSender {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// Whether the write order is postponed until the pending request runs.
+    /// Whether a write order is postponed until the pending request runs.
     is_write_postponed: bool,
-    /// Whether the write order arrived after the pending request and applies to it.
+    /// Whether a write order arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
     /// The current request's settings that the user can change with keys.
     shown: Overrides,
@@ -144,7 +144,7 @@ fn adjustable_overrides(request: &Request) -> Overrides {
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
 
-/// The worker's next task.
+/// The next task for the worker.
 enum Task {
     /// A request, with the tokens for the render and the write stage.
     Render(Box<Request>, CancelToken, CancelToken),
@@ -223,9 +223,9 @@ impl CommandSender {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Postpones a write order until the pending request runs, if the order was meant for that request, or if
-    /// the current image is incomplete and the pending request has the same settings. Returns whether the
-    /// order was postponed.
+    /// Postpones a write order until the pending request runs. Does so if the order was meant for that
+    /// request, or if the current image is incomplete and the pending request has the same settings. Returns
+    /// whether the order was postponed.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -345,7 +345,7 @@ impl Worker {
 }
 
 /// If the worker thread panics, reports the newest request as failed, because the front end is waiting for
-/// that request to end.
+/// the request to end.
 struct PanicReporter<'a>(&'a CommandSender);
 
 impl Drop for PanicReporter<'_> {

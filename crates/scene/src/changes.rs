@@ -1,17 +1,18 @@
-//! Summaries of scene edits: changed keys with old and new values, or changed lines.
+//! Summarizes scene edits as a list of changed keys with their old and new values, or as a list of changed
+//! lines.
 
 mod keys;
 
 use super::sanitize::shortened;
 
-/// Maximum size in bytes of a scene to compare. Larger scenes are not edited by hand.
+/// Maximum size of scenes to compare, in bytes. Nobody edits larger scenes by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
 /// Maximum number of characters shown per line.
 const MAX_LINE_CHARS: usize = 40;
 
-/// Lists the changes between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the
-/// same syntax as in `--set`. If no key differs or a version is not valid TOML, lists the changed lines
+/// Lists the differences between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`. Keys have
+/// the same syntax as in `--set`. If no key differs or a version is not valid TOML, lists the changed lines
 /// instead. Returns an empty list if the versions are equal or too large.
 pub fn list_changes(before: &str, after: &str) -> Vec<String> {
     if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
@@ -69,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn changes_outside_of_keys_are_listed_by_line() {
+    fn changes_outside_keys_are_listed_by_line() {
         let text = "[sphere]\nradius = 0.5 # half\n# one\ncolor = 1\nlast = 2\n";
         let changed = |from: &str, to: &str| list_changes(text, &text.replace(from, to)).pop();
         assert_eq!(changed("x", "y"), None);

@@ -24,7 +24,7 @@ pub struct Diagnostic {
     pub path: PathBuf,
     /// The span in the file, if known.
     pub place: Option<SourceSpan>,
-    /// Help text: the expected values, or how to fix the problem.
+    /// Help text that lists the expected values or explains how to fix the problem.
     pub help: Option<String>,
 }
 

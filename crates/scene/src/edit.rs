@@ -1,4 +1,4 @@
-//! Writes a camera to a scene's source text, keeping comments and formatting.
+//! Writes a camera into a scene's source text without changing comments or formatting.
 
 use std::ops::Range;
 
@@ -53,7 +53,7 @@ impl CameraEdits<'_> {
         self.set_number("fov", fov, FOV_DEGREES);
         self.set_number("aperture", aperture, 0.0);
         match self.table.get("focus") {
-            // Ignore rounding of the distance while orbiting.
+            // Ignore rounding errors in the distance while orbiting.
             Some(given) if wanted.is_focused_on_look_at() && is_nearly_equal(&given.value, focus) => {}
             Some(_) | None => self.set_number("focus", focus, wanted.pose.distance()),
         }
@@ -100,19 +100,19 @@ impl CameraEdits<'_> {
         }
     }
 
-    /// The text before a key on its line.
+    /// Returns the text before a key on the same line.
     fn indent(&self, key: &KeyValue<'_>) -> &str {
         let line = self.text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         &self.text[line..key.span.start]
     }
 
-    /// Whether a key is the first on its line, possibly as `camera.key`.
+    /// Whether a key is the first on its line, possibly in the form `camera.key`.
     fn starts_line(&self, key: &KeyValue<'_>) -> bool {
         let indent = self.indent(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
-    /// The separator between this entry and the next entry.
+    /// Returns the separator between this entry and the next one.
     fn separator_after(&self, key: &KeyValue<'_>) -> String {
         if self.starts_line(key) {
             format!("{}{}", self.line_end(key), self.indent(key))
@@ -121,8 +121,8 @@ impl CameraEdits<'_> {
         }
     }
 
-    /// The line ending after this entry. If the entry is on an unterminated last line, returns the line
-    /// ending of the previous line.
+    /// Returns the line ending after this entry. If the entry is on an unterminated last line, returns the
+    /// line ending of the previous line.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn added_keys_use_the_same_line_ending() {
         let wanted = Viewpoint { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
-        // The first line's ending differs from the endings of the camera's lines.
+        // The first line ends differently from the lines of the camera table.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
             assert_eq!(written(&text, &wanted), format!("{text}{end}fov = 35.5"), "at the end of the file");
@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    /// The comments in a text, with an empty string for each blank line.
+    /// Returns the comments in a text, and an empty string for each blank line.
     fn comments(text: &str) -> Vec<String> {
         let comment = |line: &str| line.split_once('#').map(|(_, words)| words.to_owned());
         text.lines()
@@ -296,7 +296,8 @@ mod tests {
             let others = |text: &str| -> Vec<String> {
                 text.lines().filter(|line| !is_camera(line)).map(str::to_owned).collect()
             };
-            // Only camera lines may differ. Keys of lights and shapes with the same names are not compared.
+            // Only camera lines may differ. Lights and shapes have keys with the same names, which are not
+            // compared.
             assert_eq!(others(&new), others(&text), "{}", path.display());
             let changed = text.lines().filter(|line| !new.lines().any(|other| other == *line)).count();
             assert!(changed <= 6, "{}: {changed} lines", path.display());

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, max_projection};
 use crate::math::DVec3;
 
-/// Warning about a quad light that faces away from everything, followed by its label and help text.
+/// Warning message about a quad light that faces away from everything. Its label and help text follow.
 pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
@@ -18,8 +18,8 @@ pub type MeshBounds = Option<[DVec3; 2]>;
 /// ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Spans of one-sided quad lights with shapes behind them and nothing in front of them. Only calls `bounds`
-/// if the scene has one-sided quad lights.
+/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Only
+/// calls `bounds` if the scene has one-sided quad lights.
 pub(super) fn lights_facing_away(
     scene: &Scene,
     bounds: impl FnOnce() -> Vec<MeshBounds>,
@@ -58,8 +58,8 @@ pub(super) fn lights_facing_away(
     away.map(|(number, _)| scene.objects[number].span.clone()).collect()
 }
 
-/// Whether the camera is in front of a light. Always true for an orbiter camera, because its file is not read
-/// here.
+/// Whether the camera is in front of a light. Always true for orbiter cameras, because their files are not
+/// read here.
 fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
@@ -67,7 +67,7 @@ fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     }
 }
 
-/// Upper bound on the projection of a shape's points onto a unit direction.
+/// Returns an upper bound on the projection of a shape's points onto a unit direction.
 fn max_shape_projection(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     shape.max_projection_onto(direction).unwrap_or_else(|| {
         let of = |mesh: &Mesh| Some(bounding_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?));
@@ -75,7 +75,7 @@ fn max_shape_projection(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) 
     })
 }
 
-/// The transformed corners of a mesh's bounding box.
+/// Returns the transformed corners of a mesh's bounding box.
 fn bounding_box_corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.transform();
     std::array::from_fn(|number| {

@@ -4,14 +4,14 @@ use super::description::Texture;
 use crate::choice::Choice;
 use crate::math::{DVec3, Vec3};
 
-/// Values that affect the image. Implementations destructure all fields without `..`, so code with a new
-/// field does not compile until the field is added or explicitly ignored.
+/// Values that affect the image. Implementations destructure all fields without `..`, so a new field causes a
+/// compile error until it is added to the fingerprint or explicitly ignored.
 pub trait Fingerprinted {
-    /// Adds all values that later stages read to the fingerprint.
+    /// Extends the fingerprint by all values that later stages read.
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
 }
 
-/// Data that scene items refer to: textures and meshes by index, and the orbiter file.
+/// The data to which scene items refer: textures and meshes (by index), and the orbiter file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FingerprintContext<'a> {
     /// The scene's textures.
@@ -42,7 +42,7 @@ impl std::fmt::Display for Key {
     }
 }
 
-/// Fingerprint builder. Hashes inputs in order, and numbers by their bits.
+/// Fingerprint builder. Hashes its inputs in order. Hashes numbers by their bits.
 #[derive(Debug)]
 pub struct FingerprintHasher(blake3::Hasher);
 
@@ -54,7 +54,7 @@ impl FingerprintHasher {
         new
     }
 
-    /// Adds bytes and their length.
+    /// Adds bytes, preceded by their length.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.u64(bytes.len() as u64);
         self.0.update(bytes);

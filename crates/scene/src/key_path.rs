@@ -11,7 +11,7 @@ pub(super) fn quote_key_part(name: &str) -> String {
     if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { toml_string(name) }
 }
 
-/// Splits a dotted key into parts, including their quotes. Ignores dots inside quotes.
+/// Splits a dotted key into its parts, which keep their quotes. Ignores dots inside quotes.
 pub fn key_parts(key: &str) -> Vec<&str> {
     let mut rest = key;
     let mut parts = Vec::new();
@@ -23,7 +23,7 @@ pub fn key_parts(key: &str) -> Vec<&str> {
     parts
 }
 
-/// Splits a dotted key from the text that follows it, at the first space outside quotes.
+/// Splits a text at the first space outside quotes, into a dotted key and the text after it.
 pub fn split_key(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
@@ -37,7 +37,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     }
     let parts = key_parts(&key);
     let last = parts.len() - 1;
-    // Do not start with an index, which is meaningless without its list.
+    // Do not start with an index, because it is meaningless without the list's name.
     let begins_with_number = |skipped: &usize| parts[*skipped].parse::<u64>().is_ok();
     let tails =
         (1..=last).filter(|skipped| !begins_with_number(skipped)).map(|skipped| parts[skipped..].join("."));
@@ -45,7 +45,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     fitting.unwrap_or_else(|| shortened(parts[last], columns))
 }
 
-/// Byte index of the first character `end` outside quotes.
+/// Returns the byte index of the first `end` outside quotes.
 fn find_unquoted(text: &str, end: char) -> Option<usize> {
     let (mut is_quoted, mut is_escaped) = (false, false);
     for (at, c) in text.char_indices() {

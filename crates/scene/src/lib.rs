@@ -47,7 +47,7 @@ pub const SCENE_NOT_FOUND: &str = "scene file not found";
 /// Error message for a missing file with a model's extension.
 pub const MODEL_NOT_FOUND: &str = "file not found";
 
-/// Phrase in the help text for a missing scene if there is a renamed copy.
+/// Phrase in the help text for a missing scene that was probably renamed.
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
@@ -56,7 +56,7 @@ pub fn is_absence(diagnostic: &Diagnostic) -> bool {
 }
 
 /// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. Each element takes far
-/// more space in memory than in the file. A scene with a million spheres has half as many elements.
+/// more space in memory than in the file. A scene with a million spheres has half this number.
 const MAX_PARTS: usize = 32 << 20;
 
 /// A valid scene, its text and warnings.
@@ -66,25 +66,25 @@ pub struct LoadedScene {
     pub scene: Arc<Scene>,
     /// The file's text followed by the `--set` values. All spans in [`Self::scene`] index into it.
     pub source: SceneText,
-    /// The path as given by the caller.
+    /// The path as passed by the caller.
     pub path: PathBuf,
     /// Likely mistakes, in file order.
     pub warnings: Vec<Diagnostic>,
-    /// Files referenced by the scene file itself. Empty unless there are `--set` values, which may replace
-    /// these files.
+    /// Files that the scene file itself references. Empty unless there are `--set` values, because only these
+    /// can replace the references.
     pub named: Vec<PathBuf>,
     /// Spans of the values in `[render]` and `[photons]`.
     pub settings: Vec<SettingSpan>,
 }
 
-/// A value in `[render]` or `[photons]` and its span.
+/// The location of a value in `[render]` or `[photons]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SettingSpan {
     /// The name of the table: `render` or `photons`.
     pub table: &'static str,
     /// Name of the key.
     pub key: String,
-    /// Byte range in the text that includes the `--set` values.
+    /// Byte range of the value in the text, which includes the `--set` values.
     pub span: Range<usize>,
 }
 
@@ -97,7 +97,7 @@ pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
 }
 
 impl LoadedScene {
-    /// Returns the file's text with `camera` written to `[camera]`. Replaces numbers in place and adds
+    /// Returns the file's text after writing `camera` to `[camera]`. Replaces numbers in place and adds
     /// missing keys. Comments and formatting stay unchanged.
     ///
     /// # Errors
@@ -112,8 +112,8 @@ impl LoadedScene {
         document::camera_of(&SceneText::with_sets(text.into(), sets).ok()?)
     }
 
-    /// Warnings about lights that shine away from everything, for scenes with mesh files. Only calls `bounds`
-    /// if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
+    /// In scenes with mesh files, returns warnings about lights that shine away from everything. Only calls
+    /// `bounds` if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
     pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
@@ -129,19 +129,19 @@ impl LoadedScene {
         facing::lights_facing_away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
-    /// The 1-based line number in the file where `span` starts.
+    /// Returns the 1-based line number in the file where `span` starts.
     pub fn line(&self, span: &Range<usize>) -> usize {
         let before = self.source.text().get(..span.start).unwrap_or_default();
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
-    /// The span of a setting's value, in the file or in a `--set` argument. `None` if neither sets it.
+    /// Returns the span of a setting's value in the file or in a `--set` argument. `None` if neither sets it.
     pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_it = |setting: &&SettingSpan| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
     }
 
-    /// Creates a diagnostic at `span`, for problems found after parsing, such as a mesh without usable faces
+    /// Creates a diagnostic at `span` for a problem found after parsing, such as a mesh without usable faces
     /// or a texture that cannot be decoded.
     pub fn diagnostic_at(
         &self,
@@ -180,7 +180,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
 /// text is not in a file.
 ///
 /// # Errors
-/// Same as [`load`].
+/// Returns the same errors as [`load`].
 pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     load_source(SceneText::with_sets(text, sets)?.mark_generated(), path, sets)
 }
@@ -197,7 +197,8 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
     }
 }
 
-/// The files referenced by a scene file, even if the scene has errors. Empty for models and unreadable files.
+/// Returns the files that a scene file references, even if the scene has errors. Empty for models and
+/// unreadable files.
 pub fn named_files(path: &Path) -> Vec<PathBuf> {
     if is_model(path) {
         return Vec::new();
@@ -206,7 +207,7 @@ pub fn named_files(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
-/// file is not read. Only the metadata of referenced files is read.
+/// file is not read. Of referenced files, only the metadata is read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     if text.contains('\0') {
         return Outcome {
@@ -218,7 +219,7 @@ pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     document::lower(&SceneText::file(text), path)
 }
 
-/// Whether a file is a model: it has a mesh extension and does not contain a scene.
+/// Whether a file is a model, that is, has a mesh extension and does not contain a scene.
 pub fn is_model(path: &Path) -> bool {
     read::is_model(path)
 }
@@ -228,7 +229,7 @@ pub fn is_mesh(path: &Path) -> bool {
     document::has_mesh_extension(path)
 }
 
-/// The commented scene written by `glimt new`.
+/// Returns the commented scene written by `glimt new`.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")
 }

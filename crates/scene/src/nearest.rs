@@ -1,9 +1,9 @@
-//! Suggestions for misspelled names and names from other renderers.
+//! Suggests corrections for misspelled names and for names from other renderers.
 
 use strsim::osa_distance;
 
-/// The candidate with the smallest edit distance (optimal string alignment) to `written`. `None` if more than
-/// one third of the characters differ. Ignores case and treats `-` as `_`.
+/// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`. `None` if
+/// more than one third of the characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {
@@ -47,7 +47,8 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (&["sun", "distant", "infinite", "parallel"], &["directional"]),
 ];
 
-/// The candidate that corresponds to another renderer's name `written`, or else the nearest candidate.
+/// Returns the candidate that corresponds to `written` if that is another renderer's name, otherwise the
+/// nearest candidate.
 pub fn translate_foreign_name<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");
     let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));

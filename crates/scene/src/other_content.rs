@@ -1,5 +1,5 @@
-//! Recognizes models, images, image parts and checkpoints that are passed instead of a scene, by their first
-//! bytes.
+//! Recognizes models, images, image parts and checkpoints by their first bytes if they are passed instead of
+//! a scene.
 
 use std::io::Read;
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(super) fn may_be_scene(found: &Path) -> bool {
 pub(super) enum OtherContent {
     /// A model, with its format and its usual extension.
     Model { format: &'static str, ending: &'static str },
-    /// An image of this format.
+    /// An image in this format.
     Image(&'static str),
     /// An image part or a checkpoint.
     Part,
@@ -42,7 +42,7 @@ pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
 }
 
 impl OtherContent {
-    /// Detects the type of contents from the first bytes. `None` if the file may be a scene.
+    /// Detects the content type from the first bytes. `None` if the file may be a scene.
     pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MAGIC) {
             return Some(Self::Part);
@@ -50,7 +50,7 @@ impl OtherContent {
         image_format(bytes).map(Self::Image).or_else(|| detect_model(bytes))
     }
 
-    /// Error for a file with these contents instead of a scene.
+    /// Returns the error for a file that has these contents and is therefore not a scene.
     pub(super) fn to_diagnostic(self, path: &Path) -> Box<Diagnostic> {
         // Remove the extension `.toml`.
         let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
@@ -65,7 +65,7 @@ impl OtherContent {
                 (format!("this is an image ({format}), not a scene"), help)
             }
             Self::Part => (
-                "this is a part or checkpoint of an image, not a scene".to_owned(),
+                "this is an image part or a checkpoint, not a scene".to_owned(),
                 "`glimt info` shows which scene it belongs to; `glimt merge` merges parts".to_owned(),
             ),
         };
@@ -73,7 +73,7 @@ impl OtherContent {
     }
 }
 
-/// The format of an image.
+/// Returns an image's format.
 fn image_format(bytes: &[u8]) -> Option<&'static str> {
     const STARTS: [(&[u8], &str); 9] = [
         (b"\x89PNG\r\n", "PNG"),
@@ -100,13 +100,13 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Whether the first byte after whitespace is `byte`.
+/// Whether the first byte after leading whitespace is `byte`.
 fn begins_with(bytes: &[u8], byte: u8) -> bool {
     bytes.trim_ascii_start().first() == Some(&byte)
 }
 
 /// Whether `bytes` start with a TGA header. TGA has no magic number, so all fields must be valid. At least
-/// one of these bytes never occurs in text.
+/// one of the bytes in a valid header never occurs in text.
 fn is_tga(bytes: &[u8]) -> bool {
     let &[_, map, kind, first0, first1, count0, count1, depth, _, _, _, _, w0, w1, h0, h1, bits, ..] = bytes
     else {

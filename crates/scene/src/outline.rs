@@ -1,5 +1,5 @@
-//! Tables in a scene's text, with the spans of keys, values and names, for completions and editors. The text
-//! may contain errors.
+//! Finds the tables in a scene's text and the spans of their keys, values and names, for use in completions
+//! and editors. The text may contain errors.
 
 use std::ops::Range;
 
@@ -13,8 +13,8 @@ use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 pub struct OutlineTable {
     /// The table's definition.
     pub info: &'static TableInfo,
-    /// The type from the key `type`, or the default type. `None` if the definition has no types or if the
-    /// type is unknown.
+    /// The type that the key `type` selects, or the default type. `None` if the definition has no types or if
+    /// the type is unknown.
     pub kind: Option<&'static TypeInfo>,
     /// `NAME` in `[materials.NAME]`, or a shape's `name`.
     pub name: Option<SpannedName>,
@@ -48,7 +48,7 @@ pub struct OutlineKey {
     pub inner: Vec<OutlineKey>,
 }
 
-/// The tables in a text, in the order of their definitions.
+/// Returns the tables in a text, in the order in which glimt defines them.
 pub fn outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
@@ -58,7 +58,7 @@ pub fn outline(text: &str) -> Vec<OutlineTable> {
     tables().iter().flat_map(of).collect()
 }
 
-/// The tables with the definition `info`.
+/// Returns the tables that `info` defines.
 fn outline_tables(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
         TableSyntax::Single => table_entries(found.value)
@@ -140,7 +140,7 @@ fn table_entries(value: Value<'_>) -> Option<Entries<'_>> {
 }
 
 impl OutlineTable {
-    /// The keys allowed for the table's type, or for any type if the type is unknown.
+    /// Returns the keys allowed for the table's type, or for any type if the table's type is unknown.
     pub fn known_keys(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {
@@ -157,7 +157,7 @@ impl OutlineTable {
         }
     }
 
-    /// Key prefixes for `--set` that address this table.
+    /// Returns the key prefixes by which `--set` refers to this table.
     pub fn set_prefixes(&self) -> Vec<String> {
         let table = self.info.name;
         let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::quote_key_part(&name.text)));

@@ -1,4 +1,4 @@
-//! Reads scene files without blocking and with a limit on memory.
+//! Reads scene files without blocking, and limits the memory used.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -76,7 +76,7 @@ fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
-/// The key `file` of a `[[mesh]]` as shown in help texts.
+/// Formats the key `file` in `[[mesh]]` for help texts.
 fn mesh_file_key(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
@@ -98,7 +98,7 @@ fn is_unsupported_model(path: &Path) -> bool {
     UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera(path)
 }
 
-/// Whether there is no `[camera]` header near the start of a file. False for unreadable files.
+/// Whether a file has no `[camera]` header near its start. False for unreadable files.
 fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
@@ -143,7 +143,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     Ok(bytes)
 }
 
-/// Number of syntax elements, which determines the memory used by the parsed document.
+/// Counts the syntax elements, which determine the memory used by the parsed document.
 fn count_syntax_elements(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
@@ -210,7 +210,8 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
     Some(parent.join(near))
 }
 
-/// Finds a file with the given text in the folder of a missing scene, which was probably renamed.
+/// Finds the new file of a scene that is missing because it was probably renamed: a file with the same text
+/// in the same folder.
 pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
@@ -221,11 +222,11 @@ pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     };
     let names = folder::names(listed).ok()?.take(MAX_FOLDER_FILES);
     let named = |name| parent.join::<std::ffi::OsString>(name);
-    // The order of files depends on the file system. Take the first by name.
+    // The order of files in a folder depends on the file system. Use the first by name.
     names.map(named).filter(|file| file != path && has_text(file)).min()
 }
 
-/// Whether two different file names share their extension or their stem.
+/// Whether two file names differ, but have the same extension or the same stem.
 fn is_alike(found: &Path, meant: &Path) -> bool {
     found.file_name() != meant.file_name()
         && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())

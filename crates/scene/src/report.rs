@@ -27,8 +27,8 @@ pub enum Style {
     Ansi,
 }
 
-/// Formats diagnostics, sorted by file and position, with a summary line. Wraps messages at `width` columns
-/// and cuts source lines. Returns an empty string if there are no diagnostics.
+/// Formats diagnostics sorted by file and position, followed by a summary line. Wraps messages at `width`
+/// columns and cuts source lines. Returns an empty string if there are no diagnostics.
 pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
@@ -49,7 +49,7 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// Converts offsets to lines and columns. Caches the line index of the last text.
+/// Converts offsets to lines and columns. Caches the line index for the last text.
 #[derive(Default)]
 pub struct Locator(Option<(Arc<str>, LineIndex)>);
 
@@ -133,7 +133,7 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
     if has_origin { rendered } else { without_lines(&rendered, "|") }
 }
 
-/// A rendered line without color escape sequences and surrounding whitespace.
+/// Removes color escape sequences and surrounding whitespace from a rendered line.
 fn without_colors(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
@@ -147,7 +147,7 @@ fn without_lines(rendered: &str, text: &str) -> String {
     rendered.split_inclusive('\n').filter(|line| without_colors(line) != text).collect()
 }
 
-/// Removes the line `:::`, which the renderer inserts before a snippet if the origin is shown above.
+/// Removes the line `:::`, which the renderer inserts before a snippet whose origin it has already shown.
 fn without_second_origin(rendered: &str) -> String {
     let Some(second) = rendered.lines().find(|line| without_colors(line) == ":::") else {
         return rendered.to_owned();
@@ -177,8 +177,8 @@ impl Excerpt {
         Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
     }
 
-    /// The column where the label starts, after the line number, ` | `, the text before the span, the carets
-    /// and a space.
+    /// Returns the column where the label starts, after the line number, ` | `, the text before the span, the
+    /// carets and a space.
     fn label_column(&self, line: usize) -> usize {
         let frame = line.to_string().len() + " | ".len();
         frame
@@ -217,7 +217,7 @@ impl LineIndex {
         self.starts.partition_point(|start| *start <= offset)
     }
 
-    /// 1-based line and column of a byte offset. Does not count a byte order mark.
+    /// Returns the 1-based line and column of a byte offset. A byte order mark is not counted.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char(source, offset);
         let line = self.line(offset);
@@ -226,7 +226,7 @@ impl LineIndex {
         (line, before.chars().count() + 1)
     }
 
-    /// Byte range of line `line` (0-based), without line ending and byte order mark.
+    /// Returns the byte range of the 0-based line `line`, without its line ending or a byte order mark.
     pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
         let start = *self.starts.get(line)?;
         let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
@@ -236,7 +236,7 @@ impl LineIndex {
     }
 }
 
-/// Makes text safe to display, and wraps it between words at `width` characters.
+/// Makes text safe to display and wraps it at word boundaries after at most `width` characters.
 fn wrap_visible(text: &str, width: usize) -> Cow<'static, str> {
     let text = visible(text);
     let mut lines = String::with_capacity(text.len());

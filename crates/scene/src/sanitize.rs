@@ -25,7 +25,8 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// [`visible`] text truncated to `limit` characters, ending with `…` if truncated.
+/// Makes text safe to display with [`visible`] and truncates it to `limit` characters. Truncated text ends
+/// with `…`.
 pub fn shortened(text: &str, limit: usize) -> String {
     let shown = visible(text);
     if shown.chars().count() <= limit {

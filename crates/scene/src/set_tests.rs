@@ -8,7 +8,7 @@ use super::source::{MALFORMED_SET, MISSING_EQUALS_HELP};
 use super::tests::CAMERA;
 use super::{Outcome, SceneText, document, parse};
 
-/// Parses `text` with a camera and `--set` values.
+/// Adds a camera to `text` and parses it with `--set` values.
 fn with_sets(text: &str, sets: &[&str]) -> Result<Scene, Vec<Diagnostic>> {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let source = SceneText::with_sets(format!("{text}\n{CAMERA}").into(), &sets)?;
@@ -23,7 +23,7 @@ const BALLS: &str = "[render]\nsamples = 4
 [[sphere]]\ncenter=[2,0,0]\nradius=3\nmaterial='wall'\nname='big ball'";
 
 #[test]
-fn set_is_equivalent_to_a_value_in_the_file() {
+fn set_is_equivalent_to_editing_the_file() {
     let cases: [(&[&str], &str, &str); 11] = [
         (&["render.samples=3"], "samples = 4", "samples = 3"),
         (&["render.width=7"], "samples = 4", "samples = 4\nwidth = 7"),
@@ -64,7 +64,7 @@ fn mistakes_in_set_are_reported() {
         ("sphere.5.radius=1", "there is no [[sphere]] with number or name `5`", "5"),
         ("sphere.0.radius=1", "there is no [[sphere]] with number or name `0`", "0"),
         ("sphere.radius=1", "there is no [[sphere]] with number or name `radius`", "radius"),
-        ("sphere.ball.radius=1", "2 [[sphere]] have the name `ball`", "ball"),
+        ("sphere.ball.radius=1", "2 [[sphere]] tables are named `ball`", "ball"),
         ("cone.1.radius=1", "the scene has no [[cone]]", "1"),
         ("light.1.intensity=1", "the scene has no [[light]]", "1"),
         (

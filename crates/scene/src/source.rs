@@ -1,4 +1,4 @@
-//! Source text of a scene: the file followed by the `--set` values. All spans index into this text.
+//! A scene's source text: the file's text followed by the `--set` values. All spans index into this text.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ impl SceneText {
         Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
     }
 
-    /// Combines the text of a file with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither
+    /// Combines a file's text with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither
     /// TOML nor numbers become strings.
     ///
     /// # Errors
@@ -74,12 +74,12 @@ impl SceneText {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// [`Self::text`] as an `Arc`. Only copies the text if there are `--set` values.
+    /// Returns [`Self::text`] as an `Arc`. Only copies the text if there are `--set` values.
     pub fn shared_text(&self) -> Arc<str> {
         if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text().into() }
     }
 
-    /// Byte offsets of the `--set` values.
+    /// Returns the byte offsets of the `--set` values.
     pub(super) fn set_offsets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }
@@ -94,7 +94,7 @@ impl SceneText {
         Self { is_generated: true, ..self }
     }
 
-    /// Resolves a span to the file at `path` or to a `--set` value. Returns no span for generated text.
+    /// Maps a span to the file at `path` or to a `--set` value. Returns no span if the text was generated.
     pub(super) fn resolve_span(
         &self,
         path: &Path,
@@ -115,7 +115,7 @@ impl SceneText {
     }
 }
 
-/// Converts `TABLE.KEY=VALUE` to TOML and quotes the value if necessary. `None` if the `=`, the table or the
+/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. `None` if the `=`, the table or the
 /// key is missing.
 fn set_to_toml(set: &str) -> Option<String> {
     // Quoted keys may contain `=`, so try each `=`.
@@ -148,7 +148,7 @@ pub fn toml_string(text: &str) -> String {
     quoted
 }
 
-/// Message of the error for a malformed `--set` value.
+/// Error message for a malformed `--set` value.
 pub(super) const MALFORMED_SET: &str = "malformed value";
 /// Hint for a `--set` value without `=`.
 pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";

@@ -17,7 +17,7 @@ fn scene(text: &str) -> Scene {
     outcome.scene.unwrap_or_else(|| panic!("{messages:?}"))
 }
 
-/// Adds a camera to `text` and returns the messages.
+/// Adds a camera to `text`, parses it and returns the messages.
 fn messages(text: &str) -> Vec<String> {
     outcome(&format!("{text}\n{CAMERA}")).diagnostics.into_iter().map(|one| one.message).collect()
 }
@@ -183,7 +183,7 @@ fn orbiter_replaces_position_and_look_at() {
 }
 
 #[test]
-fn warnings_are_only_about_darkness_and_energy_gain() {
+fn only_darkness_and_energy_gain_cause_warnings() {
     let sphere = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='m'\n";
     let dark = UNLIT_SCENE;
     assert_eq!(messages(&format!("[materials.m]\n{sphere}")), [dark]);
@@ -215,7 +215,7 @@ fn finite_shapes_may_be_area_lights() {
 }
 
 #[test]
-fn degenerate_edges_are_reported_at_their_value() {
+fn degenerate_edge_errors_point_to_the_value() {
     let place = |text: &str| {
         let outcome = outcome(&format!("[materials.m]\n{text}\nmaterial='m'\n{CAMERA}"));
         let [error] = outcome.diagnostics.try_into().expect("one error");
@@ -230,7 +230,7 @@ fn degenerate_edges_are_reported_at_their_value() {
 }
 
 #[test]
-fn tiny_triangles_far_away_have_area() {
+fn tiny_distant_triangles_have_area() {
     let fine = "[[light]]\n[materials.m]\n[[triangle]]\na = [1e6, 0, 0]\nb = [1000000.001, 0, 0]\n\
                 c = [1e6, 0.001, 0]\nmaterial = 'm'\n";
     assert_eq!(messages(fine), [""; 0]);

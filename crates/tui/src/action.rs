@@ -1,4 +1,4 @@
-//! Actions that keys trigger.
+//! Actions triggered by keys.
 
 /// An action that the user can trigger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,10 +8,9 @@ use crate::scene::description::Pose;
 
 /// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
 const POLE: f64 = 1.0;
-/// Range of the field of view, in degrees.
+/// Minimum and maximum field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Maximum factor by which the camera's distance to `look_at` may exceed or fall below its distance in the
-/// scene.
+/// Limit on dollying: the distance to `look_at` stays within this factor of its value in the scene.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits the camera around `look_at` by `right` and `up` degrees.
@@ -30,8 +29,8 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     with_eye_at(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Multiplies the distance to `look_at` by `factor`, keeping it within a factor of [`REACH`] of `own`, the
-/// scene camera's distance.
+/// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
+/// distance in the scene.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
@@ -45,7 +44,7 @@ pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
     rounded((view.fov * factor).clamp(least, most), 0.01)
 }
 
-/// Moves the eye to `look_at + arm`. Rounds its position by at most 1/10,000 of the arm's length.
+/// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
 fn with_eye_at(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
@@ -80,7 +79,7 @@ mod tests {
         }
         let arm = (pose.position - pose.look_at).normalize();
         assert!((arm.dot(DVec3::Y).acos().to_degrees() - POLE).abs() < 0.01, "{arm}");
-        assert!(arm.z > 0.0, "the camera did not pass the pole");
+        assert!(arm.z > 0.0, "the camera should not cross the pole");
         let above = Pose { position: DVec3::new(0.0, 9.0, 0.0), up: DVec3::Y, look_at: DVec3::ZERO };
         assert!(orbited(&above, 10.0, -40.0).position.is_finite());
     }
@@ -97,7 +96,7 @@ mod tests {
             assert_eq!(dollied(&pose, factor, 4.0), pose, "no further movement");
         }
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
-        assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts farther away stays there");
+        assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts beyond the limit should stay there");
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed_fov(&view, 1.1), 44.0);
         assert_eq!(zoomed_fov(&view, 100.0), 160.0);

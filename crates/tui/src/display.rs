@@ -1,4 +1,4 @@
-//! Sends the target cells to the terminal in slices, as bandwidth permits.
+//! Sends the target screen to the terminal in slices, as bandwidth permits.
 
 use std::time::{Duration, Instant};
 
@@ -74,9 +74,9 @@ pub(super) struct Display {
     sent: usize,
     /// Whether a preview is being sent.
     is_picture_due: bool,
-    /// Cost of sending the last preview.
+    /// Bytes and round-trip time for sending the last preview.
     report: Option<FrameReport>,
-    /// Whether the report on the last preview has been returned.
+    /// Whether the last preview's report has been returned.
     is_reported: bool,
 }
 
@@ -146,7 +146,7 @@ impl Display {
         }
     }
 
-    /// Sets a new target. `is_new` if it contains a new preview.
+    /// Sets a new target. `is_new` means that it contains a new preview.
     pub(super) fn set_target(
         &mut self,
         wanted: &Buffer,
@@ -200,7 +200,7 @@ impl Display {
         }
     }
 
-    /// Sends one slice, ending it early if `is_late` returns true. Returns whether anything was sent.
+    /// Sends one slice, ending it early if `is_late` returns true. Returns true if anything was sent.
     pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_queued_bytes();
         let room = if is_idle { 0 } else { self.connection.max_slice(now) };
@@ -338,7 +338,7 @@ mod tests {
 
     use super::*;
 
-    /// The byte count of a small update is added to the preview's count instead of replacing it.
+    /// A small update adds its bytes to the preview's count instead of replacing the count.
     #[test]
     fn report_counts_bytes_since_the_render_began() {
         let now = Instant::now();
@@ -375,6 +375,6 @@ mod tests {
         display.reset_byte_count();
         buffer.content[9].set_fg(Color::Rgb(255, 255, 255));
         let (told, difference) = show(&mut display, &buffer);
-        assert_eq!(told, difference, "only the next render is counted");
+        assert_eq!(told, difference, "only the next render should be counted");
     }
 }

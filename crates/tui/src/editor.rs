@@ -21,7 +21,7 @@ pub(super) fn editor_command(variable: impl Fn(&str) -> Option<String>) -> Strin
     editor(variable).0
 }
 
-/// The editor from the environment, as a shell command, and the variable that specifies it. `None` for the
+/// The editor from the environment as a shell command, with the variable that specifies it. `None` for the
 /// default editor.
 pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
     let set = |name: &'static str| {
@@ -71,7 +71,7 @@ fn wait_for_child(id: Pid) -> Result<WaitStatus, Errno> {
     }
 }
 
-/// Command line for the shell. Simple commands are run using `exec`, because a shell in between would
+/// Command line for the shell. Simple commands are run using `exec`, because an intermediate shell would
 /// intercept signals.
 fn shell_command_line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
@@ -83,7 +83,7 @@ fn shell_command_line(editor: &str) -> String {
 /// Arguments that open the file at a position.
 fn position_arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     let FilePosition { path, line, column } = place;
-    // Prevents a file name with a leading dash from being parsed as an option.
+    // Prevent a file name with a leading dash from being parsed as an option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         Path::new(".").join(path)
     } else {

@@ -32,7 +32,7 @@ pub(super) fn is_plain_terminal(variable: impl Fn(&str) -> Option<String>) -> bo
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
 }
 
-/// The image protocol for a preview choice.
+/// Returns the image protocol for the user's preview choice.
 fn image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
         PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
@@ -48,8 +48,8 @@ fn image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
     }
 }
 
-/// Queries to send to the terminal. Multiplexers, which reply on their own behalf or not at all, and plain
-/// terminals, which may print queries as text, get only a few of them.
+/// Selects the queries to send to the terminal. Few are sent to multiplexers, which reply on their own behalf
+/// or not at all, and to plain terminals, which may print queries as text.
 pub(super) fn terminal_queries(
     preview: PreviewChoice,
     color: ColorChoice,

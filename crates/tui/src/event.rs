@@ -33,8 +33,8 @@ pub(super) enum Event {
     Resize(Window),
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
-    /// A new preview. `range` is the range of displayed values if the view maps values to colors. `section`
-    /// is the part of the image shown at 1:1 scale, if any.
+    /// A new preview. `range` is the range of displayed values, for views that map values to colors.
+    /// `section` is set if only part of the image is shown, at 1:1 scale.
     Picture {
         generation: u64,
         picture: Arc<Picture>,
@@ -59,7 +59,7 @@ pub(super) enum Event {
     NoShell,
     /// The editor has exited.
     Back,
-    /// The editor could not be run. Contains the reason.
+    /// The reason why the editor could not be run.
     NoEditor(String),
     /// A source of events has ended.
     Lost(EventSource),
@@ -110,7 +110,7 @@ pub(super) struct Mouse {
     pub row: u16,
 }
 
-/// Kinds of mouse events, for the left button and the wheel.
+/// A left-button or wheel event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MouseEventKind {
     Press,
@@ -196,7 +196,7 @@ pub(super) struct FilePosition {
     pub column: usize,
 }
 
-/// Cost of sending the last preview.
+/// Bytes and round-trip time for sending the last preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FrameReport {
     /// Bytes sent since the render began.
@@ -211,6 +211,6 @@ pub(super) struct WriteFailure {
     pub why: String,
     /// Generation of the request that failed.
     pub generation: u64,
-    /// Whether glimt refused to write the image, for a reason listed among the errors and warnings.
+    /// Whether glimt refused to write the image. The errors and warnings list the reason.
     pub is_refused: bool,
 }

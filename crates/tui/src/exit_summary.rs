@@ -17,7 +17,8 @@ pub(super) fn summary_text(state: &State) -> String {
     }
 }
 
-/// Changes made with keys but saved neither in the scene nor in an image, formatted as command-line options.
+/// Changes that were made with keys and saved neither to the scene nor in an image, formatted as command-line
+/// options.
 pub(super) fn unsaved_as_options(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
@@ -36,7 +37,7 @@ pub(super) fn image_name(state: &State) -> Option<String> {
     (!names.is_empty()).then(|| names.join(", "))
 }
 
-/// Why this run has written no image.
+/// Explains why this run has not written an image.
 fn reason_for_no_image(state: &State) -> String {
     if is_scene_broken(state) {
         return format!("no image written; {} has errors", scene_name(state));
@@ -53,10 +54,10 @@ fn reason_for_no_image(state: &State) -> String {
 
 /// Appended to the list of written files if the scene was edited after they were written.
 const OLDER_THAN_EDIT: &str = " (older than your last edit)";
-/// Refers to the render that started after the files were written.
+/// Name for the render that started after the files were written.
 const NEXT_RENDER: &str = "the next render";
 
-/// Describes the events after the files were written.
+/// Describes what has happened since the files were written.
 fn events_since_writing(state: &State) -> String {
     if is_scene_broken(state) {
         return format!("; {} has errors since", scene_name(state));
@@ -151,7 +152,7 @@ fn view_prefix(view: View) -> String {
     if view.is_empty() { view } else { format!("{view}, ") }
 }
 
-/// The name of the view, or nothing for the beauty view.
+/// The view's name. Empty for the beauty view.
 pub(super) fn view_label(view: View) -> String {
     if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
@@ -195,11 +196,11 @@ mod tests {
         ui.finish_render([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
-        assert!(ui.text().contains(messages::NOT_SAVED), "the newest image is not saved: {}", ui.text());
+        assert!(ui.text().contains(messages::NOT_SAVED), "expected an unsaved image: {}", ui.text());
     }
 
     #[test]
-    fn time_is_the_written_images_render_time() {
+    fn summary_shows_the_written_images_render_time() {
         let mut ui = TestUi::new();
         let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
             let generation = ui.state.request.generation;
@@ -231,7 +232,7 @@ mod tests {
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
-        assert_eq!(summary_text(&ui.state), own, "the file was not written again");
+        assert_eq!(summary_text(&ui.state), own, "the file should not be written again");
         ui.press('w');
         ui.worker_event(written_event(generation, "a.png", false));
         assert_eq!(summary_text(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
@@ -288,7 +289,7 @@ mod tests {
             ui.worker_event(finished(generation, Status::Skipped));
             assert!(summary_text(&ui.state).starts_with(failed), "{key}");
         }
-        // Return to the scene's own image after disk space was freed or the image was written.
+        // Return to the scene's own image after freeing disk space or writing the image.
         ui.press('0');
         for status in [Status::Done, Status::Reused] {
             fail(&mut ui);
@@ -394,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn revisiting_own_image_keeps_it_finished() {
+    fn revisited_scene_image_stays_finished() {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         let mut ui = TestUi::new();
         ui.worker_event(Event::Started { generation: 1 });
@@ -419,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn own_image_state_survives_key_changes() {
+    fn scene_image_state_survives_key_changes() {
         let mut ui = TestUi::new();
         let own = |ui: &mut TestUi, state| {
             let generation = ui.state.request.generation;

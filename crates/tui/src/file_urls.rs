@@ -28,7 +28,7 @@ impl FileUrls {
     }
 }
 
-/// Percent-encodes everything but unreserved characters and slashes (RFC 3986).
+/// Percent-encodes everything except unreserved characters and slashes (RFC 3986).
 fn percent_encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len());
     for byte in bytes {

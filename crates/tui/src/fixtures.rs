@@ -30,7 +30,7 @@ pub(super) fn window(columns: u16, rows: u16) -> Window {
     Window { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
 }
 
-/// A state that has not sent a request yet.
+/// Creates a state from which no request has been sent yet.
 pub(super) fn state(columns: u16, rows: u16) -> State {
     state_with(columns, rows, PreviewKind::HalfBlock, ColorDepth::TrueColor, Overrides::default())
 }
@@ -98,14 +98,14 @@ impl TestUi {
         self.handle_event(Event::Tick)
     }
 
-    /// Saves a scene with this text, which the worker loads.
+    /// Saves a scene with this text and lets the worker load it.
     pub(super) fn save_scene(&mut self, text: &str) {
         self.handle_event(Event::Changed(Changed { noticed: self.now }));
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Text { generation, text: text.into() });
     }
 
-    /// Starts the current request, and reports that its scene is valid.
+    /// Starts the current request and reports that its scene is valid.
     pub(super) fn read_scene(&mut self) {
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Started { generation });
@@ -273,7 +273,7 @@ pub(super) fn written_event(generation: u64, path: &str, is_own: bool) -> protoc
     protocol::Event::Written { generation, path: path.into(), bytes: 1, is_own, unfinished: None }
 }
 
-/// A diagnostic located in the third line of a scene.
+/// A diagnostic on the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
     Diagnostic {

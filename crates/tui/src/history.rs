@@ -21,7 +21,7 @@ const SMALL: f32 = 32.0;
 pub(crate) struct ShownImage {
     pub generation: u64,
     pub picture: Arc<Picture>,
-    /// Range of values shown, if the view maps values to colors.
+    /// Range of displayed values, for views that map values to colors.
     pub range: Option<[f32; 2]>,
     /// The section of the image shown at 1:1 scale. `None` if the whole image is shown.
     pub section: Option<Section>,
@@ -32,13 +32,13 @@ pub(crate) struct ShownImage {
 }
 
 impl ShownImage {
-    /// Whether both show the same image, regardless of sample count and size.
+    /// Whether both previews show the same image, regardless of size and sample count.
     pub(crate) fn shows_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
         images.is_some_and(|(own, other)| own.image == other.image)
     }
 
-    /// Whether the image is known to have all its samples.
+    /// Whether all samples are known to be included in the image.
     pub(crate) fn is_finished(&self) -> bool {
         self.source.is_some_and(|source| source.is_finished)
     }
@@ -51,9 +51,9 @@ pub(super) struct History {
     past: VecDeque<HistoryEntry>,
     /// Number of scene edits so far.
     edits: u64,
-    /// Number of the last edit that left the scene valid and may have changed the image.
+    /// Number of the last edit that left the scene valid.
     read_edits: u64,
-    /// Index of the older render being viewed, and the newest image.
+    /// The newest image and the index of the older render being viewed.
     open: Option<(usize, ShownImage)>,
 }
 
@@ -67,8 +67,8 @@ struct HistoryEntry {
     origin: ImageOrigin,
     /// Number of the render that finished the image. `None` if the image is unfinished.
     run: Option<u64>,
-    /// Changes since the previous entry: changes in files, then changes made with keys. `None` for the first
-    /// entry.
+    /// Changes since the previous entry, first those in files, then those made with keys. `None` for the
+    /// first entry.
     changes: Option<[Vec<String>; 2]>,
     /// Thumbnail for the history strip, created on first use.
     small: OnceCell<Picture>,
@@ -80,24 +80,24 @@ impl History {
         self.edits += 1;
     }
 
-    /// Records that the scene was read. New entries include the last edit.
+    /// Records that the scene has been read. New entries include the last edit.
     pub(super) fn record_scene_read(&mut self) {
         self.read_edits = self.edits;
     }
 
-    /// Records that the scene turned out to be invalid. New entries still show the previous version.
+    /// Records that the scene turned out to be invalid. New entries still show its previous version.
     pub(super) fn record_invalid_scene(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
-    /// Changes in files between the render being viewed and the newest one.
+    /// Lists file changes between the render being viewed and the newest one.
     pub(super) fn edits_since_viewed(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
         let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
         edits.unwrap_or_default().join("; ")
     }
 
-    /// One-line explanation of how the render being viewed differs from the previous one.
+    /// Describes in one line how the render being viewed differs from the previous one.
     pub(super) fn viewed_changes_text(&self) -> String {
         let Some((at, _)) = &self.open else { return String::new() };
         let Some(past) = self.past.get(*at) else { return String::new() };
@@ -109,8 +109,8 @@ impl History {
         past.with_stopped_label(words)
     }
 
-    /// Records that the camera, moved with keys since request `since`, has been written to the scene. This
-    /// counts as an edit that all entries since that request include.
+    /// Records that a camera that has been moved with keys since request `since` was written to the scene.
+    /// This counts as an edit, which all entries since that request include.
     pub(super) fn record_saved_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
@@ -126,8 +126,8 @@ impl History {
         }
     }
 
-    /// Adds an image. It replaces an earlier image of the same request, or the last entry if both show the
-    /// same image.
+    /// Adds an image. It replaces any earlier image from the same request, or the last entry's image if it
+    /// looks the same.
     pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
@@ -140,7 +140,7 @@ impl History {
                     // Edits since then had no visible effect.
                     self.read_edits = past.edits;
                 }
-                // If the image is the same, keep its origin.
+                // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
                 let origin = if is_same { past.origin.merged_with_later(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
@@ -209,7 +209,7 @@ impl History {
         }
     }
 
-    /// Drops a request's unfinished entry.
+    /// Drops the unfinished entry for a request.
     pub(super) fn drop_unfinished(&mut self, generation: u64) {
         let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
         if let Some(at) = self.past.iter().position(is_it) {
@@ -252,7 +252,7 @@ impl History {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
-        // If `c` wrote the camera to the scene, the change is listed as an edit, not as a camera movement.
+        // If `c` wrote the camera to the scene, list the change as an edit, not as a camera movement.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
         let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
@@ -296,7 +296,7 @@ impl History {
         self.show_entry(next, newest)
     }
 
-    /// Whether moving back by `back` entries, or forward if `back` is negative, reaches the newest one.
+    /// Whether moving `back` entries back (forward if negative) reaches the newest one.
     pub(super) fn returns_to_newest(&self, back: isize) -> bool {
         let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
         place.is_some_and(|place| place + 1 >= self.past.len())
@@ -588,7 +588,7 @@ mod tests {
         history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
         history.record_saved_camera(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
-        assert_eq!(before.generation, 1, "the image before the camera moved");
+        assert_eq!(before.generation, 1, "expected the image before the camera moved");
     }
 
     #[test]
@@ -599,7 +599,7 @@ mod tests {
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
-    /// Origin of an image, given the text of its scene and its view.
+    /// Creates an image's origin from its scene text and view.
     fn origin(text: &str, view: Option<View>) -> ImageOrigin {
         let toggles = KeyOverrides { view, ..KeyOverrides::default() };
         ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }

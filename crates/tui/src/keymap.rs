@@ -10,12 +10,12 @@ use super::messages;
 pub(super) struct Binding<A = Action> {
     /// Keys that trigger the action.
     pub keys: &'static [KeyPress],
-    /// Label in the help. Empty if the previous row covers the key.
+    /// Label in the help. Empty if the label in the previous row covers this key.
     pub label: &'static str,
     pub action: A,
-    /// Description in the help. Empty if the previous row covers the key.
+    /// Description in the help. Empty if the previous row describes this key.
     pub help: &'static str,
-    /// The word shown in the key line. Empty if the key line omits the key.
+    /// The word shown in the key line. Empty if the key is not listed there.
     pub hint: &'static str,
 }
 
@@ -140,7 +140,7 @@ pub(super) enum OverlayAction {
     Close,
 }
 
-/// Key bindings of the overlays.
+/// Key bindings for overlays.
 pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
     binding(
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
@@ -182,8 +182,8 @@ pub(super) fn overlay_action_for(key: KeyPress) -> Option<OverlayAction> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The action for a key. Terminals differ in whether they report shift with a capital letter or `?`, so shift
-/// is ignored for characters.
+/// Returns the action for a key. Shift is ignored for characters, because not all terminals report it with a
+/// capital letter or `?`.
 pub(super) fn action_for(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,

@@ -1,6 +1,6 @@
-//! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` is the path of the
-//! scene file. If the file contains `broken`, reading it fails; if it contains `panic`, the worker panics.
-//! Pressing `w` makes the front end panic.
+//! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` is the scene file's
+//! path. Reading a file that contains `broken` fails, and a file that contains `panic` makes the worker
+//! panic. Pressing `w` makes the front end panic.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -1,4 +1,4 @@
-//! Front-end messages and labels. Tests refer to them by name, so rewording a message does not break a test.
+//! Front-end messages and labels. Tests refer to them by name, so rewording a message breaks no test.
 
 use std::fmt::Display;
 
@@ -7,7 +7,7 @@ pub const NO_SCENE: &str = "no scene loaded";
 
 /// Shown when the camera was moved with keys.
 pub const CAMERA_MOVED: &str = "camera moved (preview only). w: save image · c: keep in scene · 0: reset";
-/// Shown when the camera has returned to the scene's own position.
+/// Shown when the camera has returned to its position in the scene.
 pub const CAMERA_RESET: &str = "camera reset";
 /// Shown when the camera cannot be moved closer.
 pub const CLOSEST: &str = "closest zoom reached";
@@ -100,19 +100,19 @@ pub fn unnumbered_render(state: &str) -> String {
 /// Label for a render that is older than the newest one.
 pub const OLDER: &str = "older";
 
-/// Text with the displayed render's position among the finished renders.
+/// Position of the displayed render among the finished renders.
 pub fn render_position(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
-/// Label for the number of stages that were not run again.
+/// Word for stages that were not run again.
 pub const CACHED: &str = "cached";
-/// Text with the number of stages that were not run again.
+/// Number of stages that were not run again, with a label.
 pub fn cached_stages(stages: &str) -> String {
     format!("{stages} {CACHED}")
 }
 
-/// Text with the time between saving the file and drawing the first changed cell.
+/// Time from saving the file to drawing the first changed cell.
 pub fn save_to_screen_time(time: &str) -> String {
     format!("on screen after {time}")
 }
@@ -124,9 +124,9 @@ pub fn render_number(number: impl Display) -> String {
 
 /// Label for a render that was stopped.
 pub const STOPPED: &str = "stopped";
-/// Change listed for the first render in the history.
+/// Listed instead of changes for the first render in the history.
 pub const OPENED: &str = "opened";
-/// Change listed for a render that differs from the previous one only in noise.
+/// Listed instead of changes for a render that differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
 /// Shown when depth of field was requested for a camera without a lens.
@@ -211,7 +211,7 @@ pub fn view_chosen(name: &str) -> String {
 /// Shown when the photon view was selected while photons were off.
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
-/// Shown when another render's checkpoint was renamed.
+/// Shown when a checkpoint from another render was renamed.
 pub fn checkpoint_kept(file: &str) -> String {
     format!("kept another render's checkpoint as {file}")
 }
@@ -226,14 +226,14 @@ pub fn output_changed(file: &str, how: &str) -> String {
     format!("{file} {how} · w: write it again")
 }
 
-/// Shown when another program modified an output file so that `w` does not replace it.
+/// Shown when another program modified an output file, which `w` will therefore not replace.
 pub fn output_kept(file: &str, how: &str) -> String {
     format!("{file} {how} · name another file with -o")
 }
 
-/// Shown when the displayed image is not saved in a file.
+/// Shown when the displayed image has not been saved.
 pub const NOT_SAVED: &str = "not saved · w: save it";
-/// Shown when the displayed image is not saved in a file, and `w` cannot save it.
+/// Shown when the displayed image has not been saved and `w` cannot save it.
 pub const NOT_SAVED_WITH_CONFLICT: &str = "not saved";
 /// Part of messages about changes made with keys. Omitted when `w` cannot write the image.
 pub const WRITE_HINT: &str = "w: save image · ";
@@ -242,12 +242,12 @@ pub fn unfinished_image(file: &str) -> String {
     format!("{file} is unfinished · w: write it again")
 }
 
-/// Shown when `w` wrote an image with these changes, and another one is displayed.
+/// Shown when `w` wrote an image with these changes but another image is displayed.
 pub fn image_with(file: &str, changes: &str) -> String {
     format!("{file} was written with {changes}")
 }
 
-/// Shown when `w` wrote an image with these changes, and the scene's own image is displayed.
+/// Shown when `w` wrote an image with these changes but the scene's own image is displayed.
 pub fn other_image_with(file: &str, changes: &str) -> String {
     format!("{} · w: write this image", image_with(file, changes))
 }
@@ -284,7 +284,7 @@ pub fn renders_on_changes(file: &str) -> String {
     format!("re-renders when {file} changes")
 }
 
-/// Text about the cost of sending the last preview.
+/// Describes the bytes and round-trip time for sending the last preview.
 pub fn preview_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
     let round_trip = round_trip_ms.map_or(String::new(), |time| format!(" · {time} ms round trip"));
     format!("{kilobytes} kB sent{round_trip}")
@@ -302,5 +302,5 @@ pub fn noise_target(share: &str) -> String {
 pub const HELP_TOGGLE: &str = "show or hide this help";
 /// Help text for stage times.
 pub const HELP_STAGE_TIME: &str = "stage time (difference from the last render)";
-/// Help text for the cost of sending a preview.
+/// Help text for a preview's byte count and round-trip time.
 pub const HELP_BYTES: &str = "bytes sent for this render; terminal round trip";

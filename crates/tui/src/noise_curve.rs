@@ -1,6 +1,6 @@
-//! Noise over render time.
+//! Noise as a function of render time.
 
-/// Maximum number of points. When it is exceeded, every second point is dropped.
+/// Maximum number of points. If there are more, every second point is dropped.
 const MAX: usize = 256;
 /// Minimum ratio between the times of successive points. It is a ratio because the time axis is logarithmic.
 const STEP: f64 = 1.02;

@@ -13,7 +13,7 @@ pub use crate::pipeline::watch::{Changed, ExternalChange, OutputChange, WatchUpd
 choice! {
     /// How to draw the preview.
     pub enum PreviewChoice {
-        /// The finest blocks the terminal is known to support, or ASCII characters without color support.
+        /// The finest blocks that the terminal is known to support, or ASCII characters if it lacks color.
         Auto = "auto",
         /// Two pixels per cell.
         HalfBlock = "halfblock",
@@ -46,10 +46,9 @@ pub struct Options {
     pub color: ColorChoice,
     /// How to draw the preview.
     pub preview: PreviewChoice,
-    /// Height of a cell divided by its width. If `None`, the terminal is queried, and 2 is used if it does
-    /// not reply.
+    /// Height of a cell divided by its width. `None` to query the terminal, with 2 as the default.
     pub cell_aspect: Option<f32>,
-    /// Minimum duration of a render that triggers a notification when it ends, unless the terminal is
+    /// How long a render must run before its end triggers a notification. None is sent while the terminal is
     /// focused. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
@@ -58,7 +57,7 @@ pub struct Options {
     pub events: Receiver<Event>,
     /// Slot for previews from the worker.
     pub previews: PreviewSlot,
-    /// Events from the file watcher. If the channel closes, a message is shown.
+    /// Events from the file watcher. If the channel closes, the front end shows a message.
     pub news: Receiver<WatchUpdate>,
 }
 
@@ -78,7 +77,7 @@ impl ExitStatus {
     /// SIGTERM.
     pub const TERMINATED: Self = Self(143);
 
-    /// Terminated by the signal with this number.
+    /// Terminated by a signal, specified by number.
     pub fn from_signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }
@@ -89,7 +88,7 @@ impl ExitStatus {
 pub struct TuiOutcome {
     /// The program's exit code.
     pub status: ExitStatus,
-    /// Whether the user requested an image that has been neither written nor refused yet.
+    /// Whether the user requested an image that has not been written or refused yet.
     pub is_write_unanswered: bool,
     /// One line that lists the written files with their sample counts and render times.
     pub summary: String,
@@ -97,8 +96,8 @@ pub struct TuiOutcome {
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.
     pub is_unwritten: bool,
-    /// Changes made with keys but saved neither in the scene nor in an image, formatted as command-line
-    /// options.
+    /// Changes that were made with keys and saved neither to the scene nor in an image, formatted as
+    /// command-line options.
     pub not_kept: Option<String>,
 }
 

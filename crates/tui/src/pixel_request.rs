@@ -53,7 +53,7 @@ impl ImageProtocolRequest {
         Self { protocol, route, is_known: protocol == ImageProtocol::Iterm && has_iterm }
     }
 
-    /// The query for the protocol. Empty if other queries cover it or it cannot be sent.
+    /// Returns the query for the protocol. Empty if other queries cover it or it cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (ImageProtocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
@@ -70,8 +70,8 @@ impl ImageProtocolRequest {
         if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
     }
 
-    /// Whether the device attributes arrive after all other replies. tmux answers that query itself before
-    /// passing on other queries.
+    /// Whether the device attributes arrive after all other replies. This is not the case inside tmux, which
+    /// answers that query itself before passing on others.
     pub(super) fn is_decided_by_attributes(self) -> bool {
         match (self.protocol, self.route) {
             (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct) => true,

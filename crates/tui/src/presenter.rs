@@ -21,7 +21,7 @@ use super::window_title::WindowTitle;
 use crate::film::Picture;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
-/// Frame interval. Limits output to 20 frames per second, except for responses to keys.
+/// Frame interval. Output is limited to 20 frames per second, except in response to keys.
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Draws the state to the terminal.
@@ -46,7 +46,7 @@ struct DrawnPreview {
     samples: f64,
     /// Time when this preview became the display's target.
     at: Option<Instant>,
-    /// Whether the slot contains a newer preview of the same request that was not worth sending yet.
+    /// Whether the slot contains a newer preview of the same request that is not worth sending yet.
     is_old: bool,
     /// Whether this is the first preview of its request.
     is_first: bool,
@@ -115,7 +115,7 @@ impl Presenter {
         }
     }
 
-    /// Number of cells in a preview, or an equivalent number for a preview drawn as pixels.
+    /// Returns the number of cells in a preview, or an equivalent number if it is drawn as pixels.
     fn preview_cells(&self, state: &State, picture: &Picture) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
@@ -171,14 +171,14 @@ impl Presenter {
         FrameExtras { later: drawn.later, links: files.map(link).collect() }
     }
 
-    /// Whether the connection is idle while a key moves the camera, meaning that the last preview is on the
-    /// screen at reduced precision and the next one has not arrived.
+    /// Whether the connection is idle while a key moves the camera. The last preview is then on the screen at
+    /// reduced precision and the next one has not arrived.
     fn has_room_to_refine(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
 
-    /// Records the preview being drawn. Returns whether it is new.
+    /// Records the preview being drawn. Returns true if it is new.
     fn record_preview(&mut self, state: &State, now: Instant) -> bool {
         let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {

@@ -1,4 +1,4 @@
-//! Ways of drawing the preview, chosen by the user and limited by the terminal.
+//! How the preview is drawn, as chosen by the user within the terminal's limits.
 
 use super::color::ColorDepth;
 use super::graphics::ImageProtocol;
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn preview_without_colors_is_a_ramp() {
+    fn preview_without_colors_uses_ascii() {
         assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::from_choice(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);

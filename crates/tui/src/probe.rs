@@ -1,4 +1,4 @@
-//! Queries the terminal when the front end is not running, to report the terminal's capabilities.
+//! Queries the terminal's capabilities while the front end is not running.
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -163,7 +163,7 @@ fn read_replies(
     Ok(true)
 }
 
-/// Bytes received from the terminal, and the replies found in them.
+/// Bytes received from the terminal and the replies parsed from them.
 #[derive(Default)]
 struct ReceivedReplies {
     decoder: Decoder,
@@ -212,7 +212,7 @@ impl ReceivedReplies {
         }
     }
 
-    /// The first text between `begin` and `end` that does not contain an escape character.
+    /// Finds the first text between `begin` and `end` that does not contain an escape character.
     fn text_between(&self, begin: &[u8], end: u8) -> Option<String> {
         let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
         starts.into_iter().find_map(|(at, _)| {

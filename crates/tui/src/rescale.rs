@@ -11,7 +11,7 @@ pub(super) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
     Picture { width, height, pixels: resized_pixels(picture, width, height).into_owned() }
 }
 
-/// The pixels of the resized image. Downscaling averages the covered pixels in linear light, weighted by
+/// Returns the resized image's pixels. Downscaling averages the covered pixels in linear light, weighted by
 /// area. Upscaling repeats the nearest pixel.
 pub(super) fn resized_pixels(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
     if (picture.width, picture.height) == (width, height) {
@@ -28,7 +28,7 @@ pub(super) fn resized_pixels(picture: &Picture, width: u32, height: u32) -> Cow<
     Cow::Owned(pixels)
 }
 
-/// The source pixels covered by a target pixel along one axis, with the covered lengths.
+/// Returns the source pixels that a target pixel covers along one axis, with the length covered in each.
 fn covered_pixels(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));

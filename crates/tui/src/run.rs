@@ -25,7 +25,7 @@ use super::writer;
 use crate::pipeline::protocol::{self, Command};
 use crate::system::threads::spawn;
 
-/// Maximum time to spend planning a slice before it is sent and keys are handled.
+/// Maximum time to plan a slice before sending it and handling keys.
 const TURN: Duration = Duration::from_millis(3);
 
 /// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
@@ -36,7 +36,7 @@ const TURN: Duration = Duration::from_millis(3);
 pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     terminal::require_terminal()?;
     let depth = color::resolve_depth(options.color, |name| std::env::var(name).ok());
-    // Prevents crossterm from dropping named colors when NO_COLOR is set.
+    // Prevent crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
@@ -121,7 +121,7 @@ struct EventLoop {
     cell_aspect: Option<f32>,
 }
 
-/// Reasons for leaving the event loop.
+/// Why the event loop ended.
 enum LoopEnd {
     Quit(ExitStatus),
     Error(TuiError),
@@ -265,7 +265,7 @@ impl EventLoop {
             Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
-                // The window may have shrunk and grown again, cutting off its content.
+                // The window may have shrunk and grown back, which cuts off its content.
                 self.presenter.display.invalidate();
                 return self.update_window_size();
             }

@@ -1,4 +1,4 @@
-//! Signal handling, and detection of terminals that disappear without sending a signal.
+//! Handles signals and detects terminals that disappear without sending one.
 //!
 //! Signals are handled on separate threads because the event loop may be blocked by a terminal that does not
 //! accept output, or by endless input. If the event loop does not react to a terminating signal, these
@@ -54,7 +54,7 @@ fn linux_signals() -> impl Iterator<Item = i32> {
 /// A signal used to wake the signal thread. No other program sends it, and it is ignored by default.
 const MARK: i32 = SIGURG;
 
-/// Signal handler. Dropping it restores the signals' default effects.
+/// Signal handler. Dropping it restores the default actions.
 pub(super) struct SignalListener {
     over: Arc<AtomicBool>,
 }
@@ -92,7 +92,7 @@ static HUNG_UP: AtomicBool = AtomicBool::new(false);
 /// Whether signals from the keyboard are handled by a child process.
 static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 
-/// Number of times the signal thread has handled all pending signals.
+/// Number of rounds in which the signal thread has handled all pending signals.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
 fn lock_round_count() -> MutexGuard<'static, u64> {
@@ -136,8 +136,8 @@ pub(super) fn set_child(id: Option<Pid>) {
     }
 }
 
-/// Forwards a terminating signal to the child. Only the first one is forwarded, because this process also
-/// receives the signals that it sends to its job.
+/// Forwards the first terminating signal to the child. Ignores later ones, because this process also receives
+/// the signals that it sends to its own job.
 fn forward_termination(number: Number) {
     let mut child = lock_child();
     if child.ending.replace(number).is_none()
@@ -292,7 +292,7 @@ pub(super) fn has_shell() -> bool {
     }
 }
 
-/// Stops the whole job with SIGTSTP, including any process that wraps glimt, just like ctrl-z outside raw
+/// Stops the whole job with SIGTSTP, including any wrapper process. This is what ctrl-z does outside raw
 /// mode.
 pub(super) fn stop_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)

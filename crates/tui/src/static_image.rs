@@ -33,9 +33,9 @@ pub struct NamedImage {
     pub picture: Picture,
 }
 
-/// Draws images as lines of text, side by side or, in a narrow terminal, below each other. Uses the
-/// terminal's colors, or ASCII characters without color support. Returns an empty string if the terminal has
-/// fewer than 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
+/// Draws images as lines of text, side by side, or stacked if the terminal is narrow. Uses the terminal's
+/// colors, or ASCII characters without color support. Returns an empty string if the terminal has fewer than
+/// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_depth(color, variable);
@@ -47,7 +47,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
-/// Window size and cell aspect ratio, with defaults for terminals that report a size of 0.
+/// Returns the window size and cell aspect ratio, with defaults for terminals that report a size of 0.
 fn window_size(window: &Window) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_terminals_stack_images_or_omit_them() {
+    fn narrow_terminals_stack_or_omit_images() {
         let lines = laid_out_lines((40, 24), ColorDepth::TrueColor);
         assert_eq!((lines.len(), lines[8].as_str()), (3 * 8, "b.png"), "{lines:?}");
         assert!(widest(&lines) <= 40, "{lines:?}");

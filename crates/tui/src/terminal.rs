@@ -1,8 +1,8 @@
 //! Terminal setup and restoration.
 //!
 //! A [`TerminalSession`] owns the terminal. The terminal is restored when the session is dropped, when the
-//! front-end thread panics (using a hook that is installed once), before the process stops, and by
-//! [`restore_from_other_thread`] if the front end is blocked.
+//! front-end thread panics, before the process stops, and by [`restore_from_other_thread`] if the front end
+//! is blocked.
 
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
@@ -47,7 +47,8 @@ static HAS_PROGRESS: AtomicBool = AtomicBool::new(false);
 static HAS_LINKS: AtomicBool = AtomicBool::new(false);
 /// Whether the terminal stores images that must be deleted.
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
-/// The thread whose panics restore the terminal. Panic messages from other threads are stored in [`PANIC`].
+/// The thread that owns the terminal. Its panics restore the terminal. Panic messages from other threads are
+/// stored in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// Message from the last panic in another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
@@ -61,7 +62,7 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
-/// Other terminal changes that glimt may have made, and the bytes that undo each of them.
+/// Other terminal changes that glimt may have made, each with the bytes that undo it.
 static CHANGES: [(&AtomicBool, &[u8]); 4] = [
     (&HAS_LINKS, LINK_OFF),
     (&HAS_TITLE, TITLE_BACK),
@@ -72,7 +73,7 @@ static CHANGES: [(&AtomicBool, &[u8]); 4] = [
 /// text as part of the string.
 const STRING_END: &[u8] = b"\x1b\\";
 
-/// Height-to-width ratio of a cell whose half blocks are square.
+/// Height-to-width ratio of a cell with square half blocks.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// Typical cell size in pixels.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
@@ -109,7 +110,7 @@ impl TerminalSession {
 
     /// Sets up the terminal again.
     pub(super) fn resume(&mut self) -> io::Result<()> {
-        // A shell may have changed the modes while the process was stopped, so save them again.
+        // A shell may have changed the modes while the process was stopped, so save the current ones.
         if RAW.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
@@ -219,7 +220,7 @@ struct RestoreData {
     leave: Vec<u8>,
 }
 
-/// Prepares for restoring the terminal on abort, such as after a failed allocation.
+/// Prepares to restore the terminal on abort, for example after a failed allocation.
 fn prepare_abort() {
     LAST_WORDS.get_or_init(|| {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
@@ -267,8 +268,8 @@ pub(super) fn enable_focus_reports() {
     FOCUS.store(true, Ordering::Release);
 }
 
-/// Bytes to send before setting a window title. The first call returns the bytes that save the original
-/// title, and later calls return none.
+/// Bytes to send before setting a window title. The first call returns the sequence that saves the original
+/// title. Later calls return nothing.
 pub(super) fn title_saving_bytes() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
@@ -401,13 +402,13 @@ pub(super) fn query_window(cell_aspect: Option<f32>) -> Window {
     }
 }
 
-/// Maximum number of columns drawn, which is more than even a video wall has.
+/// Maximum number of columns drawn. Not even a video wall has more.
 const MAX_COLUMNS: u16 = 4096;
 /// Maximum number of cells drawn. A cell takes hundreds of bytes of memory, and terminals may report up to
 /// 65,535 columns and rows.
 const MAX_CELLS: u32 = 1 << 20;
 
-/// Limits a window to the maximum size that is drawn.
+/// Limits a window to the maximum size.
 fn limit_window(window: Window) -> Window {
     let columns = window.columns.min(MAX_COLUMNS);
     let most_rows = MAX_CELLS / u32::from(columns.max(1));
@@ -471,7 +472,7 @@ mod tests {
         record_links();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(title_saving_bytes(), KEEP_TITLE, "the new title is saved again");
+        assert_eq!(title_saving_bytes(), KEEP_TITLE, "the new title should be saved again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 

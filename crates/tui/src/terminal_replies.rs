@@ -7,7 +7,7 @@ use super::terminals::{TerminalBrand, TerminalId};
 /// The finest block characters that a terminal draws without using a font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlockGlyphs {
-    /// It is not known which block characters the terminal draws.
+    /// The block characters that the terminal draws are unknown.
     Unknown,
     /// Sextants (Unicode 13).
     Sextants,
@@ -16,8 +16,8 @@ pub(super) enum BlockGlyphs {
 }
 
 impl BlockGlyphs {
-    /// Block characters supported by a terminal version. All terminals listed here have supported sextants
-    /// for a long time.
+    /// Returns the block characters that a terminal version supports. All terminals listed here have long
+    /// supported sextants.
     pub(super) fn supported_by(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
             TerminalBrand::Kitty => [0, 40],

@@ -72,7 +72,7 @@ impl TerminalBrand {
         PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
     }
 
-    /// Whether this terminal, identified by `TERM_PROGRAM`, supports 24-bit color and REP.
+    /// Whether this terminal, as identified by `TERM_PROGRAM`, supports 24-bit color and REP.
     pub(super) fn supports_true_color_and_rep(self) -> bool {
         match self {
             Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -130,8 +130,8 @@ impl TerminalId {
         Some(Self { brand: *brand, version: parse_version(rest.get(1..).unwrap_or_default()) })
     }
 
-    /// Detects the terminal from environment variables. Returns `None` for unknown terminals, and inside tmux
-    /// or screen, which do not pass on the escape sequences.
+    /// Detects the terminal from environment variables. Returns `None` for unknown terminals and inside tmux
+    /// or screen, which do not pass on escape sequences.
     pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, TerminalBrand); 6] = [
             ("xterm-kitty", TerminalBrand::Kitty),

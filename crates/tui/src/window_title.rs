@@ -1,4 +1,4 @@
-//! The terminal's window title, progress bar, desktop notifications and clipboard.
+//! Window title, progress bar, desktop notifications and clipboard.
 //!
 //! All of these are sent after the preview, and only to terminals known to support them (see `terminals`).
 
@@ -10,13 +10,13 @@ use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// How long a render must run before the title and progress bar show it. The delay prevents flicker while the
-/// camera moves.
+/// How long a render must run before the title and progress bar show it. This delay prevents flicker while
+/// the camera moves.
 const SHORT: Duration = Duration::from_millis(500);
 /// Percentage step on slow connections.
 const COARSE: u32 = 10;
 
-/// Escape sequence that saves the window title, to be restored with [`TITLE_BACK`].
+/// Escape sequence that saves the window title for [`TITLE_BACK`].
 pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
 /// Escape sequence that restores the saved window title, or the default title if none was saved.
 pub(super) const TITLE_BACK: &[u8] = b"\x1b]2;\x1b\\\x1b[23;2t";
@@ -56,8 +56,8 @@ pub(super) struct WindowTitle {
 }
 
 impl WindowTitle {
-    /// Title and progress bar for the state, with larger percentage steps if `is_slow`. `None` to leave both
-    /// unchanged.
+    /// Determines the title and progress bar for the state. If `is_slow`, the percentage changes in larger
+    /// steps. `None` leaves both unchanged.
     pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
@@ -72,7 +72,7 @@ impl WindowTitle {
         })
     }
 
-    /// Bytes that change the title and progress bar from `self` to `to`.
+    /// Returns the bytes that change the title and progress bar from `self` to `to`.
     pub(super) fn changes(&self, to: &Self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {

@@ -39,7 +39,7 @@ impl WriteQueue {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next slice to write and returns it.
+    /// Waits for the next slice and returns it.
     fn wait_for_slice(&self) -> Vec<u8> {
         let mut waiting = self.lock();
         loop {
@@ -82,9 +82,9 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Opens the terminal connected to standard output, bypassing the buffer and lock of `stdout`, because a
-/// stalled writer could hold the lock. It is opened in nonblocking mode, which does not affect other users of
-/// the terminal.
+/// Opens the terminal connected to standard output. This bypasses the buffer and lock of `stdout`, because a
+/// stalled writer could hold the lock. The terminal is opened in nonblocking mode, which does not affect
+/// other users of the terminal.
 pub(super) fn open_output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
@@ -124,7 +124,7 @@ pub(super) fn discard_queued(patience: Duration) -> bool {
 /// Poll interval while the terminal does not accept output.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Writes all bytes unless `is_given_up` returns true.
+/// Writes all bytes, but stops if `is_given_up` returns true.
 pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn() -> bool) -> io::Result<()> {
     while !bytes.is_empty() {
         match out.write(bytes) {

@@ -12,7 +12,7 @@ const CELLS: [usize; 3] = [91, 124, 91];
 /// Distance below which two parts blend.
 const BLEND: f64 = 0.022;
 
-/// The ends and radii of each part. Parts off the center are mirrored.
+/// The ends and radii of each part. Off-center parts are mirrored.
 const PARTS: [[(Vector, f64); 2]; 8] = [
     // Trunk, head, snout.
     [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
@@ -26,9 +26,9 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
     [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
 ];
 
-/// Extracts the zero level set of the distance with surface nets (Gibson, *Constrained Elastic Surface Nets*,
-/// MICCAI 1998). Each cell that the surface crosses has one vertex, which is moved onto the surface. Each
-/// lattice edge that the surface crosses has one quad.
+/// Extracts the zero level set of the distance field with surface nets (Gibson, *Constrained Elastic Surface
+/// Nets*, MICCAI 1998). Each cell that the surface crosses has one vertex, which is moved onto the surface.
+/// Each lattice edge that the surface crosses has one quad.
 pub(crate) fn bear() -> Surface {
     let inside = inside_flags();
     let [nx, ny, nz] = CELLS;
@@ -70,7 +70,7 @@ pub(crate) fn bear() -> Surface {
     surface
 }
 
-/// Whether each lattice point is inside.
+/// Returns for each lattice point whether it is inside the bear.
 fn inside_flags() -> Vec<bool> {
     lattice_points(CELLS.map(|cells| cells + 1))
         .map(|at| bear_distance(lattice_position(at, 0.0)) < 0.0)
@@ -115,7 +115,7 @@ fn bear_distance([x, y, z]: Vector) -> f64 {
     })
 }
 
-/// Distance to a round cone: a ball that is swept from one end to the other while its radius changes.
+/// Distance to a round cone: a ball swept from one end to the other with a changing radius.
 fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
     let along = subtract(*to, *from);
     let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);

@@ -33,7 +33,7 @@ pub(crate) fn leaf_png() -> Vec<u8> {
     file
 }
 
-/// Half the width of the leaf at a given height.
+/// Half the leaf's width at height `v`.
 fn leaf_half_width(v: f64) -> f64 {
     let t = ((v - 0.1) / 0.88).clamp(0.0, 1.0);
     0.62 * t.sqrt() * (1.0 - t)
@@ -48,7 +48,7 @@ fn leaf_coverage(u: f64, v: f64) -> f64 {
     stalk.max(if is_inside { blade } else { 0.0 })
 }
 
-/// Green between light veins. The color extends past the border so that no other color bleeds in.
+/// Green with light veins. The color extends past the border so that no other color bleeds in.
 fn leaf_color(u: f64, v: f64) -> Vector {
     let side = (u - 0.5).abs();
     let along = (v * 9.0 - side * 7.0).rem_euclid(1.0);
@@ -72,7 +72,7 @@ pub(crate) fn shrub() -> Surface {
         let start = scale(outwards, 0.45 + 0.5 * chance(2));
         let sway = [chance(3) - 0.5, 0.2 - 0.9 * chance(4), chance(5) - 0.5];
         let up = unit(add(outwards, sway));
-        // Rotate the leaf about its stalk, mostly facing the sky.
+        // Rotate the leaf about its stalk so that it mostly faces the sky.
         let face = add([0.0, 1.0, 0.0], scale([chance(6) - 0.5, 0.0, chance(7) - 0.5], SQRT_2));
         let normal = unit(subtract(face, scale(up, dot(face, up))));
         let across = cross(up, normal);

@@ -113,7 +113,7 @@ fn cover() -> Surface {
     ])
 }
 
-/// The pages inside the cover of a book.
+/// The pages inside a book's cover.
 fn pages() -> Surface {
     block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }

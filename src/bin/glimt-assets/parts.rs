@@ -59,8 +59,8 @@ pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
     orient_outward(positions, faces, middle)
 }
 
-/// A hexahedron, given by the corners of its bottom face in order, followed by the corresponding corners of
-/// its top face.
+/// A hexahedron. `corners` contains the corners of its bottom face in order, then the corresponding corners
+/// of its top face.
 pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
     let middle = scale(corners.iter().fold([0.0; 3], |sum, &corner| add(sum, corner)), 0.125);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];

@@ -10,7 +10,7 @@ const SIDE: u32 = 512;
 const COURSES: f64 = 8.0;
 const BRICKS: f64 = 4.0;
 
-/// Renders a texture to sRGB bytes, rows from the top.
+/// Renders a texture to sRGB bytes, starting with the top row.
 fn render_srgb(side: u32, color: impl Fn(f64, f64) -> Vector) -> Vec<u8> {
     let middle = |index: u32| (f64::from(index) + 0.5) / f64::from(side);
     (0..side)
@@ -30,7 +30,7 @@ fn encode_png(side: u32, pixels: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Noise, quantized because invisible detail would make the file larger.
+/// Noise, quantized because invisible detail would only make the file larger.
 fn grain(u: f64, v: f64, seed: u64) -> f64 {
     let fine = fractal_noise([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
     (fine * 24.0).round() / 24.0

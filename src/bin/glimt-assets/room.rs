@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::vector::{Vector, add, cross, scale, sin_cos_turns, unit};
 
-/// Half the width, the height, and half the depth of the room.
+/// The room's half width, full height, and half depth.
 const ROOM: Vector = [1.3, 2.0, 1.2];
 
 struct ObjWriter {
@@ -82,7 +82,7 @@ pub(crate) fn obj() -> Vec<u8> {
     room.text.into_bytes()
 }
 
-/// The materials of the room.
+/// The room's materials.
 pub(crate) fn mtl() -> Vec<u8> {
     let text = "\
 # Materials of room.obj. Made by glimt-assets.

@@ -123,7 +123,8 @@ fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     ring
 }
 
-/// An icosahedron subdivided `times` times. `radius` returns the distance of a vertex for its direction.
+/// An icosahedron subdivided `times` times. `radius` returns a vertex's distance from the center, given its
+/// direction.
 pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
@@ -171,7 +172,7 @@ fn curve_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector
     (center, normal, cross(tangent, normal))
 }
 
-/// A point on a tube with this radius around a closed curve.
+/// A point on a tube of radius `radius` around a closed curve.
 fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
     let (center, normal, binormal) = curve_frame(s, curve);
     let (sin, cos) = sin_cos_turns(t);

@@ -16,19 +16,19 @@ use self::cases::{every_byte, mtl, obj, off, ply, stl};
 /// A JSON pointer, the value to set, and part of the expected message.
 const EDITS: &[(&str, &str, &str)] = &[
     ("/asset/version", r#""1.0""#, r#"glTF 1.0 is not supported; version 2 is required"#),
-    ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist: there are 1"#),
+    ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist; meshes has length 1"#),
     ("/nodes/0/mesh", r#"-1"#, r#"invalid value: integer `-1`"#),
     ("/nodes/0/children", r#"[0]"#, r#"nodes: there is no root because every node is a child"#),
-    ("/nodes/0/children", r#"[9]"#, r#"nodes[9] does not exist: there are 1"#),
+    ("/nodes/0/children", r#"[9]"#, r#"nodes[9] does not exist; nodes has length 1"#),
     (
         "/meshes/0/primitives/0/attributes/POSITION",
         r#"9"#,
-        r#"meshes[0].primitives[0]: POSITION: accessors[9] does not exist: there are 2"#,
+        r#"meshes[0].primitives[0]: POSITION: accessors[9] does not exist; accessors has length 2"#,
     ),
     (
         "/meshes/0/primitives/0/indices",
         r#"9"#,
-        r#"meshes[0].primitives[0]: indices: accessors[9] does not exist: there are 2"#,
+        r#"meshes[0].primitives[0]: indices: accessors[9] does not exist; accessors has length 2"#,
     ),
     (
         "/meshes/0/primitives/0/indices",
@@ -43,13 +43,17 @@ const EDITS: &[(&str, &str, &str)] = &[
     ("/accessors/0/componentType", r#"5124"#, r#"accessors[0]: unknown component type 5124"#),
     ("/accessors/0/type", r#""VEC9""#, r#"accessors[0]: unknown type "VEC9""#),
     ("/accessors/0/count", r#"4000000000"#, r#"accessors[0]: 4000000000 elements at byte 0 need"#),
-    ("/accessors/0/bufferView", r#"9"#, r#"accessors[0]: bufferViews[9] does not exist: there are 2"#),
+    (
+        "/accessors/0/bufferView",
+        r#"9"#,
+        r#"accessors[0]: bufferViews[9] does not exist; bufferViews has length 2"#,
+    ),
     (
         "/accessors/0/byteOffset",
         r#"1000000000000"#,
         r#"accessors[0]: 3 elements at byte 1000000000000 need 36 bytes, but bufferViews[0] has 36"#,
     ),
-    ("/bufferViews/0/buffer", r#"9"#, r#"bufferViews[0]: buffers[9] does not exist: there are 1"#),
+    ("/bufferViews/0/buffer", r#"9"#, r#"bufferViews[0]: buffers[9] does not exist; buffers has length 1"#),
     (
         "/bufferViews/0/byteLength",
         r#"4000000000"#,
@@ -58,13 +62,17 @@ const EDITS: &[(&str, &str, &str)] = &[
     (
         "/bufferViews/0/byteStride",
         r#"4"#,
-        r#"bufferViews[0]: invalid stride of 4 bytes for elements of 12 bytes"#,
+        r#"bufferViews[0]: invalid stride of 4 bytes for 12-byte elements"#,
     ),
     ("/buffers/0/byteLength", r#"4000000000"#, r#"buffers[0]: it claims 4000000000 bytes but has 44"#),
     ("/buffers/0/uri", r#""/etc/passwd""#, r#"buffers[0]: "/etc/passwd" is not a relative URI"#),
     ("/buffers/0/uri", r#""data:;base64,%%%%""#, r#"invalid base64 byte"#),
     ("/scene", r#"3"#, r#""#),
-    ("/meshes/0/primitives/0/material", r#"4"#, r#"nodes[0]: materials[4] does not exist: there are 0"#),
+    (
+        "/meshes/0/primitives/0/material",
+        r#"4"#,
+        r#"nodes[0]: materials[4] does not exist; materials has length 0"#,
+    ),
     (
         "/extensionsRequired",
         r#"["KHR_draco_mesh_compression"]"#,

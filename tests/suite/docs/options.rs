@@ -28,15 +28,15 @@ fn without_common(options: impl Iterator<Item = String>) -> BTreeSet<String> {
 fn option_tables_match_the_help() {
     let page = page("docs/command-line.md");
     for (heading, command) in [
-        ("Options of a render", ""),
-        ("Options of check", "check"),
-        ("Options of info", "info"),
-        ("Options of new", "new"),
-        ("Options of schema", "schema"),
-        ("Options of compare", "compare"),
-        ("Options of bench", "bench"),
-        ("Options of merge", "merge"),
-        ("Options of farm", "farm"),
+        ("Render options", ""),
+        ("Options for check", "check"),
+        ("Options for info", "info"),
+        ("Options for new", "new"),
+        ("Options for schema", "schema"),
+        ("Options for compare", "compare"),
+        ("Options for bench", "bench"),
+        ("Options for merge", "merge"),
+        ("Options for farm", "farm"),
     ] {
         let rows = page.rows(heading);
         let cells = rows.iter().flat_map(|row| codes(&row[0]));

@@ -8,7 +8,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     /// Names that exist only in other versions. They are rejected with a dedicated error message.
     const UNAVAILABLE: &'static [&'static str];
 
-    /// Name of the value.
+    /// The value's name.
     fn name(self) -> &'static str;
 
     /// A short description of this value.
@@ -88,8 +88,7 @@ mod tests {
     choice! {
         /// Numbers.
         enum Number {
-            /// One, which
-            /// has two lines.
+            /// The first number, described on two lines.
             One = "one",
             /// Two.
             Two = "2",
@@ -105,6 +104,6 @@ mod tests {
         assert_eq!(Number::ALL, [Number::One, Number::Two]);
         assert_eq!((Number::named("One"), Number::named("three")), (None, None));
         assert_eq!(Number::UNAVAILABLE, ["three"]);
-        assert_eq!(Number::One.meaning(), "One, which has two lines");
+        assert_eq!(Number::One.meaning(), "The first number, described on two lines");
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Progress callback. Receives the number of finished work units and the total.
+/// Progress callback. Receives the number of finished work units and the total number.
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
 /// Progress callback that ignores all reports.

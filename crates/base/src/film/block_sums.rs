@@ -1,4 +1,4 @@
-//! Allocates a film's block sums and closes complete blocks.
+//! Allocates a film's block sums, and fills them as blocks are completed.
 
 use super::Rect;
 use super::sum_order::SumOrder;
@@ -49,7 +49,7 @@ impl Film {
         Ok(self)
     }
 
-    /// Memory in bytes for a crop's sums in this summation order plus the full-size finished image.
+    /// Memory in bytes for a crop's sums in this summation order, and for the full-size finished image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
@@ -70,7 +70,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn block_sums_ignore_sample_grouping() {
+    fn sample_grouping_does_not_change_block_sums() {
         let mut next = unit(3);
         let values: Vec<f32> = (0..41).map(|_| next() * 1e3).collect();
         let add = |blocks: SumOrder, counts: &[usize]| {

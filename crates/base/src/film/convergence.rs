@@ -54,7 +54,7 @@ struct LevelSums {
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
-    /// Mean of the steps in the two halves of the samples. `None` for two samples.
+    /// Mean squared step within the two halves of the samples. `None` for two samples.
     before: Option<f64>,
 }
 
@@ -125,8 +125,8 @@ impl SquaredSteps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// Number of samples until a pixel with `count` samples is next recorded. Pixels are recorded at powers
-    /// of two and halfway between them.
+    /// Number of additional samples after which a pixel with `count` samples is recorded again. Pixels are
+    /// recorded at powers of two and halfway between them.
     pub(super) fn samples_to_next_step(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();
@@ -135,7 +135,7 @@ impl SquaredSteps {
         (next - count) as usize
     }
 
-    /// Records the luminance of a pixel in the given cell and half, at a count determined by
+    /// Records the luminance of a pixel in the specified cell and half, at a sample count determined by
     /// [`SquaredSteps::samples_to_next_step`].
     pub(super) fn record(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let rounded = luminance as f32;
@@ -164,7 +164,7 @@ impl SquaredSteps {
         self.last[pixel] = rounded;
     }
 
-    /// Squared steps of a half-cell at 2^`level` samples and one doubling earlier.
+    /// Squared steps in a half-cell at 2^`level` samples and one doubling earlier.
     fn step_pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
@@ -176,16 +176,15 @@ impl SquaredSteps {
         Some(StepPair { last, before })
     }
 
-    /// Squared steps of a half-cell at 2^`level` samples, then one, two and three doublings earlier.
+    /// Squared steps in a half-cell at 2^`level` samples and one, two and three doublings earlier.
     fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
         let StepPair { last, before } = self.step_pair(level, at, is_relative)?;
         let earlier = |back: usize| self.step_pair(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
-    /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of all
-    /// cells. `None` in the same cases as [`SquaredSteps::variance_reduction`], which returns the factor for
-    /// doubling.
+    /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of
+    /// every cell. `None` if unknown, including for fewer than 16 samples.
     fn quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
@@ -195,15 +194,15 @@ impl SquaredSteps {
             }
         }
         let [last, before, third, fourth] = sums;
-        // Compare the last step with the step at a quarter of the samples, and more conservatively the sum of
-        // the last two steps with the sum of the two before.
+        // Compare the last step with the step at a quarter of the samples. For a more conservative estimate,
+        // compare the sum of the last two steps with the sum of the previous two.
         let fall = (third / last).max(CAREFUL * (third + fourth) / (last + before));
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
-    /// Expected relative standard deviation of the sum of the steps at 2^`level` samples over the given
-    /// halves of all cells: 1 if a single pixel dominates, lower if many contribute. Ignores cells with fewer
-    /// samples.
+    /// Expected relative standard deviation of the squared steps at 2^`level` samples, summed over the
+    /// specified halves of all cells: 1 if a single pixel dominates, lower if many contribute. Ignores cells
+    /// with fewer samples.
     pub(super) fn variance_uncertainty(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
@@ -218,7 +217,7 @@ impl SquaredSteps {
         1.0 / (1.0 + DOUBT * spread * spread)
     }
 
-    /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of all
+    /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of all
     /// cells, or `None` if unknown. Ignores cells with fewer samples.
     pub(super) fn variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
@@ -252,8 +251,8 @@ const INDEPENDENT_RATE: f64 = 2.0;
 /// Maximum plausible variance reduction per doubling.
 const MOST_FALL: f64 = 12.0;
 
-/// Variance reduction up to which samples are assumed to be independent. A few bright pixels can cause this
-/// reduction by chance.
+/// Largest variance reduction that is attributed to independent samples, because a few bright pixels can
+/// cause it by chance.
 const CHANCE_FALL: f64 = 2.3;
 
 /// Fraction of the variance reduction above [`CHANCE_FALL`] that is expected to continue. The smooth parts of
@@ -264,7 +263,7 @@ const LASTING: f64 = 0.65;
 /// [`SquaredSteps::variance_uncertainty`].
 const DOUBT: f64 = 2.0;
 
-/// Fraction of the variance reduction over two steps that is trusted.
+/// Trusted fraction of a variance reduction measured over two steps.
 const CAREFUL: f64 = 0.8;
 
 /// Factor by which quadrupling independent samples reduces the variance.
@@ -280,8 +279,8 @@ const FOURFOLD_LASTING: f64 = 1.2;
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
-    /// Typical long-term exponent with which the variance falls as the sample count grows, regardless of the
-    /// latest steps.
+    /// Typical long-term exponent: the variance falls with this power of the sample count. Does not depend on
+    /// the latest steps.
     pub fn typical_exponent(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
@@ -289,15 +288,16 @@ impl Convergence {
         }
     }
 
-    /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of a tile.
+    /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
+    /// tile.
     fn variance_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
         steps
             .variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
-    /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the given
-    /// halves of a tile.
+    /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the
+    /// specified halves of a tile.
     pub(super) fn predicted_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
         expected_rate(
             Self::variance_reduction(steps, level, halves),
@@ -309,7 +309,7 @@ impl Convergence {
     /// at which it falls.
     ///
     /// The variance is the geometric mean of two predictions. The first is based on doublings: it averages
-    /// the last step and its prediction from the two steps before, since each of them is noisy. However,
+    /// the last step with a prediction from the two previous steps, because each step is noisy. However,
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
     pub(super) fn variance(
@@ -332,7 +332,7 @@ impl Convergence {
     }
 
     /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
-    /// predicted from its reduction over quadrupled sample counts. `None` for fewer than 16 samples.
+    /// predicted from the reduction per quadrupling of the sample count. `None` for fewer than 16 samples.
     fn variance_by_quadrupling(
         steps: &SquaredSteps,
         level: usize,
@@ -348,8 +348,8 @@ impl Convergence {
     }
 }
 
-/// Expected variance reduction at the next doubling, given the measured reduction `fall` and the confidence
-/// `trust` in it.
+/// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
+/// confidence in this measurement.
 fn expected_rate(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }

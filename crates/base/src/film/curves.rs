@@ -1,4 +1,4 @@
-//! Tone curves: map linear radiance to linear display light in [0, 1].
+//! Tone curves, which map linear radiance to linear display light in [0, 1].
 //!
 //! Every curve maps components in [0, 1e10] to [0, 1], preserves black and is monotonic for gray.
 

@@ -37,11 +37,11 @@ pub use sums::{Film, FilmError, SampleStats};
 
 use crate::math::Vec3;
 
-/// Tile width and height in pixels: 1024 pixels of 40 bytes fit in a core's L2 cache.
+/// Tile width and height in pixels: 1024 pixels at 40 bytes each fit in a core's L2 cache.
 pub const TILE_SIZE: u32 = 32;
 
-/// Cell width and height in pixels. Each cell of a tile is sampled according to its own noise. With smaller
-/// cells, fewer pixels are oversampled because of a nearby edge.
+/// Cell width and height in pixels. Each cell of a tile is sampled according to its own noise. Smaller cells
+/// mean that fewer pixels are oversampled only because they are near an edge.
 pub const CELL_SIZE: u32 = 16;
 
 const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
@@ -89,14 +89,15 @@ fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     Some((start, u32::try_from(length).ok()?))
 }
 
-/// An integrator's samples of a tile: `samples` consecutive radiances per pixel, in row-major order.
+/// An integrator's samples for a tile: `samples` consecutive radiances per pixel, in row-major order.
 #[derive(Clone, Debug)]
 pub struct TileSamples {
     /// Sampled pixels.
     pub pixels: Pixels,
     /// Samples per pixel.
     pub samples: u32,
-    /// `pixels.count() · samples` radiances, at positions drawn in proportion to the absolute pixel filter.
+    /// `pixels.count() · samples` radiances, at positions drawn in proportion to the pixel filter's absolute
+    /// value.
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobes>,

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::convergence::{Convergence, luminance};
 use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
 
-/// Sample count that reduces the standard error at `count` samples to a fraction `part`, if the variance
-/// falls with this power of the sample count.
+/// Sample count at which the standard error drops to `part` times its value at `count` samples, if the
+/// variance falls with this power of the sample count.
 pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
@@ -24,7 +24,7 @@ pub struct CellHalfNoise {
     pub power: f64,
 }
 
-/// Noise level of an image and its convergence rate.
+/// An image's noise level and convergence rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageNoise {
     /// Relative standard error: [`Film::relative_error`].
@@ -76,8 +76,9 @@ impl Film {
             .filter(|noise| noise.relative_error.is_finite())
     }
 
-    /// Standard error of the mean luminance of a complete image with independent pixel errors. `None` for
-    /// crops, for photons (which correlate the pixels' errors), and if a pixel has fewer than two samples.
+    /// Standard error of a complete image's mean luminance, assuming independent pixel errors. `None` for
+    /// crops, for photons (because they correlate the pixels' errors), and if a pixel has fewer than two
+    /// samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
         let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
         let is_apart = self.convergence == Convergence::Stratified;
@@ -144,14 +145,15 @@ impl Film {
         tile.steps.variance_reduction(tile.steps.level_count(), &[0, 1])
     }
 
-    /// Expected relative standard deviation of the variance measured over one half of a tile's cells: 1 if a
+    /// Expected relative standard deviation of a tile's variance, measured in one half of each cell: 1 if a
     /// single pixel dominates, lower if many pixels contribute. Ignores cells with fewer samples than others.
     pub fn tile_variance_uncertainty(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
         tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])
     }
 
-    /// Noise in one half of every cell in a tile. `None` in the same cases as [`Film::cell_half_noise`].
+    /// Noise in one half of every cell in a tile. `None` under the same conditions as
+    /// [`Film::cell_half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
@@ -220,7 +222,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// A single-row film with the given gray samples for each pixel.
+    /// A single-row film with these gray samples for each pixel.
     fn film(pixels: &[&[f32]]) -> Film {
         let film = Film::new(pixels.len() as u32, 1, None).expect("a film");
         for (x, values) in pixels.iter().enumerate() {
@@ -235,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn error_follows_from_the_last_steps() {
+    fn error_is_computed_from_the_last_steps() {
         // The steps are 1 and 0.5, and the variances are their squares. The mean luminance is 3.
         let error = film(&[&[4.0, 6.0], &[0.5, 1.5]]).relative_error().expect("an estimate");
         assert!((error - (1.25_f64 / 2.0).sqrt() / 3.0).abs() < 1e-6, "{error}");
@@ -293,13 +295,16 @@ mod tests {
             for convergence in [Convergence::Stratified, Convergence::Photons] {
                 let error =
                     film(&pixels).with_convergence(convergence).relative_error().expect("an estimate");
-                assert!((0.9..1.04).contains(&(error / exact)), "{count} samples: {error} is not {exact}");
+                assert!(
+                    (0.9..1.04).contains(&(error / exact)),
+                    "{count} samples: got {error}, expected {exact}"
+                );
             }
         }
     }
 
-    /// A 64 × 64 pixel film and the true root-mean-square error of its pixel means. `sample` returns a sample
-    /// given its index and the pixel's random bits. `truth` is the expected value.
+    /// A 64 × 64 pixel film and the true root-mean-square error of its pixel means. `sample` returns the
+    /// sample with this index for a pixel with these random bits. `truth` is the expected value.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");
@@ -326,7 +331,8 @@ mod tests {
         film.relative_error().expect("an estimate") / exact
     }
 
-    /// A van der Corput sequence with a random XOR per pixel. Each doubling fills the gaps.
+    /// A van der Corput sequence with a random XOR per pixel. Each doubling fills the gaps between earlier
+    /// numbers.
     fn filling(number: u32, bits: u32) -> f32 {
         ((number.reverse_bits() >> 8) ^ bits) as f32 / 16_777_216.0
     }
@@ -372,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn single_samples_have_no_estimate() {
+    fn single_samples_give_no_estimate() {
         assert_eq!(film(&[&[1.0, 2.0], &[1.0]]).relative_error(), None);
         assert_eq!(Film::new(40, 2, None).expect("a film").relative_error(), None);
         assert_eq!(film(&[&[0.0, 0.0]]).relative_error(), Some(0.0));

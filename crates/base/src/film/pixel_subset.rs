@@ -91,7 +91,7 @@ mod tests {
                 for number in 0..pixels.count() as u32 {
                     let (x, y) = pixels.position(number);
                     let index = (y - 8) * width + x - 3;
-                    assert_eq!(PixelSubset::half_containing(index, rect), half, "{x} {y} of {rect:?}");
+                    assert_eq!(PixelSubset::half_containing(index, rect), half, "({x}, {y}) in {rect:?}");
                     seen[index as usize] += 1;
                 }
             }
@@ -107,7 +107,7 @@ mod tests {
             let places = |at| [(at, line), (line, at), (at, (at + line) % 8), (at, (line + 7 - at) % 8)];
             for kind in 0..4 {
                 let first = (0..8).map(|at| places(at)[kind]).filter(|&(x, y)| half(x, y) == 0).count();
-                assert_eq!(first, 4, "line {line} of kind {kind}");
+                assert_eq!(first, 4, "line {line} in direction {kind}");
             }
         }
     }

@@ -12,14 +12,14 @@ const PIXELS: u64 = 4096;
 /// Samples per prepass pixel.
 pub const PREPASS_SAMPLES: u32 = 16;
 
-/// Brightness prepass of an image or crop.
+/// Brightness prepass for an image or crop.
 #[derive(Clone, Copy, Debug)]
 pub struct Prepass {
     crop: Rect,
 }
 
 impl Prepass {
-    /// Creates the prepass for the pixels of `crop`.
+    /// Creates the prepass for the pixels in `crop`.
     pub fn new(crop: Rect) -> Self {
         Self { crop }
     }

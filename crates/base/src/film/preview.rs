@@ -10,9 +10,9 @@ use super::resample::Axis;
 use super::{Film, Quantity, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
-/// Resizes a film with an exact box filter. Each tile's contribution is cached, so only changed tiles are
-/// processed in an update. Pixels without samples have zero weight. Preview pixels that cover only pixels
-/// without samples show the base image.
+/// Resizes a film with an exact box filter. Each tile's contribution is cached, so an update processes only
+/// the changed tiles. Pixels without samples have zero weight. Preview pixels that cover only pixels without
+/// samples show the base image.
 #[derive(Debug)]
 pub struct Previewer {
     quantity: Quantity,
@@ -57,7 +57,7 @@ impl Previewer {
         Self::of(Quantity::Radiance, width, height)
     }
 
-    /// Creates a previewer for the given quantity.
+    /// Creates a previewer that shows this quantity.
     pub fn of(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
@@ -85,9 +85,9 @@ impl Previewer {
         self.is_whole
     }
 
-    /// Processes changed tiles until `deadline` and returns whether all of them were processed. The next call
-    /// continues with the remaining tiles. Without a deadline, processes all changes. Different calls may
-    /// pass different films.
+    /// Processes changed tiles until `deadline`, and returns whether all of them were processed. The next
+    /// call continues with the remaining tiles. Without a deadline, processes all changes. Different calls
+    /// may pass different films.
     pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
@@ -110,8 +110,8 @@ impl Previewer {
         true
     }
 
-    /// Builds the preview from the processed tiles. Pixels without samples show `base`, a coarse image of any
-    /// size, or black if there is no base.
+    /// Builds the preview from the processed tiles. Pixels without samples show `base` (a coarse image of any
+    /// size), or black if there is no base.
     pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
@@ -192,7 +192,7 @@ impl TileContribution {
         self.cells.extend(sums.into_iter().map(|(sum, weight)| (sum.as_vec3(), weight as f32)));
     }
 
-    /// Adds this contribution to the given preview rows.
+    /// Adds this contribution to a range of preview rows.
     fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
         let width = self.width.max(1) as usize;
         let first = rows.start.saturating_sub(self.y) as usize;
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn base_shows_in_pixels_without_samples() {
+    fn pixels_without_samples_show_the_base() {
         // Every other row of the left half is rendered.
         let film = film(64, 64, None, |x, y| (x < 32 && y % 2 == 0).then_some(5.0));
         let base = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::splat(2.0)] };
@@ -304,7 +304,7 @@ mod tests {
         first.add(1, &samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
-        assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile is visible");
+        assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile should be visible");
         let second = film(30, 50, None, |x, y| Some(pattern(x, y)));
         assert_eq!(picture(&second), preview(&second, 9, 5, None));
     }

@@ -1,4 +1,4 @@
-//! Quantities that a film can display: the mean radiance or statistics of the samples.
+//! Quantities that a film can display: mean radiance and sample statistics.
 
 use super::convergence::{Convergence, pixel_variance};
 use super::sums::{Tile, tile_grid, tile_rect};
@@ -64,7 +64,7 @@ impl Film {
 }
 
 impl Tile {
-    /// Value of a quantity at pixel `index` of a tile that is `columns` wide. `None` if the pixel has no
+    /// Value of a quantity at pixel `index` of a tile with `columns` columns. `None` if the pixel has no
     /// samples.
     pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
@@ -74,7 +74,7 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel's luminance. 0 for a single sample, which does not allow an estimate.
+    /// Standard error of a pixel's luminance. 0 for a single sample, from which no error can be estimated.
     fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
@@ -105,7 +105,7 @@ mod tests {
     use crate::film::TileSamples;
     use crate::math::random::unit;
 
-    /// A film of 20 × 20 pixels with `count` gray samples each.
+    /// A 20 × 20 pixel film with `count` gray samples per pixel.
     fn film(count: u32, mut next: impl FnMut(u32) -> f32) -> Film {
         let film = Film::new(20, 20, None).expect("a film");
         let rect = Rect { x: 0, y: 0, width: 20, height: 20 };
@@ -123,12 +123,12 @@ mod tests {
             let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
             assert!((0.9..1.15).contains(&(mean / exact)), "{count}: {mean} {exact}");
             let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
-            assert!(spread < 20, "{count}: the error of {spread} pixels is far too small");
+            assert!(spread < 20, "{count}: the error is far too small in {spread} pixels");
         }
     }
 
     #[test]
-    fn noise_does_not_affect_noise_free_pixels() {
+    fn noisy_pixels_do_not_affect_distant_pixels() {
         let mut next = unit(3);
         // The right half is noisy.
         let half = film(16, |pixel| if pixel % 20 < 10 { 0.4 } else { next() });

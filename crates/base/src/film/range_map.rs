@@ -1,10 +1,10 @@
-//! Range mapping: maps data without an inherent brightness (distances, counts) to brightness, based on the
-//! range of values in view.
+//! Range mapping, which maps data without an inherent brightness (distances, counts) to brightness, based on
+//! the range of values in view.
 
 use super::RadianceImage;
 use crate::math::Vec3;
 
-/// Mapping of data values to brightness.
+/// Mapping from data values to brightness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum RangeMap {
     /// Leaves the values unchanged.
@@ -12,16 +12,16 @@ pub enum RangeMap {
     None,
     /// A mapping whose range is unknown until [`RangeMap::resolved_for`] sets it. Maps everything to black.
     Unresolved(DataKind),
-    /// A mapping to the given range.
+    /// A mapping for values in this range.
     Resolved(DataKind, DataRange),
 }
 
 /// Kind of data, which determines how its values map to brightness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DataKind {
-    /// Distances: the nearest is white, the farthest dark, and 0 (nothing hit) black.
+    /// Distances: the nearest is white, the farthest is dark, and 0 (no hit) is black.
     Distances,
-    /// Amounts: 0 is black and the largest white.
+    /// Amounts: 0 is black, and the largest is white.
     Amounts,
 }
 
@@ -150,7 +150,7 @@ mod tests {
 
     fn assert_near(values: &[f32], expected: &[f32]) {
         let off = values.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(off < 1e-6, "{values:?} are not {expected:?}");
+        assert!(off < 1e-6, "got {values:?}, expected {expected:?}");
     }
 
     #[test]
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn subpixel_objects_have_a_range() {
+    fn subpixel_objects_determine_the_range() {
         let range = RangeMap::Unresolved(DataKind::Distances)
             .resolved_for(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
             .range();

@@ -4,8 +4,8 @@ use super::{Film, Quantity, RadianceImage, Rect};
 use crate::math::Vec3;
 
 impl Film {
-    /// Copies a rectangle of pixels without scaling. Pixels without samples show `base`, a full image of any
-    /// size, or black if there is no base.
+    /// Copies a rectangle of pixels without scaling. Pixels without samples show `base` (a full image of any
+    /// size), or black if there is no base.
     pub fn section(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {

@@ -7,7 +7,7 @@ use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
 
-/// Error for bytes that are not a valid tile of the film.
+/// Error for bytes that do not encode a valid tile of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the data is not a valid tile of the image")]
 pub struct Malformed;
@@ -76,7 +76,7 @@ impl StoredTile {
         Ok(())
     }
 
-    /// Adds the sample counts of a tile after its blocks have been added.
+    /// Adds a tile's sample counts after its blocks have been added.
     pub fn add_counts(&mut self, of: &Self) {
         self.tile.counts.iter_mut().zip(&of.tile.counts).for_each(|(own, other)| *own += other);
         if let (Some(own), Some(other)) = (&mut self.tile.negative, &of.tile.negative) {
@@ -85,7 +85,7 @@ impl StoredTile {
     }
 }
 
-/// Pixel sums of a single block, which may be the block in progress.
+/// Pixel sums for a single block, which may be the block in progress.
 fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
@@ -223,7 +223,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Adds samples `range` of a fixed random sequence to each pixel of a 40 × 33 film.
+    /// Adds samples `range` from a fixed random sequence to each pixel of a 40 × 33 film.
     fn add(film: &Film, range: std::ops::Range<u32>, is_signed: bool) {
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");

@@ -36,7 +36,7 @@ impl SumOrder {
         }
     }
 
-    /// Index of the block sum that receives the block ending at `count` samples, or `None` inside a block.
+    /// Index of the block sum that receives the block ending at `count` samples, or `None` within a block.
     pub(super) fn finished_block(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {

@@ -10,7 +10,7 @@ use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
 
-/// Error from creating a film.
+/// Reason why a film could not be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// There is not enough memory.
@@ -20,9 +20,9 @@ pub enum FilmError {
         remedy(*.crop_helps)
     )]
     Memory {
-        /// Width of the image in pixels.
+        /// Image width in pixels.
         width: u32,
-        /// Height of the image in pixels.
+        /// Image height in pixels.
         height: u32,
         /// Bytes for the sums and the finished image.
         bytes: u64,
@@ -33,9 +33,9 @@ pub enum FilmError {
     /// The image would have no pixels.
     #[error("there are no pixels to render: the crop is outside the {width}×{height} image")]
     Empty {
-        /// Width of the image in pixels.
+        /// Image width in pixels.
         width: u32,
-        /// Height of the image in pixels.
+        /// Image height in pixels.
         height: u32,
     },
 }
@@ -55,7 +55,7 @@ fn remedy(crop_helps: bool) -> &'static str {
     }
 }
 
-/// Statistics of the samples per pixel.
+/// Range and mean of the sample counts per pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleStats {
     /// Minimum over all pixels.
@@ -157,7 +157,7 @@ impl Tile {
         self.steps.fill(area);
     }
 
-    /// Adds samples in order to one pixel in the given cell and half. Returns the number of non-finite
+    /// Adds consecutive samples to a pixel in the specified cell and half. Returns the number of non-finite
     /// samples. `lobes` contains the weight of the negative lobes and one flag per sample.
     fn add(
         &mut self,
@@ -239,7 +239,7 @@ impl Film {
         Self::with_memory_limit(u64::MAX, width, height, crop)
     }
 
-    /// Like [`Film::new`], but uses at most `most_bytes` of memory.
+    /// Like [`Film::new`], but uses at most `most_bytes` bytes of memory.
     ///
     /// # Errors
     /// [`FilmError`] as in [`Film::new`].
@@ -277,12 +277,12 @@ impl Film {
         Self { convergence, ..self }
     }
 
-    /// Width of the full image in pixels.
+    /// Width of the full image, in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Height of the full image in pixels.
+    /// Height of the full image, in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
@@ -297,7 +297,7 @@ impl Film {
         self.tiles.len()
     }
 
-    /// Pixels of a tile in the full image, or `None` beyond the last tile.
+    /// Rectangle that a tile covers in the full image, or `None` beyond the last tile.
     pub fn tile_rect(&self, tile: usize) -> Option<Rect> {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
@@ -307,12 +307,12 @@ impl Film {
         CELLS * self.tiles.len()
     }
 
-    /// Pixels of a cell in the full image, or `None` if it has no pixels.
+    /// Rectangle that a cell covers in the full image, or `None` if the cell has no pixels.
     pub fn cell_rect(&self, cell: usize) -> Option<Rect> {
         cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
     }
 
-    /// Indices of all tiles in rings from the center of the crop outward. Computed on the first call.
+    /// Indices of all tiles, in rings from the crop's center outward. Computed on the first call.
     pub fn tile_order(&self) -> &[usize] {
         self.order.get_or_init(|| tiles_in_rings(self.crop))
     }
@@ -393,7 +393,7 @@ fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }
 
-/// Cell that contains a pixel of a tile, and the cell's pixels.
+/// Cell that contains a pixel in a tile, and the cell's rectangle.
 fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;

@@ -83,7 +83,7 @@ fn tiles_partition_the_crop() {
 }
 
 #[test]
-fn tile_order_grows_from_the_center() {
+fn tiles_are_ordered_from_the_center_outward() {
     let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
     let rings: Vec<_> = film.tile_order().iter().map(|tile| (tile % 9).abs_diff(4)).collect();
     assert!(rings[..2].iter().all(|&ring| ring == 0), "{rings:?}");

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_are_monotonic_in_gray() {
+    fn tone_curves_are_monotonic_for_gray() {
         for &curve in Tonemap::ALL {
             let mut before = gray(curve, 0.0);
             assert!(before.abs() < 1e-6, "{curve:?} maps black to {before}");
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(gray(Tonemap::None, 0.25), 0.25);
         assert!((gray(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
         assert!((gray(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
-        // Reinhard works on luminance: pure red of radiance 1 has a luminance of 0.2126.
+        // Reinhard works on luminance: pure red with radiance 1 has a luminance of 0.2126.
         let red = tone(Tonemap::Reinhard).apply(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
         assert!((gray(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_inputs_stay_in_range() {
+    fn extreme_inputs_are_mapped_into_range() {
         let hostile =
             [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
         for &curve in Tonemap::ALL {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bit_output_matches_eight_bit() {
+    fn sixteen_bit_output_matches_eight_bit_output() {
         let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
         let image = RadianceImage { width: 1001, height: 1, pixels };
         let coarse = develop(&image, &tone(Tonemap::None)).pixels;
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn parallel_images_match_per_pixel_results() {
+    fn parallel_conversion_matches_per_pixel_conversion() {
         let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let mapping = tone(Tonemap::Aces);

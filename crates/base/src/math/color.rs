@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::elementary::pow;
 
-/// Added to the squared reference in relMSE to keep errors of black pixels finite. Errors are effectively
+/// Added to the squared reference in relMSE to keep the errors of black pixels finite. Errors are effectively
 /// absolute below a radiance of 0.1 and relative above it.
 pub const RELMSE_EPSILON: f64 = 0.01;
 
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn srgb_curve_matches_known_values() {
+    fn srgb_curve_matches_reference_values() {
         assert!((srgb_to_linear(0.5) - 0.214_041_14).abs() < 1e-6);
         assert!((linear_to_srgb(0.18) - 0.461_356).abs() < 1e-5);
         assert!((linear_to_srgb_f64(0.18) - 0.461_356_129_500_442).abs() < 1e-12);

@@ -1,14 +1,14 @@
 //! Rounds numbers to a few decimals for display.
 
-/// Rounds to a multiple of `step`, a power of ten, and returns the `f64` nearest to the result.
+/// Rounds to a multiple of `step` (a power of ten) and returns the `f64` nearest to the result.
 pub fn rounded(number: f64, step: f64) -> f64 {
     let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
     let whole = libm::round(number / step) * step;
     format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
 }
 
-/// Decimal step for coordinates at `distance` from the viewpoint: a power of ten between 1e-5 and 1e-4 times
-/// the distance.
+/// Decimal step for rounding coordinates at `distance` from the viewpoint: a power of ten between 1e-5 and
+/// 1e-4 times the distance.
 pub fn decimal_step(distance: f64) -> f64 {
     libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
 }

@@ -69,7 +69,7 @@ fn exp2_f64(x: f64) -> f64 {
 }
 
 /// Arc cosine of x in [−1, 1], within 2 ulp. Uses the arc sine for |x| up to ½ and the half-angle arc sine
-/// above, with the polynomial from Moshier's Cephes library.
+/// for larger |x|, with the polynomial from Moshier's Cephes library.
 #[inline(always)]
 pub fn acos(x: f32) -> f32 {
     let size = x.abs();

@@ -49,7 +49,7 @@ mod tests {
             (f.t.length(), 1.0),
             (f.s.cross(f.t).dot(f.n), 1.0),
         ] {
-            assert!((value - expected).abs() < 1e-6, "{n}: {value} is not {expected}");
+            assert!((value - expected).abs() < 1e-6, "{n}: got {value}, expected {expected}");
         }
     }
 

@@ -52,7 +52,7 @@ pub trait Simd: Copy {
     /// on the lane order but is the same on every instruction set.
     fn min_max(self, row: &F32x16, lanes: u32) -> [f32; 2];
 
-    /// Reciprocal of every lane. In a plain loop, compilers may divide only two lanes at a time.
+    /// Reciprocals of all lanes. In a plain loop, compilers may divide only two lanes at a time.
     fn reciprocals(self, row: &F32x16) -> F32x16;
 
     /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Use only for
@@ -87,8 +87,8 @@ macro_rules! reduce {
 pub struct PortableSimd;
 
 impl Simd for PortableSimd {
-    /// Reduces by halves. Compilers turn sums of single bits into sequential tests of each lane. `black_box`
-    /// forces them to compute the whole vector first.
+    /// Reduces by halves. Without `black_box`, which forces compilers to compute the whole vector first, they
+    /// would turn a sum of single bits into one test per lane.
     #[inline(always)]
     fn movemask(self, mask: &Mask) -> u32 {
         let mut row = std::hint::black_box(*mask);

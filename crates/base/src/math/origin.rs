@@ -11,9 +11,9 @@ const STEP: f64 = 64.0;
 /// changes.
 const OFF_POWERS: f64 = 1.37;
 
-/// Local origin for a scene of the given size around `place`. Returns 0 if `place` is near 0, and otherwise a
+/// Local origin for a scene of this size around `place`. Returns 0 if `place` is near 0, and otherwise a
 /// point on a grid whose spacing is a power of two. Subtracting the origin is therefore exact, and small
-/// changes of `place` do not move the origin.
+/// changes to `place` do not move the origin.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
     // Adding 0 converts −0 to 0.

@@ -127,7 +127,7 @@ impl<T: Soa, const N: usize> Soa for [T; N] {
     }
 }
 
-/// Bits of a mask in a packet. Bits above the number of lanes are 0.
+/// A packet of flags is a bit mask with one bit per lane. All higher bits are 0.
 impl Soa for bool {
     type Packet = u32;
 
@@ -157,9 +157,9 @@ impl Soa for bool {
 }
 
 /// Generates a struct and its packet form, in which each field is a packet. Fields may be numbers, vectors,
-/// arrays, and other structs with a packet form. Each field has a default value, which unused lanes contain.
-/// The packet may have further fields, listed after `with`, that concern all lanes. They are set to their
-/// defaults by [`Soa::splat`](crate::math::soa::Soa::splat).
+/// arrays, and other structs with a packet form. Each field has a default value, which is stored in unused
+/// lanes. The packet may have further fields, listed after `with`, that apply to all lanes. They are set to
+/// their defaults by [`Soa::splat`](crate::math::soa::Soa::splat).
 ///
 /// ```
 /// use glimt_base::math::Vec3;

@@ -169,7 +169,11 @@ mod tests {
             let count = f64::from(n * n);
             assert!((weight / count - 1.0).abs() < 4e-3, "{filter:?}: weight {}", weight / count);
             assert!((mean / count).abs() < 2e-3, "{filter:?}");
-            assert!((second / count - moment).abs() < 4e-3, "{filter:?}: {} is not {moment}", second / count);
+            assert!(
+                (second / count - moment).abs() < 4e-3,
+                "{filter:?}: got {}, expected {moment}",
+                second / count
+            );
         }
     }
 

@@ -6,7 +6,7 @@
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant2D {
     columns: usize,
-    /// For each row, the cumulative probability of all previous rows. Followed by 1.
+    /// For each row, the cumulative probability of all previous rows. The last element is 1.
     rows: Vec<f32>,
     /// Cumulative column probabilities within each row, `columns + 1` values per row.
     in_row: Vec<f32>,
@@ -62,7 +62,7 @@ impl PiecewiseConstant2D {
         self.rows[row + 1] - self.rows[row]
     }
 
-    /// Probability of sampling `column` given its row.
+    /// Probability of sampling `column` within its row.
     #[inline(always)]
     pub fn column_probability(&self, row: usize, column: usize) -> f32 {
         let sums = self.column_sums_in(row);

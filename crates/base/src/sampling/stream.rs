@@ -18,7 +18,7 @@ pub enum Dimension {
     LightChoice,
     /// Position on the chosen light.
     ChosenLight,
-    /// Choice of the selected lights that are tested with shadow rays.
+    /// Choice of which picked lights are tested with shadow rays.
     ShadowRayChoice,
     /// Choice between reflection and refraction.
     Fresnel,
@@ -35,9 +35,9 @@ pub enum Dimension {
     SpecularRoulette,
     /// Choice of the vertices at which photons are gathered, if the path has several.
     Gather,
-    /// Position in a density kernel, for the surface search trial with this index.
+    /// Position in a density kernel for the coverage trial with this index.
     Trial(u32),
-    /// Choice of the light that emits a photon, and of the emitting part of the light.
+    /// Choice of the light that emits a photon, and of the part of the light that emits it.
     PhotonLight,
     /// Whether a photon is aimed, and at which target.
     PhotonTarget,
@@ -115,7 +115,7 @@ pub struct SamplerPacket<const N: usize> {
 }
 
 impl<const N: usize> SamplerPacket<N> {
-    /// Creates samplers for the given samples of pixels (x, y) in the full image.
+    /// Creates samplers for one sample of each pixel (x, y) in the full image.
     #[inline(always)]
     pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
         let mut seeds = [0; N];
@@ -125,8 +125,8 @@ impl<const N: usize> SamplerPacket<N> {
         Self { seeds, samples: *samples }
     }
 
-    /// Returns two numbers in [0, 1) per sample, for a decision that is made `of` times per sample. The
-    /// numbers are well distributed over all repetitions and samples. The scramble changes every 2³² points.
+    /// Returns two numbers in [0, 1) per sample, for a decision made `of` times per sample. The numbers are
+    /// well distributed over all repetitions and samples. The scramble changes every 2³² points.
     #[inline(always)]
     pub fn pairs(&self, paths: &[u32; N], decision: Dimension, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);
@@ -224,7 +224,7 @@ mod tests {
                 assert_eq!([x, y], point, "number {i} of sample {sample}");
                 let row = SamplerPacket::new(2, &[3; 16], &[4; 16], &[sample; 16]);
                 let [x, y] = row.pairs(&[1; 16], Dimension::Fresnel, i as u32, n);
-                assert_eq!([x[i % 16], y[15]], point, "number {i} of sample {sample} in a row");
+                assert_eq!([x[i % 16], y[15]], point, "number {i} of sample {sample} in a packet");
             }
             let first = points(2, [3, 4, sample], Dimension::Fresnel, 1).next();
             assert_eq!(first, Some(own.pair(1, Dimension::Fresnel).to_array()));

@@ -31,7 +31,7 @@ pub fn triangle(u: Vec2) -> Vec3 {
     Vec3::new(b0, b1, 1.0 - b0 - b1)
 }
 
-/// Samples a uniform direction in a cone around z. The cone is given as 1 − cos of its half angle, which
+/// Samples a uniform direction in a cone around z. The cone is specified by 1 − cos of its half angle, which
 /// stays accurate for narrow cones.
 #[inline(always)]
 pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {

@@ -1,7 +1,7 @@
-//! Ends the process if an allocation fails or on abort(3): glimt restores the terminal, prints a message and
-//! exits with code 1.
+//! Ends the process when an allocation fails or abort(3) is called: glimt restores the terminal, prints a
+//! message and exits with code 1.
 //!
-//! Only this module and the SIMD kernels contain `unsafe` code. Everything that runs at the end is
+//! Only this module and the SIMD kernels contain `unsafe` code. All code that runs while the process ends is
 //! async-signal-safe (signal-safety(7)): it neither locks nor allocates.
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -25,11 +25,11 @@ static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 const FAILED: i32 = 1;
 
 /// The system allocator, extended to end the process with a message if an allocation fails. Otherwise, the
-/// standard library would print its own message and a backtrace. The exceptions are allocations with
-/// [`try_reserve_exact`](super::memory::try_reserve_exact).
+/// standard library would print its own message and a backtrace. Allocations with
+/// [`try_reserve_exact`](super::memory::try_reserve_exact) are exempt.
 pub struct Allocator;
 
-/// Ends the process if the allocation failed and its caller does not handle that.
+/// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
 fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() && !allocation_may_fail() {
@@ -115,7 +115,7 @@ fn end_with_message(words: Arguments<'_>) -> ! {
     let mut message = MessageBuffer::default();
     // Truncate messages that do not fit.
     let _ = writeln!(message, "{words}");
-    // SAFETY: standard error stays open for the lifetime of the process; if not, the write fails.
+    // SAFETY: standard error stays open for the lifetime of the process; otherwise, the write fails.
     let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, message.bytes());
     low_level::exit(FAILED)
 }

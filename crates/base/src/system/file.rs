@@ -52,8 +52,8 @@ pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     Ok((FileKind::of(path, &metadata), metadata))
 }
 
-/// File metadata for detecting changes. It changes if the file is replaced, and at every write unless two
-/// writes have the same timestamp.
+/// File metadata for detecting changes. It changes when the file is replaced and with every write, except if
+/// two writes have the same timestamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileStamp {
     device: u64,
@@ -67,7 +67,7 @@ pub struct FileStamp {
 }
 
 impl FileStamp {
-    /// Creates the stamp for a file with this metadata.
+    /// Creates the stamp from a file's metadata.
     pub fn new(metadata: &Metadata) -> Self {
         Self {
             device: metadata.dev(),
@@ -96,7 +96,7 @@ pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
 }
 
 /// Returns the reason not to replace this file, or `None` if it may be replaced. Read-only files are not
-/// replaced even by root.
+/// replaced, even by root.
 pub fn reason_not_to_replace(metadata: &Metadata) -> Option<&'static str> {
     match () {
         () if metadata.nlink() > 1 => Some("has other hard links, which would keep the old text"),

@@ -1,4 +1,4 @@
-//! Machine and process identities, for files in folders that several machines share.
+//! Machine and process identities, for files in folders shared by several machines.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -20,7 +20,7 @@ pub(super) fn allocation_may_fail() -> bool {
 /// [`Allocator`](super::abort::Allocator) ends the process.
 ///
 /// # Errors
-/// There is not enough memory.
+/// Returns an error if there is not enough memory.
 pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
     MAY_FAIL.set(true);
     let reserved = vec.try_reserve_exact(additional);
@@ -28,7 +28,8 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
     reserved
 }
 
-/// Returns the setting that keeps this process from mapping `bytes` more bytes of memory, if any.
+/// Returns the setting that prevents this process from mapping `bytes` more bytes of memory. `None` if there
+/// is enough room.
 pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let limits = [
@@ -44,7 +45,7 @@ pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
     limits.into_iter().find(|(resource, used, _)| is_exhausted(*resource, *used)).map(|(.., setting)| setting)
 }
 
-/// Returns a size listed in `/proc/self/status`, such as `VmSize:  1024 kB`. 0 if it is not listed.
+/// Returns a size listed in `/proc/self/status`, such as `VmSize:  1024 kB`. Returns 0 if it is not listed.
 fn status_bytes(status: &str, name: &str) -> u64 {
     let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
     let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
@@ -113,14 +114,14 @@ mod tests {
     }
 
     #[test]
-    fn sizes_in_the_process_status_are_bytes() {
+    fn process_status_sizes_are_converted_to_bytes() {
         let status = "Name:\tglimt\nVmPeak:\t   9000 kB\nVmSize:\t   8192 kB\nThreads:\t1\n";
         assert_eq!(status_bytes(status, "VmSize"), 8192 * 1024);
         assert_eq!(status_bytes(status, "VmData"), 0);
     }
 
     #[test]
-    fn only_requested_reservations_may_fail() {
+    fn only_fallible_reservations_may_fail() {
         let mut bytes = Vec::<u8>::new();
         assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
         assert!(!allocation_may_fail());
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn lowest_limit_of_all_ancestors_applies() {
+    fn lowest_limit_among_ancestors_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
         let bytes = |groups: &str| cgroup_limit(root, groups).map(|limit| limit.bytes);
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn version_1_uses_a_separate_folder() {
+    fn cgroup_version_1_uses_a_separate_folder() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
         let groups = "12:cpu,cpuacct:/job\n7:memory:/job\n0::/job\n";

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn error_texts_have_no_numbers_or_capitals() {
+    fn error_messages_have_no_numbers_or_capitals() {
         let said = |number: i32| describe_error(&Error::from_raw_os_error(number));
         assert_eq!(said(nix::libc::ENOENT), "no such file or directory");
         assert_eq!(said(nix::libc::EACCES), "permission denied");

@@ -9,13 +9,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{describe_error, memory};
 
-/// Address space of a thread: its stack (the standard library's default) and its signal stack.
+/// Address space used by a thread: its stack (with the standard library's default size) and its signal stack.
 const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
 
 /// Starts a thread.
 ///
 /// # Errors
-/// The system does not have enough memory or threads.
+/// Returns an error if the system has run out of memory or threads.
 pub fn spawn<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
@@ -32,7 +32,7 @@ pub fn core_count() -> usize {
 /// Starts a pool with one thread per core.
 ///
 /// # Errors
-/// The message from [`describe_start_failure`].
+/// Returns the message from [`describe_start_failure`].
 pub fn core_pool() -> std::result::Result<ThreadPool, String> {
     let threads = core_count();
     let failed = |error: &dyn Display| describe_start_failure(threads, false, &error);
@@ -44,7 +44,7 @@ pub fn core_pool() -> std::result::Result<ThreadPool, String> {
 /// library terminates the process if a new thread has no room for its signal stack.
 ///
 /// # Errors
-/// The system's error if memory runs out.
+/// Returns the system's out-of-memory error if the stacks do not fit.
 pub fn check_stack_space(threads: usize) -> Result<()> {
     match exhausted_limit(threads) {
         Some(_) => Err(Error::from_raw_os_error(nix::libc::ENOMEM)),
@@ -52,13 +52,13 @@ pub fn check_stack_space(threads: usize) -> Result<()> {
     }
 }
 
-/// Setting that leaves no room for the stacks of `threads` more threads.
+/// Setting whose limit leaves no room for the stacks of `threads` more threads.
 fn exhausted_limit(threads: usize) -> Option<&'static str> {
     memory::exhausted_limit((threads as u64).saturating_mul(STACK_BYTES))
 }
 
 /// Explains why `threads` threads could not be started and how to fix it. The system reports the same error
-/// for a lack of memory and a lack of threads.
+/// whether memory or threads run out.
 pub fn describe_start_failure(threads: usize, has_threads_option: bool, error: &impl Display) -> String {
     let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
     let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };

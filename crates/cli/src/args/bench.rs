@@ -10,7 +10,7 @@ use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
 pub(super) const HELP: &str = "\
-Each image is compared with two references with independent noise, using the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
+Each image is compared with two references whose noise is independent, using the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
 noise does not count as error. The error that images with different seeds have in common is the bias of the method. \
 References are cached in $XDG_CACHE_HOME/glimt/references or ~/.cache/glimt/references, and reused while the scene, its \
 files and the size are unchanged.
@@ -34,7 +34,7 @@ pub struct BenchArgs {
     /// Write all results as JSON, also for --baseline
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
-    /// Plot error against time as SVG
+    /// Write an SVG plot of error over time
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     pub plot: Option<PathBuf>,
     /// Replace files not written by glimt
@@ -44,10 +44,10 @@ pub struct BenchArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub baseline: Option<PathBuf>,
 
-    /// Samples per pixel to measure at, such as 1,4,16
+    /// Sample counts per pixel to measure, such as 1,4,16
     #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub samples: Vec<u32>,
-    /// Render times to measure at instead, such as 0.1,0.5,2
+    /// Render times to measure instead, such as 0.1,0.5,2
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = seconds, conflicts_with = "samples", help_heading = "Measurement")]
     pub time: Vec<f64>,
     /// Images per point, each with a different seed
@@ -62,12 +62,12 @@ pub struct BenchArgs {
     /// Height in pixels
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
-    /// Time limit, unless --samples and --time set the time
+    /// Time limit if neither --samples nor --time is used
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, default_value = "240", help_heading = "Measurement")]
     pub within: f64,
     /// Floating-point image to use as a reference
     ///
-    /// Can be given twice, for two references with independent noise.
+    /// Can be given twice, to use two references with independent noise.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_samples", "width", "height"], help_heading = "Measurement")]
     pub reference: Vec<PathBuf>,
     /// Samples per pixel of each reference

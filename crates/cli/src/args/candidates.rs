@@ -11,7 +11,7 @@ use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
-/// Words of the command line being completed, if the shell script does not pass them as arguments.
+/// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
 /// Stores the words of the command line for completers that depend on other arguments.
@@ -44,8 +44,8 @@ fn is_scene(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Completes `TABLE.KEY=VALUE` with keys of the scene on the command line. Without a scene, completes keys of
-/// the tables that every scene has.
+/// Completes `TABLE.KEY=VALUE` with keys from the scene on the command line. Without a scene, completes keys
+/// from the tables that every scene has.
 pub(crate) fn set_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
@@ -65,7 +65,7 @@ pub(crate) fn key_path_completer() -> ArgValueCompleter {
     })
 }
 
-/// Candidates that start with `typed`, for a scene with the source `text`.
+/// Returns candidates that start with `typed`, for a scene whose source is `text`.
 fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
@@ -96,7 +96,8 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
 /// A value and its description.
 type DescribedValue = (String, &'static str);
 
-/// Candidates for `path`, which ends with `=`: the path itself or, once it is fully typed, its values.
+/// Returns candidates for `path`, which ends with `=`: the path itself or, once it is fully typed, its
+/// values.
 fn path_candidates(
     path: &str,
     doc: &str,
@@ -112,7 +113,7 @@ fn path_candidates(
     fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
 }
 
-/// Named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
+/// Returns the named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
 fn named_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn set_completes_values_of_a_key() {
+    fn set_completes_key_values() {
         assert_eq!(
             offered("", "render.integrator="),
             ["render.integrator=whitted", "render.integrator=path"]

@@ -29,7 +29,7 @@ fn help_fits_the_requested_width() {
     }
 }
 
-/// Lines break only where the next word does not fit.
+/// Checks that lines break only where the next word does not fit.
 #[test]
 fn help_lines_break_only_when_full() {
     for columns in [80, 100, 140] {

@@ -1,4 +1,4 @@
-//! Arguments of `merge` and `farm`.
+//! Arguments for `merge` and `farm`.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use super::{Progress, candidates, listed, one_of};
 use crate::choice;
 use crate::tui::ColorChoice;
 
-/// Maximum number of parts of an image.
+/// Maximum number of parts per image.
 pub(super) const MAX_PARTS: u32 = 1 << 20;
 
 pub(super) const MERGE_HELP: &str = "\
@@ -78,7 +78,7 @@ pub struct FarmArgs {
     /// Container image with glimt, for kubernetes
     #[arg(long, value_name = "NAME", default_value = concat!("glimt:", env!("CARGO_PKG_VERSION")))]
     pub image: String,
-    /// Volume claim with the scene and the output, mounted at /work, for kubernetes
+    /// Volume claim for kubernetes; holds the scene and the output, mounted at /work
     #[arg(long, value_name = "NAME", default_value = "glimt")]
     pub claim: String,
     /// Colors: auto, truecolor, 256, 16, none

@@ -3,7 +3,7 @@
 use super::results::{MethodResult, Results, StepResult};
 use super::statistics::{student_t_quantile, student_t_tail, welch_difference};
 
-/// Family-wise false positive rate of the whole table.
+/// Family-wise false positive rate for the whole table.
 const FALSE_POSITIVE_RATE: f64 = 0.01;
 
 /// Change in a method's time or error on a scene.
@@ -15,13 +15,13 @@ pub struct MethodChange {
     pub method: String,
     /// The compared quantity.
     pub quantity: Quantity,
-    /// Geometric mean over the steps of the new value divided by the old value.
+    /// Ratio of the new value to the old value, as the geometric mean over all steps.
     pub factor: f64,
-    /// 95 % confidence interval of the factor.
+    /// 95 % confidence interval for the factor.
     pub interval: [f64; 2],
-    /// Two-sided p-value of the change.
+    /// Two-sided p-value for the change.
     pub by_chance: f64,
-    /// Whether the change is significant, with a Bonferroni correction over all comparisons.
+    /// Whether the change is significant, after a Bonferroni correction for all comparisons.
     pub is_real: bool,
 }
 
@@ -117,13 +117,13 @@ fn log_difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Op
 /// Formats the comparison as lines.
 pub fn format_changes(changes: &[MethodChange], name: &str) -> Vec<String> {
     if changes.is_empty() {
-        return vec![format!("{name} has no scene, size, method and step in common with this run")];
+        return vec![format!("{name} shares no combination of scene, size, method and step with this run")];
     }
     let mut lines = vec![format!("compared with {name}, 95 % confidence intervals:")];
     lines.extend(changes.iter().map(format_change));
     let sure = (1.0 - FALSE_POSITIVE_RATE) * 100.0;
     lines.push(format!(
-        "SLOWER, WORSE, faster and better are significant at {sure:.0} % confidence over all lines."
+        "SLOWER, WORSE, faster and better mark changes significant at {sure:.0} % over all lines."
     ));
     lines
 }

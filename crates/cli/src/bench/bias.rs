@@ -1,4 +1,4 @@
-//! Bias of a method: the error common to images with different seeds, but absent from the references.
+//! Bias of a method: the error that images with different seeds share, but the references do not.
 //!
 //! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias because the
 //! noise in all four images is independent. Its standard error is estimated from the variance of the pairs,
@@ -22,7 +22,7 @@ pub struct Bias {
     pub size: f64,
     /// Standard error of `size`.
     pub error: f64,
-    /// One-sided p-value of the hypothesis of no bias.
+    /// One-sided p-value for the null hypothesis of no bias.
     pub by_chance: f64,
     /// Upper confidence bound on `size`.
     pub bound: f64,
@@ -81,7 +81,8 @@ impl PairwiseErrorProducts {
         sum / count
     }
 
-    /// Variance of the mean, assuming no bias. The products of different pairs are then uncorrelated.
+    /// Returns the variance of the mean, assuming no bias. In that case, the products of different pairs are
+    /// uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -126,8 +127,8 @@ mod tests {
             ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
         }
 
-        /// Gray of 0.5 + `offset` plus noise. Each block of `block`² pixels shares one noise value, like
-        /// pixels lit by the same photon.
+        /// Returns an image with gray value 0.5 + `offset`, plus noise. Each block of `block`² pixels shares
+        /// one noise value, like pixels lit by the same photon.
         fn picture(&mut self, noise: f32, offset: f32, block: u32) -> RadianceImage {
             const SIDE: u32 = 32;
             let mut picture = RadianceImage::black(SIDE, SIDE);

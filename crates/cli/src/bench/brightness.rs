@@ -17,7 +17,7 @@ pub struct Brightness {
     pub value: f64,
     /// Standard error of `value`.
     pub error: f64,
-    /// Two-sided p-value of the hypothesis of no bias.
+    /// Two-sided p-value for the null hypothesis of no bias.
     pub by_chance: f64,
 }
 
@@ -29,8 +29,8 @@ impl Brightness {
 }
 
 /// Compares the mean brightness of images, each rendered with a different seed, to the mean brightness of the
-/// references. `are_pixels_independent` must be false with photons, which correlate the errors of pixels. Returns
-/// `None` for fewer than [`MIN_SEEDS`] images or for black references.
+/// references. `are_pixels_independent` must be false with photons, because they correlate pixel errors.
+/// Returns `None` for fewer than [`MIN_SEEDS`] images or for black references.
 pub fn compare_brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
@@ -85,7 +85,8 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Gray of 0.5 · (1 + `brighter`), with independent noise per pixel and an offset shared by all pixels.
+    /// Returns an image with gray value 0.5 · (1 + `brighter`), independent noise per pixel, and an offset
+    /// shared by all pixels.
     fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
         let all = shared * (2.0 * next() - 1.0);
         let pixels = (0..SIDE * SIDE)
@@ -113,8 +114,8 @@ mod tests {
             let by_relmse = estimate_bias(&references, &pictures).expect("enough seeds");
             assert!(!by_relmse.is_found(), "seed {seed}: the bias should be undetectable in relMSE");
         }
-        // One percent is 4.7 standard errors, and the threshold is 3.3. The test therefore misses 8 % of the seeds,
-        // 3.3 of 40 on average. Allow 8.
+        // One percent is 4.7 standard errors, and the threshold is 3.3. The test therefore misses 8 % of the
+        // seeds, or 3.3 out of 40 on average. Allow 8.
         assert!(missed <= 8, "{missed}");
         // The normalized errors have mean 0 and standard deviation 1.
         let count = f64::from(SEEDS);
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn few_images_or_black_references_return_none() {
+    fn too_few_images_or_black_references_give_none() {
         let mut next = unit(7);
         let references = references(&mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();

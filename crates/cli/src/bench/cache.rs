@@ -17,7 +17,8 @@ use crate::output::write::WritePolicy;
 use crate::output::{AttributeLossPolicy, OutputError, staged, write};
 use crate::scene::fingerprint::{FingerprintHasher, Key};
 
-/// The cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
+/// Returns the cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither
+/// `XDG_CACHE_HOME` nor `HOME` is set.
 pub fn cache_folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
@@ -30,7 +31,8 @@ pub fn cache_folder() -> Option<PathBuf> {
 /// The folder or the file cannot be created, or a different file with this name exists.
 pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
-    // Use one folder per version of the scene, because a scene next to the references may belong to the user.
+    // Use one subfolder per version of the starter scene, because a scene file directly in the cache folder
+    // may belong to the user.
     let folder = folder.join(format!(
         "starter-{}",
         &FingerprintHasher::new("starter").bytes(text).finish().to_string()[..16]
@@ -139,7 +141,7 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Resu
     write::atomic_guarded(&path, &bytes, &guard, &CancelToken::new())
 }
 
-/// Whether a file may be replaced: it is missing, empty, or a cached reference, even a damaged one.
+/// Whether a file may be replaced because it is missing, empty or a (possibly damaged) cached reference.
 fn is_replaceable(path: &Path) -> bool {
     const HEAD_BYTES: u64 = 1 << 10;
     let Ok(file) = fs::File::open(path) else { return path.symlink_metadata().is_err() };

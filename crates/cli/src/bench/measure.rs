@@ -17,7 +17,7 @@ use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
-/// Default ratio of samples between consecutive steps.
+/// Default ratio between the sample counts of consecutive steps.
 const SAMPLE_RATIO: u32 = 4;
 
 /// Sample count or time limit of one step.
@@ -68,7 +68,7 @@ impl MethodRun<'_> {
         Ok(MethodResult::new(self.method.name.clone(), setup_seconds(&first.report), steps))
     }
 
-    /// The next step, given the previous steps and their durations in seconds.
+    /// Chooses the next step from the previous steps and their durations in seconds.
     fn next(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
@@ -160,7 +160,7 @@ impl MethodRun<'_> {
         self.run.report_begin(&what, left);
     }
 
-    /// Expected factor by which the time grows from the previous step.
+    /// Returns the expected ratio of this step's time to the previous step's time.
     fn expected_time_growth(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
@@ -170,7 +170,7 @@ impl MethodRun<'_> {
         }
     }
 
-    /// Expected total time of the later steps, relative to this step.
+    /// Returns the expected total time of all later steps, as a multiple of this step's time.
     fn later_steps_time(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {

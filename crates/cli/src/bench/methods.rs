@@ -9,9 +9,9 @@ use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 pub struct MethodSweep {
     /// Integrators.
     pub integrators: Vec<Integrator>,
-    /// Photon mapping, in whitted.
+    /// Whether to use photon mapping in whitted.
     pub photons: Vec<bool>,
-    /// Shadows, in whitted.
+    /// Shadow types in whitted.
     pub shadows: Vec<Shadows>,
     /// Limits on the radiance per bounce.
     pub clamps: Vec<f32>,

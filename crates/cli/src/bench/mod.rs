@@ -1,7 +1,8 @@
-//! Measures error against time for scenes × methods × sample counts × seeds, with two references per scene.
+//! Measures error over time for all combinations of scenes, methods, sample counts and seeds, with two
+//! references per scene.
 //!
-//! [`run()`] executes a [`BenchRequest`] and returns [`Results`]. [`table`], [`csv`] and [`plot`] present them, and [`baseline`]
-//! compares them with an older run. References are stored in a [`cache`].
+//! [`run()`] executes a [`BenchRequest`] and returns [`Results`]. [`table`], [`csv`] and [`plot`] present
+//! them, and [`baseline`] compares them with an earlier run. References are stored in a [`cache`].
 
 pub mod baseline;
 mod bias;

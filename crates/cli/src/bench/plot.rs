@@ -15,10 +15,10 @@ const PANEL: (u32, u32) = (640, 480);
 /// Panels per row.
 const ACROSS: usize = 2;
 
-/// Draws the plots of all scenes as one SVG document.
+/// Draws the plots for all scenes as one SVG document.
 ///
 /// # Errors
-/// An error from the plotting library.
+/// Returns errors from the plotting library.
 pub fn draw_svg(results: &Results) -> Result<String, String> {
     let across = results.scenes.len().clamp(1, ACROSS);
     let down = results.scenes.len().div_ceil(ACROSS).max(1);
@@ -78,7 +78,7 @@ mod tests {
                 .filter(|node| node.has_tag_name("polyline") && node.attribute("stroke") == Some(color))
                 .count()
         };
-        assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "expected a line per method in each panel");
+        assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "expected one line per method in each panel");
         let root = document.root_element();
         assert_eq!((root.attribute("width"), root.attribute("height")), (Some("1280"), Some("480")));
     }

@@ -20,9 +20,9 @@ pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 /// Sample count too large to be reached within the time limit.
 const UNLIMITED_SAMPLES: u32 = 1 << 24;
 
-/// Ratio of the references' samples to the largest measured sample count.
+/// Ratio of the reference sample count to the largest measured sample count.
 const REFERENCE_RATIO: u32 = 100;
-/// Lower bound on the largest measured sample count, for references with few samples.
+/// Lower bound on the largest measured sample count, even if the references have few samples.
 const MIN_MEASURED: f64 = 16.0;
 
 /// Maximum sample count to measure by default.
@@ -44,22 +44,22 @@ pub(super) struct ReferenceQuality {
 }
 
 impl ReferenceQuality {
-    /// The best quality possible in the given time, but no better than needed to measure `most` samples.
+    /// Requests the best quality possible in this time, but no better than needed to measure `most` samples.
     pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
         let samples = most
             .map_or(UNLIMITED_SAMPLES, |most| most.saturating_mul(REFERENCE_RATIO).min(UNLIMITED_SAMPLES));
         Self { samples, seconds: Some(seconds) }
     }
 
-    /// Whether cached references are good enough: they have enough samples, or took at least half of the
-    /// requested time.
+    /// Whether cached references are good enough, because they have enough samples or took at least half of
+    /// the requested time.
     fn is_met(self, cost: ReferenceCost) -> bool {
         cost.samples >= f64::from(self.samples)
             || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
     }
 }
 
-/// The references of a scene, with warnings.
+/// A scene's references, and a warning if they could not be cached.
 pub(super) struct SceneReferences {
     pub(super) two: TwoReferences,
     pub(super) result: ReferenceResult,
@@ -127,7 +127,7 @@ impl ReferenceRenderer<'_> {
         Some(reference(stored, true, Vec::new(), None))
     }
 
-    /// Renders both references. Calls `begin` before each one with the number of references left.
+    /// Renders both references. Calls `begin` before each one and passes it the number of references left.
     pub(super) fn render_both(
         &self,
         session: &mut Session,
@@ -178,7 +178,7 @@ impl ReferenceRenderer<'_> {
 }
 
 /// The cache key of the references. It depends on the build, because builds may render differently, and on
-/// whether the references are limited by samples or by time.
+/// whether samples or time limit the references.
 fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
     let mut key = FingerprintHasher::new("references");
     key.text(build).u64(asked.unwrap_or(0).into());
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn measured_samples_are_limited_to_1_percent() {
         assert_eq!(max_measured_samples(Some(25_600.0)), 256.0);
-        assert_eq!(max_measured_samples(Some(400.0)), 16.0, "fewer samples are too few for a slope");
+        assert_eq!(max_measured_samples(Some(400.0)), 16.0, "a slope needs at least this many samples");
         assert_eq!(max_measured_samples(Some(1e9)), 65_536.0);
         assert_eq!(max_measured_samples(None), 65_536.0, "unknown samples");
     }

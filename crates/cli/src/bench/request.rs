@@ -14,7 +14,8 @@ use crate::scene::diagnostic::Diagnostic;
 pub struct BenchRequest {
     /// Scene files.
     pub scenes: Vec<PathBuf>,
-    /// Overrides for all images and references. Size, samples, seed, time and noise threshold are ignored.
+    /// Overrides that apply to all images and references. Size, samples, seed, time and noise threshold are
+    /// ignored.
     pub common: Overrides,
     /// Width in pixels. The default is computed from the height and the scene's aspect ratio.
     pub width: Option<u32>,
@@ -22,15 +23,15 @@ pub struct BenchRequest {
     pub height: Option<u32>,
     /// Settings that define the methods.
     pub toggles: MethodSweep,
-    /// Samples or times to measure at.
+    /// Sample counts or render times to measure.
     pub steps: StepSchedule,
     /// Images per step.
     pub seeds: u32,
     /// Seed of the first image.
     pub seed: u32,
-    /// Source of the references.
+    /// Where the references come from.
     pub reference: ReferenceSource,
-    /// Time limit in seconds if neither samples nor times are given.
+    /// Time limit in seconds if neither samples nor times are specified.
     pub within: f64,
     /// Folder for cached references. `None` disables the cache.
     pub cache: Option<PathBuf>,
@@ -38,7 +39,7 @@ pub struct BenchRequest {
     pub targets: Vec<PathBuf>,
 }
 
-/// Samples or times of each step.
+/// Sample count or render time of each step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum StepSchedule {
     /// 1, 4, 16, … samples while time remains, up to 1 % of the references' samples.
@@ -50,19 +51,19 @@ pub enum StepSchedule {
     Seconds(Vec<f64>),
 }
 
-/// Source of the references.
+/// Where the references come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ReferenceSource {
     /// Path traced in the available time, with up to 100 times the largest requested sample count.
     #[default]
     InTime,
-    /// Path traced with the given samples per pixel.
+    /// Path traced with this many samples per pixel.
     Samples(u32),
     /// Two image files, which may be the same file.
     Files([PathBuf; 2]),
 }
 
-/// Events of a benchmark.
+/// Events reported during a benchmark.
 #[derive(Clone, Debug)]
 pub enum BenchEvent {
     /// A task begins.
@@ -76,7 +77,7 @@ pub enum BenchEvent {
     Done(String),
     /// A step is done. Contains a point for the plot.
     Point {
-        /// The scene's path as given by the caller.
+        /// The scene's path as passed by the caller.
         scene: String,
         /// The method's name, as shown in tables.
         method: String,
@@ -89,7 +90,7 @@ pub enum BenchEvent {
     Warnings(Vec<Diagnostic>),
 }
 
-/// A benchmark that ended early, with the results so far.
+/// The error and the partial results of a benchmark that ended early.
 #[derive(Clone, Debug)]
 pub struct UnfinishedBenchmark {
     /// Why the benchmark ended early.

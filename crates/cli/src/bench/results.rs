@@ -7,7 +7,7 @@ use super::brightness::Brightness;
 use super::slope::{Slope, TimeToError, mean_loglog_slope, time_to_error};
 use super::statistics::mean_and_error;
 
-/// Target errors. The results include the time at which each is reached.
+/// Target errors. The results include the time needed to reach each of them.
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Results of a benchmark.
@@ -26,7 +26,7 @@ pub struct Results {
 /// Results of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneResult {
-    /// The scene's path as given by the caller.
+    /// The scene's path as passed by the caller.
     pub scene: String,
     /// Width in pixels.
     pub width: u32,
@@ -38,22 +38,23 @@ pub struct SceneResult {
     pub methods: Vec<MethodResult>,
 }
 
-/// The references of a scene.
+/// A scene's references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceResult {
     /// Samples per pixel of each reference. `None` for files.
     pub samples: Option<f64>,
-    /// relMSE of one reference, estimated from the difference between the two. 0 if both are the same file.
+    /// relMSE of each reference, estimated from the difference between the two references. 0 if both are the
+    /// same file.
     pub noise: f64,
     /// Seconds spent rendering both references, possibly in an earlier run.
     pub seconds: Option<f64>,
     /// Whether the references were loaded from the cache.
     pub is_cached: bool,
-    /// The reference files, if given.
+    /// The reference files. Empty if the references were rendered.
     pub files: Vec<String>,
 }
 
-/// Results of a method on a scene.
+/// Results for one method on one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
     /// Name shown in tables.
@@ -62,9 +63,9 @@ pub struct MethodResult {
     pub setup_seconds: f64,
     /// The steps in order of time.
     pub steps: Vec<StepResult>,
-    /// Slope of error over time on log–log axes, from all steps.
+    /// Slope of error over time on log–log axes, fitted to all steps.
     pub slope: Option<Slope>,
-    /// Slope of error over time on log–log axes, from the last two steps.
+    /// Slope of error over time on log–log axes between the last two steps.
     pub last_slope: Option<Slope>,
     /// Times to reach `TARGETS`.
     pub time_to: [Option<TimeToError>; TARGETS.len()],
@@ -75,21 +76,21 @@ pub struct MethodResult {
 /// Results for one sample count or one time limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepResult {
-    /// Samples per pixel. With a time limit, the median.
+    /// Samples per pixel. For a time limit, the median over the images.
     pub samples: f64,
     /// The time limit in seconds.
     pub budget: Option<f64>,
-    /// Median time of photon mapping and rendering in seconds.
+    /// Median time for photon mapping and rendering, in seconds.
     pub seconds: f64,
     /// Median relMSE.
     pub relmse: f64,
     /// Minimum and maximum relMSE.
     pub spread: [f64; 2],
-    /// Standard error of each relMSE due to reference noise.
+    /// Standard error that reference noise adds to each relMSE.
     pub uncertainty: f64,
     /// The estimated bias. `None` if there are too few images.
     pub bias: Option<Bias>,
-    /// Difference in brightness from the references. `None` if there are too few images.
+    /// Difference in brightness between the images and the references. `None` if there are too few images.
     #[serde(default)]
     pub brightness: Option<Brightness>,
     /// The individual images.
@@ -103,7 +104,7 @@ pub struct ImageResult {
     pub seed: u32,
     /// Average samples per pixel.
     pub samples: f64,
-    /// Time of photon mapping and rendering in seconds.
+    /// Time for photon mapping and rendering, in seconds.
     pub seconds: f64,
     /// relMSE of the image. May be negative if it is below the noise of the references.
     pub relmse: f64,
@@ -120,7 +121,7 @@ pub enum BiasVerdict {
         /// Upper confidence bound on the squared bias.
         bound: f64,
     },
-    /// There is a bias that decreases with more samples.
+    /// There is a bias, which decreases as samples are added.
     Falls {
         /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
@@ -183,7 +184,8 @@ impl MethodResult {
     }
 }
 
-/// One series per image number: the first image of every step, the second of every step, and so on.
+/// Groups the results into one series per image number: the first image of every step, the second image of
+/// every step, and so on.
 fn group_by_image(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
     let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);

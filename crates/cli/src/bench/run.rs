@@ -73,7 +73,8 @@ fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// Size of a scene's benchmark images: `asked`, completed with the scene's aspect ratio or a default size.
+/// Returns the size of a scene's benchmark images: `asked`, with missing dimensions computed from the scene's
+/// aspect ratio and a default size.
 pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
@@ -105,7 +106,7 @@ fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
     Err(BenchError::Call(format!("--seed {} is too large: {way_out}", order.seed)))
 }
 
-/// A benchmark run on one scene.
+/// A benchmark of one scene.
 pub(super) struct SceneRun<'a> {
     pub(super) order: &'a BenchRequest,
     pub(super) path: &'a Path,
@@ -113,7 +114,7 @@ pub(super) struct SceneRun<'a> {
     tell: &'a dyn Fn(BenchEvent),
 }
 
-/// Error message for a scene that was saved while it was measured.
+/// Error message for a scene that was saved while it was being measured.
 fn changed_during_measurement(scene: &Path) -> String {
     format!("{} or one of its files changed during the measurement; run the benchmark again", scene.display())
 }
@@ -121,7 +122,7 @@ fn changed_during_measurement(scene: &Path) -> String {
 /// A validated scene, ready to be measured.
 struct PreparedScene {
     scene: Arc<Scene>,
-    /// References given as files.
+    /// References specified as files.
     given: Option<SceneReferences>,
     /// Overrides shared by all images and the references.
     common: Overrides,
@@ -196,7 +197,7 @@ impl SceneRun<'_> {
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
 
-    /// Loads cached references if they are good enough, and otherwise renders new references.
+    /// Loads cached references if they are good enough. Otherwise, renders new references.
     fn reference(
         &self,
         session: &mut Session,
@@ -223,7 +224,7 @@ impl SceneRun<'_> {
         if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
     }
 
-    /// Error for a scene that was saved while it was measured.
+    /// Returns the error for a scene that was saved while it was being measured.
     pub(super) fn scene_changed_error(&self) -> BenchError {
         BenchError::Failed(Failure::Work(changed_during_measurement(self.path)))
     }
@@ -254,7 +255,7 @@ impl SceneRun<'_> {
             (false, None) => "from files".to_owned(),
         };
         self.report_done(&format!(
-            "references of {width}×{height} pixels {made}, relMSE {:.1e} each",
+            "{width}×{height}-pixel references {made}, relMSE {:.1e} each",
             result.noise
         ));
     }
@@ -275,7 +276,7 @@ impl SceneRun<'_> {
 }
 
 impl StepSchedule {
-    /// The largest number of samples, if known.
+    /// Returns the largest sample count, if known.
     fn most_samples(&self) -> Option<u32> {
         match self {
             Self::Samples(list) => list.iter().max().copied(),
@@ -362,7 +363,7 @@ mod tests {
         };
         let measured = run(&order, &CancelToken::new(), &save).expect("results of both scenes");
         for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
-            assert_eq!(method.steps[0].relmse, 0.0, "{}: measured the old version", method.name);
+            assert_eq!(method.steps[0].relmse, 0.0, "{}: the old version was measured", method.name);
         }
         // Only the second version of the scene has cached references.
         let again = |color| {
@@ -375,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_saved_during_measurement_fail() {
+    fn saving_a_scene_during_measurement_fails() {
         for moment in ["reference 2 of 2", "path, 1 sample, seed 2 of 2"] {
             let folder = tempfile::tempdir().expect("a folder");
             let order = two_scenes(folder.path());
@@ -403,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_saved_during_a_later_method_fail() {
+    fn saving_a_scene_during_a_later_method_fails() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let text =

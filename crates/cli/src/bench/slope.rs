@@ -1,4 +1,4 @@
-//! Convergence, as the slope of error over time on log–log axes.
+//! Convergence rates, as slopes of error over time on log–log axes.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,14 +7,14 @@ use super::statistics::mean_and_error;
 /// A slope on log–log axes: −1 for independent samples, 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slope {
-    /// Mean slope of all series.
+    /// Mean slope over all series.
     pub value: f64,
     /// Standard error across the series.
     pub error: f64,
 }
 
-/// Mean slope of independent series of times and errors. Skips errors that are zero or negative. `None` if no
-/// series has two points at different times.
+/// Returns the mean slope of independent series of (time, error) points. Skips errors that are zero or
+/// negative. `None` if no series has two points at different times.
 pub fn mean_loglog_slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
     let slopes: Vec<f64> = series.iter().filter_map(|points| fit_line(points)).collect();
     let (value, error) = mean_and_error(&slopes);
@@ -35,9 +35,9 @@ fn fit_line(points: &[(f64, f64)]) -> Option<f64> {
     (square > 1e-12).then(|| product / square)
 }
 
-/// The time at which the error reaches `target`, interpolated linearly on log–log axes or extrapolated from
-/// the last two points. `None` if the first error is below the target, the error does not decrease, or the
-/// time is more than 1000 times the last measured time.
+/// Returns the time at which the error reaches `target`, interpolated linearly on log–log axes or
+/// extrapolated from the last two points. `None` if the first error is below the target, the error does not
+/// decrease, or the time is more than 1000 times the last measured time.
 pub fn time_to_error(target: f64, points: &[(f64, f64)]) -> Option<TimeToError> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {

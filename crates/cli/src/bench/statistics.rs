@@ -1,6 +1,6 @@
 //! Medians, means and Student's t distribution.
 
-/// The median, or NaN for an empty slice.
+/// Returns the median, or NaN for an empty slice.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -12,7 +12,7 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// The mean and its standard error, which is infinite for a single value.
+/// Returns the mean and its standard error. The error is infinite for a single value.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -41,7 +41,7 @@ pub fn student_t_quantile(probability: f64, freedom: f64) -> f64 {
     high
 }
 
-/// The difference between the means, b − a, its standard error and its degrees of freedom
+/// Returns the difference between the means, b − a, with its standard error and degrees of freedom
 /// (Welch–Satterthwaite).
 pub fn welch_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     let ((mean_a, error_a), (mean_b, error_b)) = (mean_and_error(a), mean_and_error(b));

@@ -86,7 +86,7 @@ fn format_speed(method: &MethodResult) -> String {
     format!("setup {}{slope}", words::seconds(method.setup_seconds))
 }
 
-/// Describes when the target errors are reached.
+/// Describes how long it takes to reach each target error.
 fn format_target_times(method: &MethodResult) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
     let parts = times.map(|(target, TimeToError { seconds, is_measured })| {
@@ -108,7 +108,7 @@ pub(super) fn format_slope(Slope { value, error }: Slope) -> String {
     format!("{sign}{:.2} ± {error:.2}", value.abs())
 }
 
-/// Describes the bias of a method.
+/// Describes a method's bias.
 fn describe_bias(method: &MethodResult) -> String {
     let at =
         method.steps.last().map_or(String::new(), |step| format!(" at {}", format_samples(step.samples)));
@@ -128,7 +128,7 @@ fn describe_bias(method: &MethodResult) -> String {
     }
 }
 
-/// Describes the mean luminance at the last step.
+/// Describes how the mean luminance at the last step differs from the references.
 fn describe_brightness(method: &MethodResult) -> Option<String> {
     let brightness = method.steps.last()?.brightness?;
     let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());

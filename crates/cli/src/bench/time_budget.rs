@@ -12,11 +12,11 @@ pub(super) struct TimeBudget {
     /// Number of unfinished scenes.
     scenes: usize,
     methods: usize,
-    /// When the current scene should end, in seconds since the start.
+    /// Planned end of the current scene, in seconds since the start.
     scene_end: f64,
     /// Duration of the previous scene in seconds.
     last_scene: Option<f64>,
-    /// When the current scene began, in seconds since the start.
+    /// Start of the current scene, in seconds since the start of the benchmark.
     scene_begin: f64,
     /// Durations of this scene's finished methods, in seconds.
     done: Vec<f64>,

@@ -1,4 +1,4 @@
-//! `glimt bench`: measures error against time. Writes a table, CSV, JSON and a plot.
+//! `glimt bench`: measures error over time. Writes a table, CSV, JSON and a plot.
 
 mod chart;
 mod outputs;
@@ -42,7 +42,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let scenes = order.scenes.len();
     let outputs = BenchOutputs::check_args(args, &order.scenes, console)?;
     let baseline = outputs.read_baseline(console)?;
-    // The first signal stops measuring, the second stops writing results.
+    // The first signal stops measuring. The second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
@@ -90,7 +90,7 @@ fn print_results(results: &Results, baseline: Option<&(String, Results)>, consol
 /// The measurement thread.
 type Worker = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
 
-/// Starts the benchmark on a thread. Returns the receiver of its events and the thread.
+/// Starts the benchmark on a thread. Returns the thread and a receiver for its events.
 fn spawn_benchmark(
     order: BenchRequest,
     token: CancelToken,
@@ -115,14 +115,14 @@ fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     }
 }
 
-/// The result of a benchmark that panicked. The panic handler has already printed a message.
+/// Returns the result for a benchmark that panicked. The panic handler has already printed a message.
 fn panic_result() -> UnfinishedBenchmark {
     let what = "internal error: the renderer panicked".to_owned();
     UnfinishedBenchmark { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-/// Reports why the benchmark is unfinished. `scenes` contains the number of measured scenes and the total
-/// number.
+/// Reports why the benchmark did not finish. `scenes` contains the number of measured scenes and the total
+/// number of scenes.
 fn report_unfinished(
     error: &BenchError,
     ended: &ReceivedSignal,
@@ -174,7 +174,7 @@ fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Ex
         args.scenes.clone()
     };
     if let Some((_, twice)) = (0..).zip(&scenes).find(|(index, scene)| scenes[..*index].contains(scene)) {
-        return Err(console.fail(Exit::WRONG, &format!("{} is given twice", twice.display())));
+        return Err(console.fail(Exit::WRONG, &format!("{} is specified twice", twice.display())));
     }
     let outputs = [&args.csv, &args.json, &args.plot];
     Ok(BenchRequest {
@@ -205,7 +205,7 @@ fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Ex
     })
 }
 
-/// The requested steps, sorted and without duplicates.
+/// Returns the requested steps, sorted and without duplicates.
 fn requested_steps(args: &BenchArgs) -> StepSchedule {
     let (mut samples, mut seconds) = (args.samples.clone(), args.time.clone());
     samples.sort_unstable();
@@ -230,7 +230,7 @@ fn reference_source(args: &BenchArgs, scenes: usize, console: &Console) -> Resul
     }
 }
 
-/// Writes the scene that `glimt new` writes to the folder of cached references and returns its path.
+/// Writes the `glimt new` starter scene to the reference cache and returns its path.
 fn write_starter(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
     match folder.map(cache::write_starter_scene) {
         Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),

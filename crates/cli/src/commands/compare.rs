@@ -72,7 +72,7 @@ fn warn_about_same_file(args: &CompareArgs, console: &Console) {
     if identity.is_some() && identity == FileIdentity::of(&args.b) {
         let (a, b) = (args.a.display(), args.b.display());
         let which = if args.a == args.b {
-            format!("{a} is given twice")
+            format!("{a} is specified twice")
         } else {
             format!("{a} and {b} are the same file")
         };
@@ -87,7 +87,7 @@ struct ErrorImage<'a> {
 }
 
 impl<'a> ErrorImage<'a> {
-    /// Reports errors that can be detected before measuring.
+    /// Reports errors that can be detected before the measurement.
     fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format =
             Format::from_path(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
@@ -111,7 +111,7 @@ impl<'a> ErrorImage<'a> {
         }
     }
 
-    /// Writes the image. Returns a warning if the replaced file's properties could not be kept.
+    /// Writes the image. Returns a warning if properties of the replaced file could not be preserved.
     fn write(
         &self,
         args: &CompareArgs,
@@ -138,7 +138,8 @@ impl<'a> ErrorImage<'a> {
     }
 }
 
-/// Checks that the target, which resolves to `real`, is neither a compared image nor a part or checkpoint.
+/// Checks that the target, whose resolved path is `real`, is not one of the compared images, a part or a
+/// checkpoint.
 fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
     if is_part(real) {
         let reason = format!(
@@ -222,7 +223,7 @@ fn print_table(summary: &Summary<'_>, console: &Console) {
     format_table(summary, console.answer_columns()).iter().for_each(|line| console.print_line(line));
 }
 
-/// The table's lines, wrapped to `columns`.
+/// Formats the table as lines, wrapped to `columns`.
 fn format_table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
     let title = format!("{a} compared with reference {b}, {width}×{height} pixels");
@@ -238,7 +239,7 @@ fn format_table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// A row's values, followed by the description on the same line, or on the next line if it does not fit.
+/// Formats a row's values and its description, which is on the next line if it does not fit after the values.
 fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
     /// Minimum width of a description.
     const MIN_NOTE_COLUMNS: usize = 24;
@@ -258,10 +259,11 @@ fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
-/// Minimum z-score of a significant bias. Without bias, noise exceeds it about once in two million comparisons.
+/// Minimum z-score for a significant bias. If there is no bias, noise exceeds it about once in two million
+/// comparisons.
 const SIGNIFICANT_Z: f64 = 5.0;
 
-/// Note on a significant bias.
+/// Note appended if the bias is significant.
 const SIGNIFICANT: &str = ": significant, not explained by noise";
 
 /// Name, value, unit and description of each row.
@@ -362,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn only_large_z_is_significant() {
+    fn only_large_z_scores_are_significant() {
         for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
             let lines = format_table(&Summary { bias_z: Some(z), ..summary() }, None);
             let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");

@@ -1,4 +1,4 @@
-//! `glimt completions`: prints shell completion scripts and answers their requests.
+//! `glimt completions`: prints shell completion scripts and responds to their requests.
 //!
 //! The scripts call glimt for every completion, because tables, names and keys depend on the scene on the
 //! command line.

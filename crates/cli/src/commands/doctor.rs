@@ -50,7 +50,7 @@ fn describe_threads() -> String {
     }
 }
 
-/// Describes the terminal: one name and value per property.
+/// Describes the terminal as a list of property names and values.
 fn describe_terminal(probe: &Probe) -> Vec<(&'static str, String)> {
     let term = environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());

@@ -43,7 +43,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
 /// Minimum width for wrapping.
 const MIN_COLUMNS: usize = 16;
 
-/// Whether a table has a type with this name.
+/// Whether a table defines a type with this name.
 fn has_type(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
@@ -53,7 +53,7 @@ fn overview() -> String {
     tables().iter().map(line).collect()
 }
 
-/// Describes the key, type or table with this path. `None` if there is none.
+/// Describes the key, type or table at this path. `None` if the path is unknown.
 fn explain_path(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {
@@ -103,7 +103,7 @@ fn explain_path(path: &str) -> Option<String> {
     }
 }
 
-/// All keys with their full paths, such as `TABLE.TYPE.KEY`.
+/// Returns all keys with their full paths, such as `TABLE.TYPE.KEY`.
 fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
     tables().iter().flat_map(keys_of_table)
 }
@@ -143,7 +143,7 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
     text
 }
 
-/// Describes one of several keys on two lines: type, unit, range and default, followed by the description.
+/// Summarizes one of several keys in two lines: type, unit, range and default, followed by the description.
 fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
         Default::Required(_) => "required".to_owned(),
@@ -198,7 +198,7 @@ fn unknown_path_message(path: &str) -> String {
     let parts: Vec<&str> = path.split('.').collect();
     let (first, last) =
         (parts.first().copied().unwrap_or_default(), parts.last().copied().unwrap_or_default());
-    // Suggest a key from the same table or else from any table.
+    // Suggest a key from the same table or, failing that, from any table.
     let in_table: Vec<&str> =
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_found_by_partial_paths() {
+    fn partial_paths_find_keys() {
         let text = explain_path("materials.metal.roughness").expect("a key");
         for part in ["0 … 1", "default  0.2", "number or texture", "roughness = 0.2"] {
             assert!(text.contains(part), "{part}: {text}");

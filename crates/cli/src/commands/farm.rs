@@ -74,11 +74,11 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
-/// Thread count assumed if `--threads` is not given. A node may have more processors than this machine.
+/// Thread count assumed without `--threads`. A node may have more processors than this machine.
 const NODE_THREADS: usize = 64;
 
-/// A container's memory request in MiB: the estimate for one part plus 25 %. Prints a warning and returns
-/// `None` if the scene cannot be read.
+/// Returns a container's memory request in MiB: the estimate for one part, plus 25 %. Prints a warning and
+/// returns `None` if the scene cannot be read.
 fn memory_request(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
@@ -95,7 +95,7 @@ fn memory_request(args: &FarmArgs, options: &RenderArgs, console: &Console) -> O
     None
 }
 
-/// A clap error's message without the usage.
+/// Returns a clap error's message without the usage text.
 fn error_without_usage(error: &clap::Error) -> String {
     if !error.use_stderr() {
         return "expected render options, not --help or --version".to_owned();
@@ -117,19 +117,19 @@ fn format_path_argument(path: &Path) -> String {
     if is_bare { format!("./{text}") } else { text.into_owned() }
 }
 
-/// The command that renders one part. `index` is a shell expression for the part's number.
+/// Returns the command that renders one part. `index` is a shell expression for the part's number.
 fn render_command(args: &FarmArgs, index: &str) -> String {
     let (scene, part) = (quote_word(&format_path_argument(&args.scene)), part_file_name(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", quote_word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
-/// The file name of one part, quoted for the shell.
+/// Returns the file name for one part, quoted for the shell.
 fn part_file_name(args: &FarmArgs, index: &str) -> String {
     format!("{}.{index}.part", quote_word(&format_path_argument(&args.output)))
 }
 
-/// The command that merges the parts. It lists the parts with `seq`.
+/// Returns the command that merges the parts. It lists the parts with `seq`.
 fn merge_command(args: &FarmArgs, options: &str) -> String {
     let (out, count) = (quote_word(&format_path_argument(&args.output)), args.shards);
     format!(
@@ -237,7 +237,7 @@ spec:
     )
 }
 
-/// A container command. Escapes `$` because Kubernetes expands `$(NAME)` and `$$`.
+/// Formats a container command. Escapes `$` because Kubernetes expands `$(NAME)` and `$$`.
 fn container_command(text: &str) -> String {
     quote_yaml(&text.replace('$', "$$"))
 }
@@ -327,7 +327,7 @@ mod tests {
         }
     }
 
-    /// Expands a command like Kubernetes: `$(NAME)` becomes the value of an existing variable, and `$$`
+    /// Expands a command as Kubernetes does: `$(NAME)` becomes the value of an existing variable, and `$$`
     /// becomes `$` (k8s.io/kubernetes/third_party/forked/golang/expansion).
     fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
         let (mut out, mut rest) = (String::new(), text);
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_request_allows_for_large_nodes() {
+    fn memory_request_assumes_many_threads() {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n").expect("written");

@@ -72,7 +72,7 @@ fn has_scene_extension(scene: &Path) -> bool {
     scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Prints all approximations and their number.
+/// Prints and counts all approximations.
 fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     let warning = |note: &String| Diagnostic {
         severity: Severity::Warning,

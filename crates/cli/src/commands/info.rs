@@ -33,7 +33,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
 ///
 /// # Errors
-/// Returns the errors of [`read_info`].
+/// Returns the same errors as [`read_info`].
 fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     read_info(path).or_else(|error| match (&error, other_content(path)) {
         (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
@@ -43,8 +43,8 @@ fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     })
 }
 
-/// Checks whether the file is an image, part or checkpoint instead of a scene. If so, reports this and how
-/// the file was rendered, as one JSON line or as text. `None` for other files.
+/// If the file is an image, part or checkpoint instead of a scene, reports this along with how the file was
+/// rendered, as one JSON line or as text. Returns `None` for other files.
 pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
     let (_, problem) = other_content(path)?;
     let info = describe(path);
@@ -77,10 +77,10 @@ fn as_json(path: &Path, info: &ImageInfo) -> Value {
     })
 }
 
-/// Maximum width of the name column. The values of longer names are shifted to the right.
+/// Maximum width of the name column. A longer name shifts its value to the right.
 const MAX_NAME_COLUMNS: usize = 40;
 
-/// A line about the file, followed by one line per setting.
+/// Formats one line about the file, followed by one line per setting.
 fn as_text(path: &Path, info: &ImageInfo) -> String {
     let name = path.to_string_lossy();
     let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));

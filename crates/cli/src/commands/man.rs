@@ -10,7 +10,7 @@ use crate::environment::VARIABLES;
 use crate::exit::Exit;
 use crate::scene::nearest::nearest;
 
-/// Prints the manual page of a command, or of the program.
+/// Prints the manual page for a command or for the whole program.
 pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
     let mut all = Args::command();
     all.build();

@@ -90,7 +90,7 @@ impl MergeCommand<'_> {
             return Err(self.console.fail(Exit::WRONG, &message));
         }
         if self.args.parts.iter().any(|part| is_same_file(part, out)) {
-            let message = format!("{name} is given both as the output and as a part");
+            let message = format!("{name} is both the output and a part");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
         let format =
@@ -99,7 +99,7 @@ impl MergeCommand<'_> {
         Ok(format)
     }
 
-    /// Checks that the output does not replace an input of the render.
+    /// Checks that the output does not replace an input file of the render.
     fn check_inputs(&self, inputs: &MergeInputs<'_>) -> Result<(), Exit> {
         match self.refused_input(inputs, &self.args.out) {
             Ok(None) => Ok(()),
@@ -108,7 +108,7 @@ impl MergeCommand<'_> {
         }
     }
 
-    /// An error message if the file at `path` is an input of the parts or of their scene.
+    /// Returns an error message if the file at `path` is an input file of the parts or their scene.
     fn refused_input(&self, inputs: &MergeInputs<'_>, path: &Path) -> Result<Option<String>, Cancelled> {
         let why = inputs.reason_to_keep(path)?;
         Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
@@ -201,7 +201,7 @@ impl MergeCommand<'_> {
         Ok(())
     }
 
-    /// Describes the number of complete parts and the names of incomplete parts.
+    /// Describes how many parts are complete, and names the incomplete parts.
     fn describe_parts(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         let incomplete = match names.as_slice() {
@@ -212,7 +212,7 @@ impl MergeCommand<'_> {
         format!("{count} of {} parts{incomplete}", self.args.parts.len())
     }
 
-    /// Reports the parts on stderr, unless the image on the same terminal shows the same text.
+    /// Reports the parts on stderr, unless the same terminal shows the same text above the image.
     fn report_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             Progress::None => {}
@@ -226,7 +226,8 @@ impl MergeCommand<'_> {
         }
     }
 
-    /// Whether to redraw the image in place. This requires a terminal without progress lines between redraws.
+    /// Whether to redraw the image in place. This requires a terminal on which no progress lines are printed
+    /// between redraws.
     fn redraws_in_place(&self) -> bool {
         let has_lines = match self.args.progress {
             Progress::Plain | Progress::Json => self.console.is_terminal,
@@ -336,7 +337,7 @@ impl MergeCommand<'_> {
     }
 }
 
-/// Records the scene's path relative to the output, as a single render does.
+/// Records the scene's path relative to the output, as an unsharded render does.
 fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     if let Some(path) = scene_paths(parts, out).find(|path| path.is_file()) {
@@ -381,7 +382,7 @@ impl AwaitedPart {
         }
     }
 
-    /// The part's path, if the file exists but is incomplete.
+    /// Returns the part's path if the file exists but is incomplete.
     fn incomplete_path(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }

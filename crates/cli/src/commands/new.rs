@@ -17,8 +17,9 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
-            console
-                .print_message(&format!("note: write {name} next to the scene with: glimt schema > {name}"));
+            console.print_message(&format!(
+                "note: to create {name} next to the scene, run: glimt schema > {name}"
+            ));
         }
         console.print_trusted_text(&text);
         return Exit::DONE;
@@ -84,7 +85,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     }
 }
 
-/// Error message for a scene file with the extension of an image or a mesh.
+/// Returns the error message for a scene file with an image or mesh extension.
 fn wrong_extension_error(file: &Path) -> Option<String> {
     let what = if is_mesh(file) {
         "a mesh"

@@ -13,7 +13,7 @@ use crate::scene::sanitize::visible;
 const MIN_BAR_COLUMNS: usize = 10;
 /// Assumed width if the terminal's size is unknown.
 const DEFAULT_COLUMNS: usize = 80;
-/// Number of steps of the render's bar.
+/// Number of steps in the render's progress bar.
 const STEPS: u64 = 1000;
 
 pub(super) struct ProgressBars {
@@ -91,8 +91,8 @@ impl Reporter for ProgressBars {
     }
 }
 
-/// The text next to the bar, as detailed as the width allows. With a time limit, shows seconds instead of
-/// samples.
+/// Returns the text next to the bar, as detailed as the width allows. Shows seconds instead of samples if
+/// there is a time limit.
 fn format_bar_text(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),

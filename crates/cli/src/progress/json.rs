@@ -137,7 +137,8 @@ pub(crate) fn failure_to_json(failure: &Failure) -> Value {
     }
 }
 
-/// Diagnostics as in `check --json`, with the additional key `path`: `file`, or null if empty.
+/// Converts diagnostics as in `check --json`, and adds the key `path`: the same as `file`, or null if `file`
+/// is empty.
 fn diagnostics_to_json(all: &[Diagnostic]) -> Vec<Value> {
     let mut places = Locator::default();
     let with_path = |one: &Diagnostic| {

@@ -45,7 +45,7 @@ impl PlainReporter {
         }
     }
 
-    /// The line to print now, if a line is due. Never repeats the last line.
+    /// Returns the line to print now, if one is due. Never repeats the last line.
     fn next_line(&mut self, progress: &RenderProgress) -> Option<String> {
         let step = (progress.fraction * STEPS).floor();
         if progress.fraction >= 1.0 || (step <= self.reported && self.last.elapsed() < INTERVAL) {
@@ -119,8 +119,8 @@ mod tests {
         };
         let mut said = Vec::new();
         for samples in 0..100 {
-            // Report each value twice, like the renderer: at the end of a pass and at the start of the next
-            // pass.
+            // Report each value twice, as the renderer does: at the end of a pass and at the start of the
+            // next pass.
             said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
             said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
         }
@@ -128,9 +128,11 @@ mod tests {
             (1..10).map(|ten| format_progress(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
         assert_eq!(said, tens);
         // The interval has passed, but nothing has changed.
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
+        plain.last =
+            Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
         assert_eq!(plain.next_line(&progress(0.9, 90)), None);
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
+        plain.last =
+            Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
         assert!(plain.next_line(&progress(0.91, 91)).is_some());
     }
 

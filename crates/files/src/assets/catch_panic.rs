@@ -1,4 +1,4 @@
-//! Converts panics in third-party decoders to errors.
+//! Converts panics in third-party decoders into errors.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -11,12 +11,12 @@ thread_local! {
 
 /// Runs `work`. If it panics, returns the panic message as an error instead of printing it.
 ///
-/// The first call installs a panic hook that forwards all other panics to the previous hook. A front end with
-/// its own hook (for example, to restore the terminal) must install it before it loads any file.
+/// The first call installs a panic hook that forwards all other panics to the previous hook. A front end that
+/// has its own hook (for example, to restore the terminal) must install that hook before loading any file.
 ///
 /// # Errors
 ///
-/// The panic's message.
+/// The panic message.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     silence_caught_panics();
     let outer = IS_CATCHING.replace(true);

@@ -1,4 +1,4 @@
-//! Materials of mesh files.
+//! Materials from mesh files.
 
 use std::path::PathBuf;
 
@@ -8,11 +8,11 @@ use crate::math::{DVec2, Vec2, Vec3};
 /// A material from an MTL file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileMaterial {
-    /// Name in the file.
+    /// Material name in the file.
     pub name: String,
     /// Diffuse reflectance, `Kd`.
     pub diffuse: Vec3,
-    /// Specular reflectance, `Ks`: scale of the unnormalized Phong lobe.
+    /// Specular reflectance, `Ks`. Scales the unnormalized Phong lobe.
     pub specular: Vec3,
     /// Phong exponent, `Ns`.
     pub shininess: f32,
@@ -36,16 +36,16 @@ pub struct FileMaterial {
     pub normal_texture: Option<FileTexture>,
     /// Scale factor for the normal map's slopes, ≥ 0. Set by the option `-bm`, 1 by default.
     pub normal_strength: f32,
-    /// Parameters of the PBR extension. `None` if the material has none of its statements.
+    /// Parameters of the PBR extension. `None` if the material has no PBR statements.
     pub physical: Option<PhysicalMaterial>,
 }
 
 impl FileMaterial {
     /// Maximum index of refraction.
     pub const MAX_IOR: f32 = 10.0;
-    /// Maximum reflectance of a coat. A higher one would require a larger index of refraction.
+    /// Maximum reflectance of a coat. A higher reflectance would require a larger index of refraction.
     pub const MAX_COAT: f32 = 0.66;
-    /// Index of refraction of principled materials that do not specify one above 1.
+    /// Index of refraction for principled materials, unless the file specifies one above 1.
     pub const DEFAULT_IOR: f32 = 1.5;
 
     /// Whether the material has a specular highlight. Illumination models 0 and 1 have none. Materials with
@@ -54,9 +54,9 @@ impl FileMaterial {
         self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
     }
 
-    /// The kind of material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is an opacity
-    /// texture. Materials with the PBR extension are principled. Otherwise, models 3, 5 and 8 with a specular
-    /// color are mirrors, or coats over a stronger diffuse color.
+    /// Determines the kind of material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is an
+    /// opacity texture. Materials with PBR statements are principled. Of the rest, models 3, 5 and 8 with a
+    /// specular color are coated if [`Self::is_coated`], and mirrors if not. All others are Phong materials.
     pub fn kind(&self) -> FileMaterialKind<'_> {
         match (self.illumination_model, &self.physical) {
             (Some(4 | 6 | 7 | 9), _) if self.opacity_texture.is_none() => FileMaterialKind::Glass,
@@ -115,13 +115,14 @@ impl FileMaterial {
         }
     }
 
-    /// Whether the specular reflection is a coat over a diffuse texture or a stronger diffuse color.
+    /// Whether the specular reflection is a coat. It is one if there is a diffuse texture, or if the diffuse
+    /// color is stronger than the specular color.
     pub fn is_coated(&self) -> bool {
         self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
     }
 }
 
-/// Kind of a material from a mesh file.
+/// Kind of material in a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FileMaterialKind<'a> {
     /// Diffuse and glossy.
@@ -136,12 +137,12 @@ pub enum FileMaterialKind<'a> {
     Glass,
 }
 
-/// A line of a file.
+/// A line in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileLine {
     /// The file.
     pub path: PathBuf,
-    /// Number of the line, starting at 1.
+    /// Line number, starting at 1.
     pub line: usize,
 }
 
@@ -162,7 +163,7 @@ pub struct FileTexture {
     pub offset: DVec2,
     /// Whether coordinates outside [0, 1] are clamped, `-clamp on`.
     pub is_clamped: bool,
-    /// Offset and scale of the values, `-mm`.
+    /// Offset and scale applied to the values, `-mm`.
     pub range: (f32, f32),
     /// Channel to read as a scalar, `-imfchan`.
     pub number: Option<PixelValue>,
@@ -184,14 +185,14 @@ impl FileTexture {
         }
     }
 
-    /// Whether both textures use the same image with the same coordinates.
+    /// Whether both textures show the same image at the same texture coordinates.
     pub fn is_same_image(&self, other: &Self) -> bool {
         let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
         self.path == other.path && at(self) == at(other)
     }
 }
 
-/// PBR extension of MTL. Values are in [0, 1].
+/// Parameters of MTL's PBR extension, all in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMaterial {
     /// Roughness, `Pr`.

@@ -15,7 +15,7 @@ use crate::system::file::FileStamp;
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 
-/// Error for a file that cannot be used.
+/// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file could not be read, or is not a regular file.
@@ -36,7 +36,7 @@ pub enum AssetError {
         /// The reason, as shown to the user.
         reason: String,
     },
-    /// An allocation for the file's content failed.
+    /// There was not enough memory for the file's content.
     #[error("out of memory: cannot allocate {} MB for {}", bytes.div_ceil(1_000_000), path.display())]
     OutOfMemory {
         /// The file.
@@ -59,7 +59,7 @@ impl AssetError {
     }
 }
 
-/// Returns the line number and reason from the error of a rejected file.
+/// Returns the line number and reason from the error for a rejected file.
 #[cfg(test)]
 pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
     match result {
@@ -69,7 +69,7 @@ pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (O
     }
 }
 
-/// BLAKE3 hash of a file, computed from the decoded bytes.
+/// BLAKE3 hash of a file, computed from the bytes that were decoded.
 pub type FileHash = [u8; 32];
 
 /// A file referenced by an asset, such as a material library or a glTF buffer.
@@ -77,7 +77,7 @@ pub type FileHash = [u8; 32];
 pub struct Companion {
     /// The file.
     pub path: PathBuf,
-    /// Hash of the decoded bytes. `None` if the file could not be read.
+    /// Hash of the bytes that were decoded. `None` if the file could not be read.
     pub hash: Option<FileHash>,
     /// Stamp of the file, taken before it was read.
     pub stamp: Option<FileStamp>,
@@ -90,17 +90,17 @@ pub struct LoadedMesh {
     pub hash: FileHash,
     /// Triangles of all usable faces.
     pub mesh: TriangleMesh,
-    /// Materials of the file, indexed by [`TriangleMesh::materials`].
+    /// Materials from the file, indexed by [`TriangleMesh::materials`].
     pub materials: Vec<FileMaterial>,
     /// Number of skipped faces, by reason.
     pub dropped: Dropped,
     /// Other warnings, one line each.
     pub warnings: Vec<String>,
-    /// Warnings about the file's materials, one line each. Not relevant if the scene overrides the materials.
+    /// Warnings about the file's materials, one line each. Irrelevant if the scene overrides the materials.
     pub material_warnings: Vec<String>,
-    /// Files that affect the mesh, including missing ones: material libraries, or buffers of a glTF file.
+    /// Other files that affect the mesh, including missing ones: material libraries or glTF buffers.
     pub companions: Vec<Companion>,
-    /// Images referenced by the material libraries or the glTF file, used or not.
+    /// Images referenced by the material libraries or the glTF file, including unused ones.
     pub pictures: Vec<PathBuf>,
 }
 
@@ -128,7 +128,7 @@ pub struct Dropped {
 /// A gKit orbiter camera, which orbits the scene's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbiterCamera {
-    /// `c`: point at which the camera looks.
+    /// `c`: point that the camera looks at.
     pub center: [f64; 3],
     /// `p`: offset in the image plane.
     pub position: [f64; 2],

@@ -1,4 +1,4 @@
-//! Reads regular files with a size limit, progress and cancellation.
+//! Reads regular files. Enforces a size limit, reports progress and can be cancelled.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -10,11 +10,11 @@ pub(crate) use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 use crate::system::memory::try_reserve_exact;
 
-/// Number of bytes between two polls of the cancel token.
+/// Number of bytes between polls of the cancel token.
 const CHUNK: usize = 1 << 20;
 
 /// Error message for Git LFS pointers.
-const LFS_POINTER: &str = "it is a Git LFS pointer, not the file's content: run `git lfs pull`";
+const LFS_POINTER: &str = "it is a Git LFS pointer, not the file's content; run `git lfs pull`";
 /// Error message for binary data where text is expected.
 pub(crate) const BINARY_FILE: &str = "this is a binary file in another format";
 /// Error message for UTF-16 text.
@@ -45,8 +45,8 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }
 
-/// Opens a regular file of at most `limit` bytes. Returns the file and its length. Rejects pipes, devices and
-/// folders without opening them, because opening a pipe may block.
+/// Opens a regular file with at most `limit` bytes. Returns the file and its length. Rejects pipes, devices
+/// and folders without opening them, because opening a pipe may block.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let refused = |kind: FileKind| AssetError::unreadable(path, not_regular(kind));
@@ -66,7 +66,7 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     Ok((file, found.len()))
 }
 
-/// Number of bytes at the start of a file to check for binary data.
+/// Number of bytes to check for binary data at the start of a file.
 const START: usize = 1 << 12;
 
 /// Reads a text file. Rejects binary files based on their first [`START`] bytes.
@@ -77,7 +77,7 @@ pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<
     })
 }
 
-/// Reads a text or binary file in a format that starts with three letters.
+/// Reads a text or binary file whose format starts with three letters.
 pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
@@ -102,15 +102,15 @@ fn reject_if_binary(path: &Path, is_binary: bool) -> Result<(), AssetError> {
     if is_binary { Err(refused()) } else { Ok(()) }
 }
 
-/// Rejects UTF-16 where a text file is expected. Must not be called for binary formats, because their 16-bit
+/// Rejects UTF-16 where a text file is expected. Do not call it for binary formats, because their 16-bit
 /// numbers can look like UTF-16.
 pub(crate) fn refuse_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), UTF16_TEXT);
     if is_utf16(start) { Err(refused()) } else { Ok(()) }
 }
 
-/// Whether a file starts like UTF-16 text: two ASCII characters, each with a zero byte, after an optional
-/// byte order mark.
+/// Whether a file starts like UTF-16 text: an optional byte order mark, then two ASCII characters, each with
+/// a zero byte.
 fn is_utf16(start: &[u8]) -> bool {
     let start = start.strip_prefix(b"\xff\xfe").or(start.strip_prefix(b"\xfe\xff")).unwrap_or(start);
     let is_letter = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
@@ -120,8 +120,8 @@ fn is_utf16(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, out of
-/// `2·length`. The second half is reserved for parsing.
+/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, with a
+/// total of `2·length`. The second half is reserved for parsing.
 fn read_accepted(
     path: &Path,
     limit: u64,
@@ -137,7 +137,7 @@ fn read_accepted(
     read_rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file of about `length` bytes. Reports progress like [`bytes`].
+/// Reads the rest of an open file that has about `length` bytes. Reports progress like [`bytes`].
 pub(crate) fn read_rest(
     path: &Path,
     file: File,
@@ -189,7 +189,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("zeros");
-        // A sparse file of 3 TiB. Reading it completely would take an hour.
+        // A sparse 3 TiB file. Reading it completely would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
         for read in [text, text_or_binary] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));

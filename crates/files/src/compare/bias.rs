@@ -1,4 +1,4 @@
-//! Bias: the brightness difference between an image and its reference, relative to the noise of both.
+//! Bias: the brightness difference between an image and its reference, compared with the noise in both.
 
 use super::Errors;
 
@@ -7,7 +7,7 @@ use super::Errors;
 pub struct Bias {
     /// mean (a − b) / mean b. `None` if the reference is black.
     pub value: Option<f64>,
-    /// Standard error of the bias due to the noise of both images. `None` if the noise of either image is
+    /// Standard error of the bias, caused by the noise in both images. `None` if either image's noise is
     /// unknown.
     pub standard_error: Option<f64>,
     /// Bias divided by its standard error. `None` if the standard error is unknown or zero.

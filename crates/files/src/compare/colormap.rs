@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use crate::math::Vec3;
 
-/// Linear Rec. 709 color of a value in [0, 1]. CIE lightness is proportional to the value. The Oklab hue (B.
-/// Ottosson, 2020) makes half a turn. Chroma peaks in the middle.
+/// Returns the linear Rec. 709 color for a value in [0, 1]. CIE lightness is proportional to the value. The
+/// Oklab hue (B. Ottosson, 2020) makes half a turn. Chroma peaks in the middle.
 pub(super) fn error_color(value: f64) -> Vec3 {
     const LIGHTEST: f64 = 95.0;
     const CHROMA: f64 = 0.19;
@@ -17,7 +17,7 @@ pub(super) fn error_color(value: f64) -> Vec3 {
     from_oklab(libm::cbrt(luminance_of(LIGHTEST * value)), a, b)
 }
 
-/// Relative luminance of a CIE lightness in [0, 100].
+/// Converts a CIE lightness in [0, 100] to relative luminance.
 fn luminance_of(lightness: f64) -> f64 {
     const KAPPA: f64 = 24_389.0 / 27.0;
     let root = (lightness + 16.0) / 116.0;

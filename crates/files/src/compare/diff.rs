@@ -1,17 +1,17 @@
-//! Creates images of per-pixel errors.
+//! Creates images that show per-pixel errors.
 
 use rayon::prelude::*;
 
 use super::{Pair, colormap};
 use crate::film::RadianceImage;
 
-/// |a − b| of each channel, linear.
+/// Returns |a − b| for each channel, in linear values.
 pub fn absolute_difference(pair: &Pair) -> RadianceImage {
     let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels).map(|(a, b)| (*a - *b).abs());
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels: pixels.collect() }
 }
 
-/// FLIP of each pixel as a color, from black (0) through purple, red and orange to pale yellow (1).
+/// Shows each pixel's FLIP as a color, from black (0) through purple, red and orange to pale yellow (1).
 pub fn flip_heat_map(pair: &Pair, flip: &[f32]) -> RadianceImage {
     let pixels = flip.par_iter().map(|&error| colormap::error_color(f64::from(error))).collect();
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels }

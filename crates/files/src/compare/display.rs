@@ -1,9 +1,9 @@
-//! Errors of displayed values (clamped sRGB without quantization): PSNR of the channels and SSIM of the luma.
+//! Errors in displayed values (clamped sRGB without quantization): PSNR of the channels and SSIM of the luma.
 //!
 //! SSIM follows Z. Wang et al., *Image Quality Assessment: From Error Visibility to Structural Similarity*
-//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1. SSIM is averaged over
-//! all windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their weights
-//! renormalized.
+//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1. SSIM is averaged
+//! over all windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their
+//! weights renormalized.
 
 use rayon::prelude::*;
 
@@ -103,7 +103,8 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// Converts a position in the tile (with margin) to a position in the image. `None` outside the image.
+/// Converts a position in the tile, including its margin, to a position in the image. `None` outside the
+/// image.
 fn image_position(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }

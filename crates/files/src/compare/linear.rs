@@ -1,4 +1,4 @@
-//! Error metrics of linear values.
+//! Error metrics computed from linear values.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// The trimmed mean excludes one in this many pixels.
+/// The trimmed mean excludes one pixel in this many.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -27,7 +27,7 @@ struct Sums {
     max: f64,
     /// Column and row of the first pixel with the largest difference.
     max_at: [u32; 2],
-    /// Sums of the luminance of both images.
+    /// Total luminance of each image.
     luminances: DVec2,
 }
 
@@ -80,7 +80,7 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
     sums
 }
 
-/// Mean over the channels of (a − b)²/(b² + 0.01).
+/// Returns the mean of (a − b)²/(b² + 0.01) over the channels.
 fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
     let (a, b) = (a.as_dvec3(), b.as_dvec3());
     ((a - b) * (a - b) / (b * b + RELMSE_EPSILON)).element_sum() / 3.0

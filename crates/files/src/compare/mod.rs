@@ -1,4 +1,4 @@
-//! Error metrics of an image compared with a reference.
+//! Error metrics for an image compared with a reference.
 //!
 //! RMSE, relMSE and the largest difference are computed from linear values, and PSNR, SSIM and FLIP from
 //! displayed values (clamped sRGB). Sums use double precision, in an order that does not depend on the number
@@ -21,7 +21,7 @@ pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
 pub use two_references::TwoReferences;
 
-/// Errors of a pair's first image compared with the second image, the reference. Means are over pixels and
+/// Errors in the first image of a pair. The second image is the reference. Means are over pixels and
 /// channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Errors {

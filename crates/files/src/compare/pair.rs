@@ -57,7 +57,7 @@ impl Pair {
     /// Checks an image and its reference, and creates a pair. The names are used in messages.
     ///
     /// # Errors
-    /// All errors of both images.
+    /// All errors found in the two images.
     pub fn new(names: [&Path; 2], a: RadianceImage, b: RadianceImage) -> Result<Self, Vec<CompareError>> {
         let errors = [check_finite(names[0], &a), check_finite(names[1], &b), check_sizes(names, &a, &b)];
         let errors: Vec<_> = errors.into_iter().flatten().collect();
@@ -68,7 +68,7 @@ impl Pair {
     /// is ignored.
     ///
     /// # Errors
-    /// All errors of both images.
+    /// All errors found in the two images.
     pub fn load(a: &Path, b: &Path) -> Result<Self, Vec<CompareError>> {
         match (read(a), read(b)) {
             (Ok((first, mut warnings)), Ok((second, more))) => {
@@ -107,7 +107,7 @@ impl Pair {
         self.a.height as usize
     }
 
-    /// Pixels of both images at a position.
+    /// Returns the pixel at a position in each image.
     pub(super) fn at(&self, x: usize, y: usize) -> [Vec3; 2] {
         let index = y * self.width() + x;
         [self.a.pixels[index], self.b.pixels[index]]

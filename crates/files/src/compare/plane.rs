@@ -1,4 +1,4 @@
-//! Scalar planes of a tile, and separable filters.
+//! Scalar planes for tiles, and separable filters.
 
 /// Scalars in row-major order.
 #[derive(Clone, Debug)]
@@ -19,8 +19,8 @@ impl Plane {
         Self { values, ..*self }
     }
 
-    /// Filters rows and columns. Pixels whose taps are not all inside the plane are dropped, which shrinks the
-    /// plane by `taps − 1` in both dimensions.
+    /// Filters rows and columns. Pixels whose taps are not all inside the plane are dropped, which shrinks
+    /// the plane by `taps − 1` in both dimensions.
     pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
         self.along_rows(along_rows).along_columns(along_columns)
     }

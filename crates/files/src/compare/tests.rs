@@ -41,7 +41,8 @@ fn warnings_about_the_files_are_returned() {
     }
 }
 
-/// Hashed values in [0, 1] plus noise of ±1/8. Some are outside the display range.
+/// An image of hashed values in [0, 1], with and without added noise of ±1/8. Some sums are outside the
+/// display range.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
     let noise = |x, y, c| (((x * 5 + y * 11 + c * 17) % 33) as f32 - 16.0) / 128.0;
@@ -100,7 +101,7 @@ fn assert_measures([a, b]: &[RadianceImage; 2], expected: &Expected) {
 // computed with flip-evaluator 1.7 by the paper's authors (LDR, linear input, 67 pixels per degree).
 
 #[test]
-fn errors_of_noise_match_numpy() {
+fn noisy_image_errors_match_numpy() {
     let expected = Expected {
         linear: [0.074_452_040_028_3, 0.087_685_495_302, 0.087_685_495_302, 0.125],
         max_at: [0, 0],
@@ -114,7 +115,7 @@ fn errors_of_noise_match_numpy() {
 }
 
 #[test]
-fn errors_of_several_tiles_match_numpy() {
+fn multi_tile_errors_match_numpy() {
     let expected = Expected {
         linear: [1.326_208_766_31, 19.568_535_989_9, 0.427_631_782_818, 40.158_447_265_6],
         max_at: [59, 127],
@@ -128,7 +129,7 @@ fn errors_of_several_tiles_match_numpy() {
 }
 
 #[test]
-fn errors_of_tiny_images_match_numpy() {
+fn tiny_image_errors_match_numpy() {
     let small = Expected {
         linear: [0.075_368_020_683, 0.125_544_632_27, 0.125_544_632_27, 0.125],
         max_at: [0, 0],
@@ -157,7 +158,7 @@ fn errors_of_tiny_images_match_numpy() {
 }
 
 #[test]
-fn flip_of_single_pixels_matches_numpy() {
+fn single_pixel_flip_matches_numpy() {
     let [a, b] = edges(150, 140);
     let flip = measure(&pair(a, b)).flip;
     assert_near("first", f64::from(flip[0]), 0.792_423_285_289);
@@ -212,7 +213,7 @@ fn constant_images_have_known_errors() {
     let black_and_white = errors(&gray(1.0), &gray(0.0));
     assert!(black_and_white.psnr_db.abs() < 1e-9, "{}", black_and_white.psnr_db);
     assert!((black_and_white.relmse - 100.0).abs() < 1e-9);
-    // For the constants 0 and 1, SSIM is C₁/(1 + C₁).
+    // For constant images of 0 and 1, SSIM is C₁/(1 + C₁).
     assert!((black_and_white.ssim - 1e-4 / 1.0001).abs() < 1e-9);
     let beyond = errors(&gray(7.0), &gray(1.0));
     assert_eq!((beyond.psnr_db, beyond.flip), (f64::INFINITY, 0.0), "displayed identically");

@@ -10,7 +10,7 @@ pub(super) fn band_count(height: usize) -> usize {
     height.div_ceil(SIDE)
 }
 
-/// Tiles of a band, from left to right.
+/// Tiles in a band, from left to right.
 pub(super) fn tiles_in_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
     let y = band * SIDE;
     (0..width.div_ceil(SIDE)).map(move |column| {

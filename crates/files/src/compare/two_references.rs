@@ -11,11 +11,11 @@ fn luminance(color: DVec3) -> f64 {
     color.dot(LUMINANCE_WEIGHTS.as_dvec3())
 }
 
-/// Two independently rendered references of the same image.
+/// Two independently rendered references for the same image.
 #[derive(Clone, Debug)]
 pub struct TwoReferences {
     pair: Pair,
-    /// 1/(r² + 0.01) for the mean r of both references, divided by the number of channels and pixels.
+    /// 1/(r² + 0.01), divided by the number of channels and pixels. r is the mean of both references.
     weights: Vec<DVec3>,
 }
 
@@ -36,7 +36,8 @@ impl TwoReferences {
         &self.pair
     }
 
-    /// relMSE of an image of the same size, unbiased by the references' noise. Can be negative.
+    /// Returns an image's relMSE, without bias from the references' noise. It can be negative. The image must
+    /// have the same size as the references.
     pub fn error(&self, x: &RadianceImage) -> f64 {
         self.cross(x, x)
     }

@@ -1,4 +1,4 @@
-//! Copies file attributes to a replacement file: owner, group, access list, extended attributes, permissions.
+//! Copies attributes to a replacement file: owner, group, access list, extended attributes and permissions.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -16,9 +16,9 @@ const ACCESS_LIST: &str = "system.posix_acl_access";
 /// Attributes that describe the old content or are managed by the system.
 const EXCLUDED: [&str; 4] = ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
 
-/// Permissions of the owner.
+/// Permission bits for the owner.
 const OWNER_BITS: u32 = 0o700;
-/// Permissions of everyone except the group.
+/// Permission bits for everyone except the group.
 const NON_GROUP_BITS: u32 = 0o707;
 
 /// Policy for attributes that would be lost by replacing a file.
@@ -39,11 +39,12 @@ pub(super) struct FileAttributes {
     mode: u32,
     #[cfg(target_os = "linux")]
     flags: Flags,
-    /// Names and values. The access list is last because it may remove permissions.
+    /// Names and values of extended attributes. The access list is last because setting it may remove
+    /// permissions.
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
 
-/// Attributes that could not be copied, and permissions that are safe without them.
+/// Attributes that could not be copied, and the permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct UncopiedAttributes {
     /// Descriptions of the lost attributes, such as `its owner`.
@@ -96,7 +97,7 @@ impl FileAttributes {
         }
         if gid != self.gid {
             carried.lost.push("its group".to_owned());
-            // The new group's members previously had the permissions of others. Do not grant them more.
+            // Members of the new group previously had the permissions for others. Do not grant them more.
             let others_bits = (carried.mode & 0o007) << 3;
             carried.mode &= NON_GROUP_BITS | others_bits;
         }
@@ -136,7 +137,7 @@ impl UncopiedAttributes {
     }
 }
 
-/// Extended attributes of a file. Empty on file systems without them.
+/// Reads a file's extended attributes. Returns none on file systems that do not support them.
 fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     let is_carried = |name: &OsString| !EXCLUDED.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {

@@ -12,14 +12,14 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
 
-/// Number of pixels between two polls of the cancel token. Processing them takes a few milliseconds and keeps
+/// Number of pixels between polls of the cancel token. Processing them takes a few milliseconds and keeps
 /// all threads busy.
 const PIXELS: usize = 1 << 18;
 
-/// Number of bytes to compress or write between two polls of the cancel token.
+/// Number of bytes to compress or write between polls of the cancel token.
 pub(super) const BYTES: usize = 1 << 15;
 
-/// Tone maps an image from top to bottom. Components have one byte, or two bytes in big-endian order, as in
+/// Tone maps an image from top to bottom. Each component is one byte, or two bytes in big-endian order as in
 /// PNG and PPM. Passes the bytes to `take` in order, at most [`BYTES`] at a time.
 pub(super) fn tone_map_in_parts(
     image: &RadianceImage,
@@ -105,8 +105,8 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
 
 /// Like [`write_all`], but for pipes and sockets, whose readers may block indefinitely.
 pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
-    /// Number of bytes per write. A pipe that is ready has at least this much space, so the write does not
-    /// block.
+    /// Number of bytes per write. A pipe that is ready for writing has at least this much space, so the write
+    /// does not block.
     const PIPE_BYTES: usize = 4096;
     let mut rest = bytes;
     while !rest.is_empty() {
@@ -114,7 +114,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
         match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Another process wrote to the pipe first.
+            // Another process has written to the pipe first.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }
@@ -123,7 +123,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
 }
 
 fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
-    /// Milliseconds between two polls of the cancel token.
+    /// Milliseconds between polls of the cancel token.
     const POLL_MS: u8 = 50;
     loop {
         token.check().map_err(io::Error::other)?;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn only_stopped_writes_are_cancelled() {
+    fn only_stopped_writes_count_as_cancelled() {
         let token = CancelToken::new();
         token.cancel();
         let classify = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));

@@ -10,9 +10,9 @@ use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 pub struct DevelopSettings {
     /// Film quantity that the image shows.
     pub quantity: Quantity,
-    /// Tone mapping, before its range is resolved for the image.
+    /// Tone mapping. Its range has not been adapted to the image yet.
     pub tone: ToneMapping,
-    /// Bits per channel of PNG and PPM files.
+    /// Bits per channel in PNG and PPM files.
     pub bit_depth: BitDepth,
     /// Metadata names and values, except for those derived from the film.
     pub metadata: Vec<(String, String)>,
@@ -26,7 +26,7 @@ impl DevelopSettings {
         film.image(self.quantity)
     }
 
-    /// Returns the metadata with the number of samples inserted after the scene.
+    /// Returns the metadata, with the number of samples inserted after the scene entry.
     pub fn metadata_with_samples(
         &self,
         SampleStats { min, mean, max }: SampleStats,
@@ -50,7 +50,7 @@ impl DevelopSettings {
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.resolved_for(image);
-        // Add the metadata derived from the film: the number of samples, and the range at the end.
+        // Add the metadata derived from the film: the number of samples and, at the end, the range.
         let mut metadata = self.metadata_with_samples(film.samples());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));

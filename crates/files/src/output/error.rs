@@ -68,7 +68,7 @@ pub enum OutputError {
     /// Replacing the existing file is not allowed.
     #[error("{reason}")]
     Refused {
-        /// Message with the file, the reason and advice.
+        /// Message that names the file, states the reason and gives advice.
         reason: String,
     },
     /// The work was cancelled.
@@ -98,7 +98,7 @@ fn way_out(error: &io::Error) -> &'static str {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space or choose another location",
         ErrorKind::FileTooLarge => {
-            "raise the file size limit (ulimit -f), choose another location or a smaller image"
+            "raise the file size limit (ulimit -f), choose another location or render a smaller image"
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
             "allow writing there or choose another location"

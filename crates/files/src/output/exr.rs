@@ -110,9 +110,9 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// Attributes of the file. Metadata is written to the standard attribute `comments`, one item per line.
-/// [`MEAN_LUMINANCE_ERROR`] is the only custom attribute. With more of them, files would be nondeterministic,
-/// because the encoder would write them in the random order of its hash map.
+/// Returns the file's attributes. Metadata is written to the standard attribute `comments`, one item per
+/// line. [`MEAN_LUMINANCE_ERROR`] is the only custom attribute. Several would make files nondeterministic,
+/// because the encoder writes them in the random order of its hash map.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();

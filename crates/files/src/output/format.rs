@@ -22,7 +22,7 @@ pub enum Format {
     WebP,
 }
 
-/// Bits per channel of integer formats.
+/// Bits per channel in integer formats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BitDepth {
     /// 8 bits.
@@ -61,7 +61,7 @@ impl Format {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
-    /// List of known extensions for messages.
+    /// Lists the known extensions for messages.
     pub(super) fn known_extensions() -> String {
         Self::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ")
     }
@@ -79,7 +79,7 @@ impl Format {
         known.ok_or_else(|| OutputError::UnknownExtension { path: path.to_owned(), extension })
     }
 
-    /// Checks that this format can represent an image of this size and bit depth.
+    /// Checks that this format can represent an image with this size and bit depth.
     ///
     /// # Errors
     /// [`OutputError::Unsuitable`] with the reason.
@@ -140,7 +140,7 @@ impl AnimationFormat {
         known.map(|&(_, format)| format)
     }
 
-    /// Checks that this format can represent frames of this size.
+    /// Checks that this format can represent frames with this size.
     ///
     /// # Errors
     /// [`OutputError::Animation`] with the reason.

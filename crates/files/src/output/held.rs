@@ -12,7 +12,7 @@ use super::temporary::TemporaryFile;
 
 /// Extension of the backup name.
 const EXTENSION: &str = ".glimt-saved";
-/// Maximum number of concurrent saves by other programs during a replacement.
+/// Maximum number of attempts to restore the old text while other programs save the file.
 const ATTEMPTS: usize = 16;
 
 /// Result of looking for a backup when a file is opened.
@@ -69,7 +69,7 @@ impl<'a> Replacement<'a> {
     /// Swaps both files. The old text is now the backup.
     ///
     /// # Errors
-    /// A system error. Includes the new text if it has been renamed back to its temporary name.
+    /// A system error. Also returns the new text if it has been renamed back to its temporary name.
     pub(super) fn swap(mut self) -> Result<Self, (io::Error, Option<TemporaryFile>)> {
         match exchange(&self.held, self.target) {
             Ok(()) => Ok(self),
@@ -258,7 +258,8 @@ mod tests {
             fs::rename(other, self.scene()).expect("renamed");
         }
 
-        /// All texts that exist after a kill, a cleanup and the next start.
+        /// Returns all texts that exist after the process is killed, stale files are removed and glimt
+        /// restarts.
         fn after_a_kill(&self) -> Vec<String> {
             remove_stale(self.folder.path(), &|_| false);
             recover_backup(&self.scene());
@@ -293,7 +294,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn killed_replacement_does_not_lose_text() {
+    fn killing_a_replacement_loses_no_text() {
         // The process is killed after `steps` steps. An editor saves at the steps in `saves`.
         for steps in 0..=2 {
             for saves in [vec![], vec![0], vec![1], vec![0, 1], vec![2], vec![0, 2]] {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::resolve_path::{directory_of, follow_links};
 
 /// Identity of a regular file, existing or not. Two paths with the same identity refer to the same file, even
-/// with symbolic or hard links, `..`, or different case on a case-insensitive file system.
+/// if links or `..` are involved, or if they differ only in case on a case-insensitive file system.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum FileIdentity {
     /// An existing file.
@@ -55,8 +55,8 @@ impl FileIdentity {
     }
 }
 
-/// Properties for identifying an existing file if [`FileIdentity`] is not sufficient. Some case-insensitive
-/// file systems, such as FAT and some network file systems, have no stable inode numbers.
+/// Properties that help to identify an existing file where [`FileIdentity`] is not sufficient. Some
+/// case-insensitive file systems, such as FAT and some network file systems, have no stable inode numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileFingerprint {
     real: PathBuf,
@@ -83,8 +83,8 @@ impl FileFingerprint {
         })
     }
 
-    /// Whether both may be the same file. They must be in the same folder, and either have the same name,
-    /// ignoring case, or the same length, modification time and content.
+    /// Whether both may belong to the same file. The files must be in the same folder. Either their names
+    /// must match, ignoring case, or their lengths, modification times and contents must be equal.
     pub fn may_equal(&self, other: &Self) -> bool {
         let is_stamp_same = || (self.length, self.modified) == (other.length, other.modified);
         self.folder == other.folder
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn possibly_identical_files_are_the_same() {
+    fn possibly_identical_files_count_as_the_same() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("other")).expect("a folder");

@@ -8,8 +8,8 @@ use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// JPEG quality (maximum 100). Visually lossless at arm's length. Files are a quarter as large as at quality
-/// 100.
+/// JPEG quality (maximum 100). Visually lossless at arm's length. Files are a quarter of the size they have
+/// at quality 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(

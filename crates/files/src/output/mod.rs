@@ -54,7 +54,7 @@ const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
 /// Program name.
 const PROGRAM: &str = "glimt";
 
-/// An additional layer (AOV) of an image.
+/// An additional layer (AOV) in an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerImage {
     /// Name of the layer.
@@ -72,10 +72,10 @@ pub struct EncodeOptions {
     pub tone: ToneMapping,
     /// Bit depth of PNG and PPM. Float formats always use 32 bits.
     pub bit_depth: BitDepth,
-    /// Metadata names and values (the scene, the settings), written to PNG text chunks, WebP XMP packets, or
-    /// comments in EXR, HDR, JPEG and PPM files. The program version is always written.
+    /// Metadata names and values, such as the scene and the settings. They are written to PNG text chunks,
+    /// WebP XMP packets, or comments in EXR, HDR, JPEG and PPM files. The program version is always written.
     pub metadata: Vec<(String, String)>,
-    /// Standard error of the mean luminance, written as an attribute of EXR files. `None` if unknown.
+    /// Standard error of the mean luminance, written as an attribute in EXR files. `None` if unknown.
     pub mean_luminance_error: Option<f64>,
 }
 
@@ -147,7 +147,7 @@ pub fn check_target_read_only(path: &Path) -> Result<Format, OutputError> {
 /// Like [`check_target_read_only`], but for any type of file.
 ///
 /// # Errors
-/// Same as [`check_target_read_only`], except for the extension.
+/// Same as [`check_target_read_only`], but the extension is not checked.
 pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve(path).map(drop)
 }
@@ -155,7 +155,7 @@ pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
 /// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
-/// Same as [`check_target`], except for the extension.
+/// Same as [`check_target`], but the extension is not checked.
 pub fn check_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }

@@ -10,7 +10,7 @@ pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
-        // The flag is not supported by the file system or kernel.
+        // The file system or kernel does not support the flag.
         Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => move_by_steps(from, to),
         moved => moved.map_err(io::Error::from),
     }

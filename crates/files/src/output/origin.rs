@@ -11,9 +11,9 @@ use serde::de::DeserializeOwned;
 use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::{PROGRAM, SOFTWARE};
 
-/// Limit on the size of PNG chunks before the pixels. glimt writes a few hundred bytes.
+/// Maximum size of the PNG chunks before the pixels. glimt writes a few hundred bytes.
 const HEADER_BYTES: usize = 1 << 20;
-/// Maximum size of a plot to examine.
+/// Maximum number of bytes to examine in a plot.
 const PLOT_BYTES: u64 = 64 << 20;
 
 /// Result of checking the file that would be replaced.
@@ -65,7 +65,7 @@ pub fn may_replace_image(path: &Path) -> Replaced {
     Replaced::of(replaced(path), "an image", is_own_image)
 }
 
-/// Scene named in a PNG file written by glimt. `None` if the file does not exist or contains no scene name.
+/// Returns the scene named in a PNG file that glimt wrote. `None` if there is no such file or scene name.
 pub fn scene_of_image(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
     let reader = png_header(replaced(path)?.ok()?)?;
@@ -75,8 +75,7 @@ pub fn scene_of_image(path: &Path) -> Option<String> {
     latin.map(|text| text.text.clone()).or_else(utf8)
 }
 
-/// Checks whether a JSON file may be replaced. It must either parse as `T` and be accepted by `is_own`, or be
-/// empty.
+/// Checks whether a JSON file may be replaced. It must be empty, or parse as a `T` that `is_own` accepts.
 pub fn may_replace_json<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
@@ -84,14 +83,14 @@ pub fn may_replace_json<T: DeserializeOwned>(
 ) -> Replaced {
     Replaced::of_text(path, kind, |file| {
         let mut reader = BufReader::new(file);
-        // Avoid reading all of a large file in another format.
+        // Avoid reading a large file in another format completely.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
         is_object && serde_json::from_reader(reader).is_ok_and(|value| is_own(&value))
     })
 }
 
-/// Checks whether a table may be replaced. It must either start with this line, including its line end, or be
-/// empty.
+/// Checks whether a table may be replaced. It must be empty, or start with `first_line`, including the line
+/// end.
 pub fn may_replace_table(path: &Path, first_line: &str) -> Replaced {
     Replaced::of_text(path, "a table", |file| {
         let mut start = Vec::new();
@@ -100,13 +99,13 @@ pub fn may_replace_table(path: &Path, first_line: &str) -> Replaced {
     })
 }
 
-/// Checks whether a plot may be replaced. It must either be empty, or contain these texts and the signature
-/// added by [`sign_plot`]. Plots from older versions, which have no signature, are also accepted.
+/// Checks whether a plot may be replaced. It must be empty, or contain `texts` and the signature that
+/// [`sign_plot`] adds. Plots from older versions, which have no signature, are also accepted.
 pub fn may_replace_plot(path: &Path, texts: &[&str]) -> Replaced {
     Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
 }
 
-/// Start of the signature. The signature follows the first tag of an SVG file.
+/// Start of the signature, which follows the first tag in an SVG file.
 const SIGNATURE: &str = "\n<desc>";
 
 /// Adds a signature with the program's name to a plot.

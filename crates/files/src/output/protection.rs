@@ -1,5 +1,5 @@
 //! Checks file protections other than permissions: chattr(1) flags and sticky directories. Without these
-//! checks, the error would only occur in rename(2), after the new file is written.
+//! checks, the error would not occur until rename(2), after the new file has been written.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -10,7 +10,7 @@ use nix::unistd::{Uid, geteuid};
 /// Mode bit for directories in which only owners may replace files.
 const STICKY: u32 = 0o1000;
 
-/// A flag that protects a file or directory. Not even root can replace the file, or any file in the directory.
+/// A flag that protects a file, or all files in a directory. Not even root can replace a protected file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flag {
     /// `chattr +a`
@@ -20,7 +20,8 @@ pub(super) enum Flag {
 }
 
 impl Flag {
-    /// Flag of a file or directory. `None` if it has no such flag or the file system does not report flags.
+    /// Returns the flag that protects a file or directory. `None` if there is none or flags are not
+    /// supported.
     #[cfg(target_os = "linux")]
     pub(super) fn of(path: &Path) -> Option<Self> {
         use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
@@ -45,7 +46,7 @@ impl Flag {
         }
     }
 
-    /// Advice for removing the flag.
+    /// Returns advice on removing the flag.
     pub(super) fn removal_advice(self) -> &'static str {
         match self {
             Self::AppendOnly => "remove the flag (chattr -a) or choose another location",
@@ -152,7 +153,7 @@ mod tests {
         assert_eq!(fs::read(&old).expect("read"), b"new");
     }
 
-    /// Requires root, because a thread changes to another user.
+    /// Requires root, because a thread switches to another user.
     #[test]
     fn sticky_directories_protect_other_users_files() {
         use rustix::thread::{set_thread_res_gid, set_thread_res_uid};

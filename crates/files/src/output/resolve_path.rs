@@ -1,4 +1,5 @@
-//! Resolves the path of a file to write. Follows links, and detects special files and missing permissions.
+//! Resolves the path of a file before it is written. Follows links, and detects special files and missing
+//! permissions.
 
 use std::fs::{self, Metadata};
 use std::io::{self, ErrorKind};
@@ -156,7 +157,7 @@ fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), Output
 
 fn is_a_directory(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
-    OutputError::Target { path: path.to_owned(), why, way_out: "name a file in it" }
+    OutputError::Target { path: path.to_owned(), why, way_out: "specify a file in it" }
 }
 
 /// Directory of a path, or the working directory for a bare file name.

@@ -1,13 +1,13 @@
-//! Path of the scene in an image's metadata. It is relative to the image, so both can be moved together.
+//! The scene path in an image's metadata. It is relative to the image, so both can be moved together.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::resolve_path::directory_of;
 
-/// Returns the path of a scene relative to an image, with `/` as separator. If the scene is in the image's
-/// folder, the path starts with `./`, because earlier versions wrote bare file names for scenes in any
-/// folder.
+/// Returns a scene's path relative to an image, with `/` as the separator. If the scene is in the image's
+/// folder, the path starts with `./`. Bare file names are ambiguous, because earlier versions wrote them for
+/// scenes in any folder.
 pub fn relative(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
     let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
@@ -19,13 +19,13 @@ pub fn relative(scene: &Path, image: &Path) -> String {
     if names.len() == 1 { format!("./{}", names.concat()) } else { names.join("/") }
 }
 
-/// Whether `named`, from an image's metadata, refers to this scene.
+/// Whether the path `named` in an image's metadata refers to this scene.
 pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
     if !named.contains('/') {
         return named == bare(scene);
     }
     let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
-    // The image may be a link, written through either the path of the link or the path of its target.
+    // The image may be a link. It may have been written through the link's path or through the target's path.
     let target = fs::canonicalize(image).ok();
     [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
         let file = fs::canonicalize(directory_of(image).join(named));

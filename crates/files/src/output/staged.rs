@@ -50,8 +50,8 @@ pub fn create_files_atomically(
     Ok(())
 }
 
-/// Removes files that were already moved, and their folders unless they contain other files. Ignores errors
-/// because the caller reports the original error.
+/// Removes files that were already moved. Also removes their folders, unless these contain other files.
+/// Ignores errors because the caller reports the original error.
 fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn only_folders_of_dead_writers_are_removed() {
+    fn only_stale_folders_are_removed() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let living = StagingFolder::create(at, OsStr::new("a.toml")).expect("a folder");

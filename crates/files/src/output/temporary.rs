@@ -31,7 +31,8 @@ pub(super) struct TemporaryFile {
 }
 
 impl TemporaryFile {
-    /// Creates an empty, locked file `.NAME.glimt-<machine>-<process>-<number>.tmp` for a target called `name`.
+    /// Creates an empty, locked file for a target called `name`. The file is called
+    /// `.NAME.glimt-<machine>-<process>-<number>.tmp`.
     pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
             let path = directory.join(next_name(name));
@@ -49,7 +50,7 @@ impl TemporaryFile {
         Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
     }
 
-    /// Locks the file. Returns false if another process has locked or removed the file as stale.
+    /// Locks the file. Returns false if another process has locked it or has removed it as stale.
     fn claim(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
@@ -92,8 +93,8 @@ impl Drop for TemporaryFile {
     }
 }
 
-/// Tests whether files can be created in a directory, by creating an unnamed file or, if this is not
-/// supported, a file that is removed immediately. Some directories, such as /proc, reject files despite write
+/// Checks that files can be created in a directory. Creates an unnamed file or, if this is not supported, a
+/// named file that is removed immediately. Some directories, such as /proc, reject files despite write
 /// permission.
 pub(super) fn check_can_create(directory: &Path) -> io::Result<()> {
     if create_unnamed(directory).is_ok() {
@@ -112,8 +113,8 @@ fn create_unnamed(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Removes temporary files of killed processes on this machine, unless `is_kept` returns true. Keeps the
-/// files of other machines, earlier boots and running processes. Ignores files that cannot be removed,
+/// Removes temporary files left by killed processes on this machine, unless `is_kept` returns true. Keeps
+/// files from other machines, earlier boots and running processes. Ignores files that cannot be removed,
 /// because they must not prevent a write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale_entries(directory) {
@@ -123,7 +124,7 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     }
 }
 
-/// Removes temporary folders of killed processes on this machine, with their contents.
+/// Removes temporary folders left by killed processes on this machine, including their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
@@ -198,12 +199,12 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A temporary name of a process on this machine that has ended.
+    /// Returns a temporary name for a process that has ended on this machine.
     pub(in crate::output) fn dead_name(name: &str) -> OsString {
         name_of(OsStr::new(name), &dead_process())
     }
 
-    /// A temporary name of a process on another machine.
+    /// A temporary name from a process on another machine.
     pub(in crate::output) fn foreign_name(name: &str) -> OsString {
         let dead = dead_process();
         name_of(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
@@ -242,7 +243,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn only_files_of_dead_local_writers_are_removed() {
+    fn only_stale_local_files_are_removed() {
         let directory = tempfile::tempdir().expect("a directory");
         let living = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         let write = |name: OsString| {

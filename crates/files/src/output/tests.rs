@@ -364,7 +364,7 @@ fn guards_check_the_link_target_after_writing() {
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }
 
-/// A writer that is not root cannot restore the owner of a file. Requires root, because a thread changes its
+/// A writer that is not root cannot restore a file's owner. Requires root, because a thread changes its
 /// file system user to `nobody` (setfsuid(2)).
 #[cfg(target_os = "linux")]
 #[test]

@@ -22,7 +22,7 @@ pub(super) fn encode(
     Ok(bytes.into_bytes())
 }
 
-/// XMP packet with the metadata as the description, one line per item.
+/// Creates an XMP packet with the metadata as the description, one line per item.
 fn xmp_packet(options: &EncodeOptions) -> String {
     let lines = options.metadata.iter();
     let lines = lines.map(|(name, value)| escape_xml(&format!("{}: {}\n", one_line(name), one_line(value))));

@@ -21,14 +21,14 @@ use super::{AttributeLossPolicy, FileIdentity, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
-/// Path for standard output. The path is not opened, because this would fail for sockets.
+/// Path for standard output. The path is not opened, because opening fails for sockets.
 pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file atomically: writes and synchronizes a locked temporary file in the same directory, renames
-/// the temporary file, and synchronizes the directory. If the process is killed at any time, either the old or
-/// the new file exists. The permissions, access list, attributes and flags are kept. The owner is also kept if
-/// this process may change owners. If the path is a link, the target is replaced. Also removes temporary files
-/// in the same directory left by killed processes on this machine.
+/// the temporary file, and synchronizes the directory. Even if the process is killed, either the old
+/// or the new file exists. The permissions, access list, attributes and flags are kept. The owner is also
+/// kept if this process may change owners. If the path is a link, the target is replaced. Also removes
+/// temporary files in the same directory left by killed processes on this machine.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
@@ -41,7 +41,7 @@ pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     atomic_guarded(path, bytes, &guard, &CancelToken::new())
 }
 
-/// Creates a file without overwriting. Leaves no partial file on failure.
+/// Creates a file without overwriting an existing one. Leaves no partial file on failure.
 ///
 /// # Errors
 /// System errors such as [`ErrorKind::AlreadyExists`].
@@ -57,19 +57,19 @@ pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// Policy for existing files. `may_replace` is called just before the replacement, with the resolved path.
 pub struct WritePolicy<'a> {
-    /// Whether to keep a file whose name looks like a temporary file of a killed process.
+    /// Whether to keep a file whose name looks like a temporary file left by a killed process.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
-    /// Decides whether this file, existing or not, may be replaced or written in place.
+    /// Decides whether a file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
-    /// Folders already searched for temporary files of killed processes. If `None`, every write searches the
-    /// folder again.
+    /// Folders already searched for temporary files left by killed processes. If `None`, every write searches
+    /// the folder again.
     pub sweep: Option<&'a SweptFolders>,
-    /// Policy if a file's owner, access list or attributes cannot be kept.
+    /// What to do if a file's owner, access list or attributes cannot be kept.
     pub losses: AttributeLossPolicy<'a>,
 }
 
-/// Folders already searched for temporary files of killed processes. Avoids searching a folder again at every
-/// write.
+/// Folders already searched for temporary files left by killed processes. Avoids searching a folder again at
+/// every write.
 #[derive(Debug, Default)]
 pub struct SweptFolders(RefCell<HashSet<PathBuf>>);
 
@@ -84,7 +84,7 @@ impl SweptFolders {
 /// Like [`atomic`], but with a guard. Can be cancelled until the new file is complete.
 ///
 /// # Errors
-/// The errors of [`atomic`] and the guard, and [`OutputError::Cancelled`].
+/// Any error from [`atomic`] or the guard, or [`OutputError::Cancelled`].
 pub fn atomic_guarded(
     path: &Path,
     bytes: &[u8],
@@ -125,7 +125,7 @@ pub enum Durability {
 /// place.
 ///
 /// # Errors
-/// The errors of [`atomic_guarded`] and `content`.
+/// Any error from [`atomic_guarded`] or `content`.
 pub fn atomic_with(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -135,7 +135,7 @@ pub fn atomic_with(
     replace(path, content, guard, (token, durability, None))
 }
 
-/// Like [`atomic_with`], but if `expected` is given, replaces only a file with this content.
+/// Like [`atomic_with`], but if `expected` is set, replaces only a file with this content.
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -164,7 +164,7 @@ fn replace(
                     Some(file) => file,
                     None => {
                         (guard.may_replace)(&target.path)?;
-                        return Err(named(io::Error::other("it was changed in the meantime")));
+                        return Err(named(io::Error::other("it has changed in the meantime")));
                     }
                 },
             };
@@ -256,7 +256,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place. Appends to the target, so the content of an open file is kept.
+/// Writes in place. Appends to the target, so existing content in an open file is kept.
 fn write_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.

@@ -56,8 +56,8 @@ pub fn closest_by_brute_force(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit>
     hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
 }
 
-/// Rays in random directions, toward corners and edges, along axes with positive and negative zeros, from
-/// corners, and from triangles.
+/// Rays in random directions, toward corners and edges, and along axes (with positive and negative zeros).
+/// Some start at corners or on triangles.
 pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     let mut next = random(11);
     let mut rays = Vec::new();
@@ -75,7 +75,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
         rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
-        // A ray through an excluded triangle, and a ray that starts on one.
+        // Exclude the start triangle. One ray passes through it, and one starts on it.
         let start = (i % mesh.len().max(1)) as u32;
         rays.push(Ray::new(origin, target - origin).with_start_triangle(start));
         rays.push(Ray::new(target, Vec3::new(next(), next(), next())).with_start_triangle(start));

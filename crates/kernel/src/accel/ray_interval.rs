@@ -13,7 +13,7 @@ pub struct TreeNode {
     pub shapes: u32,
 }
 
-/// The part of a ray inside a box.
+/// The part of a ray that is inside a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayInterval {
     /// Distance at which the ray enters the box (negative if it starts inside), and the axis of the entry

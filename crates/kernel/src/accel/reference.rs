@@ -19,7 +19,7 @@ pub struct SimdBounds {
 impl SimdBounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
 
-    /// Box with the given corners.
+    /// Creates a box from its corners.
     #[inline(always)]
     pub fn new(min: Vec4, max: Vec4) -> Self {
         Self { min, minus_max: -max }
@@ -160,7 +160,8 @@ impl TriangleReference {
         [self.intersected_with(left, &parts[0]), self.intersected_with(right, &parts[1])]
     }
 
-    /// Replaces the reference's box with the intersection of both boxes, or by `half` if they do not overlap.
+    /// Replaces the reference's box with the intersection of both boxes, or with `half` if they do not
+    /// overlap.
     #[inline(always)]
     fn intersected_with(&self, half: SimdBounds, part: &SimdBounds) -> Self {
         let mut both =
@@ -253,7 +254,7 @@ impl ClippedTriangle {
         &self.points[..self.count]
     }
 
-    /// Bounding box. The corners are ∞ and −∞ if the polygon is empty.
+    /// Bounding box of the polygon. The corners are ∞ and −∞ if the polygon is empty.
     pub fn extent(&self) -> (DVec3, DVec3) {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))

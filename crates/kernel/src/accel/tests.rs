@@ -43,7 +43,7 @@ fn cuboid(squares: u32) -> TriangleSoup {
         .collect()
 }
 
-/// Triangles of various sizes at random positions. Some are long and thin.
+/// Triangles of different sizes at random positions. Some are long and thin.
 fn noise(seed: u64, count: usize) -> TriangleSoup {
     let mut next = random(seed);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -55,8 +55,8 @@ fn noise(seed: u64, count: usize) -> TriangleSoup {
     (0..count).map(triangle).collect()
 }
 
-/// More than fifty meshes: pathological meshes, boxes, and noise. Each is used unchanged, far from the
-/// origin, tiny, and huge.
+/// More than fifty meshes: pathological meshes, boxes, and noise. There are four copies of each mesh:
+/// unchanged, far from the origin, tiny, and huge.
 fn scenes() -> Vec<TriangleSoup> {
     let shorten = |mesh: TriangleSoup| mesh.into_iter().take(240).collect::<TriangleSoup>();
     let mut own: Vec<TriangleSoup> = difficult_meshes().into_iter().map(shorten).collect();
@@ -110,7 +110,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
-/// Number of rays for which any tree disagrees with brute force, and a description of the first such ray.
+/// Number of rays for which a tree disagrees with brute force, and a description of the first such ray.
 fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
     let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
     let mut next = random(seed);
@@ -148,7 +148,7 @@ fn no_difference(rays: usize) {
         .map(|scene| (scene, differences(&scenes[scene], scene as u64, rays.div_ceil(scenes.len()))))
         .filter(|(_, (different, _))| *different > 0)
         .collect();
-    assert!(faults.is_empty(), "trees differ from brute force in (scene, (rays, first ray)): {faults:#?}");
+    assert!(faults.is_empty(), "trees differ from brute force; (scene, (ray count, first ray)): {faults:#?}");
 }
 
 #[test]
@@ -184,8 +184,8 @@ fn kd_trees_of_all_scenes_are_valid() {
     }
 }
 
-/// Checks that this mesh is split into many leaves. With a single leaf, the tests above would not cover any
-/// planes.
+/// Checks that the mesh is split into many leaves. If it were a single leaf, the other tests would not cover
+/// any planes.
 #[test]
 fn kd_tree_splits_large_meshes() {
     let mesh = noise(9, 3000);
@@ -212,7 +212,7 @@ fn builds_can_be_canceled() {
 }
 
 #[test]
-fn validation_finds_a_moved_triangle() {
+fn validation_detects_a_moved_triangle() {
     let mesh = noise(9, 400);
     let mut shifted = mesh.clone();
     shifted[17] = shifted[17].map(|corner| corner + Vec3::splat(0.5));

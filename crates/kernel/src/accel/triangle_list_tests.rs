@@ -104,7 +104,7 @@ fn decided_packets_match_single_rays() {
             let (start, target) = (on(&triangles[from], next), on(&triangles[to], next));
             let own = Ray::new(start, target - start).with_start_triangle(from as u32);
             match kind {
-                // Bounce rays in random directions and shadow rays to other surfaces.
+                // Scattered rays in random directions, and shadow rays to other surfaces.
                 0 => Ray { direction: Vec3::new(next(), next(), next()), ..own },
                 1 => Ray { t_max: 1.0 - 1e-5, ..own },
                 // Rays toward corners, along edges, and along axes.
@@ -113,7 +113,7 @@ fn decided_packets_match_single_rays() {
                 4 => {
                     Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).with_start_triangle(from as u32)
                 }
-                // Rays from far away and rays within planes.
+                // Rays from far away, and rays in the plane of a triangle.
                 _ if to % 2 == 0 => Ray::new(start * 50.0 - target * 49.0, target - start),
                 _ => Ray::new(start, on(&triangles[from], next) - start),
             }
@@ -144,7 +144,7 @@ fn decided_packets_match_single_rays() {
         }
     }
     assert!(counts.iter().all(|[all, hits, _]| *all > 5000 && hits * 4 > *all), "{counts:?}");
-    assert!(left * 20 < bounces, "{left} of {bounces} rays are undecided");
+    assert!(left * 20 < bounces, "{left} of {bounces} scattered rays are undecided");
 }
 
 #[test]

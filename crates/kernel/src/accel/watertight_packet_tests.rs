@@ -35,7 +35,7 @@ fn packets_match_single_rays_bit_for_bit() {
     let mut next = signed(7);
     let (mut hits, mut shared) = (0, 0);
     for round in 0..20_000 {
-        // Triangles share corners and may be degenerate. Rays run parallel to an axis, toward corners, or
+        // Triangles share corners and may be degenerate. Rays are parallel to an axis, toward corners, or
         // from surfaces.
         let step = [1.0, 0.25, 1e-6][round % 3];
         let corners: Vec<Vec3> = (0..6)

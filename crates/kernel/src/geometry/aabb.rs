@@ -73,7 +73,7 @@ impl Aabb {
 /// Factor applied to distances to compensate for rounding in [`SlabRay::entry_distance`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
-/// [`SLAB_PAD`] for slab tests that multiply it by the inverse direction, which rounds once more.
+/// [`SLAB_PAD`] for slab tests that premultiply the inverse direction by it, which adds a rounding error.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
 /// Bound on the watertight triangle test's error perpendicular to a ray, relative to the distance. The error
@@ -95,8 +95,8 @@ impl SlabRay {
         Self { origin, margin: 0.0, inverse: direction.recip() }
     }
 
-    /// Preprocesses a ray for the boxes of triangles inside the box `whole`. The slab test then never misses
-    /// a box with a triangle that the watertight test may hit.
+    /// Preprocesses a ray for testing the bounding boxes of triangles inside the box `whole`. The slab test
+    /// then never misses a box with a triangle that the watertight test may hit.
     pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
         Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }

@@ -160,8 +160,8 @@ impl Cone {
         DVec2::new(angle_to_u(mirror_y(radial_direction(local.truncate()))), 1.0 - along / self.slant)
     }
 
-    /// Mean curvature at a point on a part. On the side, the curvature is in the direction around the axis,
-    /// and is unbounded at the tip.
+    /// Mean curvature at a point on a part. The side curves only around the axis, and its curvature is
+    /// unbounded at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.point_to_local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
@@ -289,7 +289,8 @@ mod tests {
 
     #[test]
     fn lines_parallel_to_the_side_cross_it_once() {
-        // Direction (−1, 2) is parallel to the left side. The ray passes through the right side and the base.
+        // The direction (−1, 2) is parallel to the left side. The ray passes through the right side and the
+        // base.
         let slope = Vec3::new(-1.0, -2.0, 0.0);
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         for capped in [true, false] {
@@ -316,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn texture_coordinates_rise_from_base_to_tip() {
+    fn v_increases_from_base_to_tip() {
         let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
         let hit = hat(true).intersect(&ray).expect("aimed at it");
         let surface = hat(true).surface(&ray, &hit);
@@ -353,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn distant_hits_use_the_right_crossing() {
+    fn distant_hits_use_the_correct_crossing() {
         hits_from_afar::<Cone>();
     }
 }

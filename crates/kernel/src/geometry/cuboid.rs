@@ -113,7 +113,7 @@ impl Cuboid {
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
-    /// Whether a surface point is farther than `margin` from all faces but one.
+    /// Whether a surface point is farther away than `margin` from all faces but one.
     pub fn is_on_one_face(&self, point: DVec3, margin: f64) -> bool {
         let from_center = point - self.center;
         let along = DVec3::new(
@@ -270,7 +270,7 @@ mod tests {
     fn rotated_boxes_are_hit_at_their_edges() {
         let cube = Cuboid::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
         let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X).to_f64();
-        let hit = cube.intersect(&ray).expect("the edge is on the axis");
+        let hit = cube.intersect(&ray).expect("the ray should hit the edge");
         assert!((f64::from(hit.t) - (5.0 - 2.0_f64.sqrt())).abs() < 1e-6);
         assert_eq!(cube.intersect(&Ray::new(Vec3::new(-5.0, 0.0, 1.42), Vec3::X).to_f64()), None);
     }

@@ -130,7 +130,7 @@ impl Cylinder {
         }
     }
 
-    /// Texture coordinate v for a point on the side.
+    /// Texture coordinate v of a point on the side.
     fn height(&self, z: f64) -> f64 {
         0.5 + z / (2.0 * self.half_length)
     }
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn texture_coordinates_follow_the_side() {
+    fn side_uvs_match_the_angle_and_the_height() {
         let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = bar(true).intersect(&ray).expect("aimed at it");
         let surface = bar(true).surface(&ray, &hit);
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn distant_hits_use_the_right_crossing() {
+    fn distant_hits_use_the_correct_crossing() {
         hits_from_afar::<Cylinder>();
     }
 }

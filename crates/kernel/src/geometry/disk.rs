@@ -34,7 +34,8 @@ impl Disk {
         Self { frame: AxialFrame::new(center, normal), radius }
     }
 
-    /// Intersects the plane and checks the border. `None` for rays in the plane.
+    /// Intersects the plane and checks that the hit is inside the border. Returns `None` for rays in the
+    /// plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(to_shape_hit)
     }
@@ -86,7 +87,7 @@ impl Disk {
         self.frame.origin.abs().max_element() + self.radius
     }
 
-    /// The nearest point of the disk in the plane's coordinates, and its texture coordinates.
+    /// Plane coordinates of the nearest point on the disk, and its texture coordinates.
     fn nearest_in_plane(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.point_to_local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
@@ -112,7 +113,7 @@ impl Disk {
         self.radius
     }
 
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     pub fn normal(&self) -> DVec3 {
         self.frame.axis()
     }
@@ -166,7 +167,7 @@ mod tests {
     use crate::math::{Vec2, Vec3};
 
     #[test]
-    fn hits_are_inside_the_border_from_both_sides() {
+    fn hits_from_both_sides_are_inside_the_border() {
         let disk = Disk::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 4.0), 0.5);
         for (x, is_hit) in [(0.0, true), (0.5, true), (-0.5, true), (0.500_001, false)] {
             for z in [-2.0_f32, 2.0] {

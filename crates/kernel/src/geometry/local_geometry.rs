@@ -36,7 +36,7 @@ pub struct NearestSurface {
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// A plane, at least up to this distance.
+    /// A plane that extends at least up to this distance.
     Flat(f64),
     /// A sphere of this radius.
     Round(f64),

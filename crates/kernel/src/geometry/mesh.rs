@@ -28,7 +28,7 @@ pub struct TriangleMesh {
     pub materials: Vec<u32>,
 }
 
-/// The normal group of a vertex.
+/// A vertex's normal group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NormalGroup {
     /// Vertices with the same number share a normal. Must be less than the number of vertices in the file.

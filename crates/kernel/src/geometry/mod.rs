@@ -1,7 +1,7 @@
 //! Rays, boxes, shapes and hits with error bounds.
 //!
-//! Mesh triangles are intersected in `f32` with a watertight test. All other shapes are flat, quadrics, or
-//! tori. They are intersected in `f64`, so their rounding errors are invisible to `f32` rays.
+//! Mesh triangles are intersected in `f32` with a watertight test. All other shapes (flat shapes, quadrics,
+//! and tori) are intersected in `f64`, so their rounding errors are invisible to `f32` rays.
 
 pub mod aabb;
 pub mod cone;
@@ -159,7 +159,7 @@ impl Shape {
         for_shape!(self, it => it.surface(ray, hit))
     }
 
-    /// Surface point at a hit, including at least the requested parts.
+    /// Surface point at a hit, with at least the requested fields.
     #[inline]
     pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         if asked.uv {
@@ -307,7 +307,7 @@ impl Shape {
     }
 
     /// Whether a ray that crosses the surface at a point must travel farther than `distance` before it can
-    /// hit another side. False if unknown.
+    /// hit the shape again. False if unknown.
     #[inline]
     pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         match self {
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_match_with_and_without_coordinates() {
+    fn surfaces_match_with_and_without_uvs() {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
                 let [bare, full] = [false, true]
@@ -468,7 +468,7 @@ mod tests {
     fn rays_hit_fronts_on_entry_and_backs_on_exit() {
         for shape in shapes() {
             let mut seen = 0;
-            // A tube or an open cone also contains points, although its surface is not closed.
+            // A tube or an open cone also contains points, although its surface is open.
             let is_closed = match shape {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
                 Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),

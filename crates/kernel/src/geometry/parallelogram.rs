@@ -41,7 +41,7 @@ impl Parallelogram {
         }
     }
 
-    /// Intersects the plane and checks the edges.
+    /// Intersects the plane and checks that the hit is inside the quad.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);

@@ -13,7 +13,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 pub struct Plane {
     /// A point on the plane. Its texture coordinates are (0, 0).
     pub point: DVec3,
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     normal: DVec3,
     u: DVec3,
     v: DVec3,
@@ -27,7 +27,7 @@ impl Plane {
         Self { point, normal, u, v }
     }
 
-    /// Intersects the plane. `None` for rays within the plane or parallel to it.
+    /// Intersects the plane. `None` for rays in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
@@ -92,7 +92,7 @@ impl Plane {
         self.point
     }
 
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     pub fn normal(&self) -> DVec3 {
         self.normal
     }

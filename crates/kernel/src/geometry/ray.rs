@@ -43,7 +43,7 @@ impl Ray {
         Self { t_max: 1.0 - shortening.min(0.5), ..Self::new(from, direction) }
     }
 
-    /// Extends the segment by the error of its endpoint.
+    /// Extends the segment by the error bound of its endpoint.
     #[inline(always)]
     pub fn extended_by(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
@@ -90,7 +90,7 @@ impl RayF64 {
 }
 
 /// Moves the origin of a ray off the surface at `point`. If `error` bounds the errors of the components of
-/// `point`, the new origin is guaranteed to be on the side of the surface that the direction points to
+/// `point`, the new origin is guaranteed to be on the side of the surface toward which the direction points
 /// (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., section 6.8.6).
 #[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {

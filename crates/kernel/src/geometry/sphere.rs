@@ -134,7 +134,7 @@ impl Sphere {
         (point - self.center).length() < self.radius
     }
 
-    /// Projected area, which is the area of a great circle for every direction.
+    /// Projected area. For every direction, this is the area enclosed by a great circle.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_hit_spheres_twice_once_or_never() {
+    fn rays_hit_spheres_twice_once_or_not_at_all() {
         let ray = |x: f32| Ray::new(Vec3::new(x, 0.0, -3.0), Vec3::Z).to_f64();
         assert_eq!(unit().intersect(&ray(0.0)).map(|hit| hit.t), Some(2.0));
         assert_eq!(unit().intersect(&ray(1.0)).map(|hit| hit.t), Some(3.0));
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn texture_coordinates_have_known_values() {
+    fn texture_coordinates_have_expected_values() {
         let (uv, ..) = sphere_parametrization(DVec3::ONE.normalize());
         assert!((uv.x - 0.625).abs() < 1e-6 && (uv.y - 0.695_913_3).abs() < 1e-6);
         for pole in [DVec3::Y, DVec3::NEG_Y] {

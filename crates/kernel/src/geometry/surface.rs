@@ -29,7 +29,7 @@ pub struct SurfacePoint {
     pub point: Vec3,
     /// Bound on each component's error, including the error of the shape's intersection test.
     pub error: Vec3,
-    /// Unit geometric normal of the front.
+    /// Unit geometric normal on the front side.
     pub normal: Vec3,
     /// Origin of shadow rays on the camera's side. It is `point` itself, or a point above `point` if flat
     /// triangles approximate a convex surface. Only valid if the segment from `point` is unobstructed.
@@ -47,7 +47,7 @@ pub struct SurfacePoint {
     pub barycentric: Vec3,
 }
 
-/// Optional parts of a [`SurfacePoint`]. Parts that are not requested may be 0 or equal to the point.
+/// Optional fields of a [`SurfacePoint`]. Fields that are not requested may be 0 or equal to the point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SurfaceRequest {
     /// Texture coordinates and tangents.
@@ -57,7 +57,7 @@ pub struct SurfaceRequest {
 }
 
 impl SurfaceRequest {
-    /// Requests all optional parts.
+    /// Requests all optional fields.
     pub const ALL: Self = Self { uv: true, shadow_point: true };
 }
 
@@ -66,7 +66,7 @@ impl SurfaceRequest {
 pub struct AreaPoint {
     /// The point.
     pub point: DVec3,
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     pub normal: DVec3,
 }
 
@@ -91,8 +91,8 @@ impl SurfacePoint {
     }
 }
 
-/// Error bound for each component of a point computed in double precision, including the next intersection
-/// test from there. `reach` is the largest magnitude among the lengths in these computations.
+/// Error bound for each component of a point computed in double precision, and for the next intersection test
+/// from there. `reach` is the largest magnitude among the lengths in these computations.
 #[inline(always)]
 pub fn point_error_bound(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat(f64_error_bound(reach))

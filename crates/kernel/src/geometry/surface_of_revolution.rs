@@ -1,4 +1,4 @@
-//! Surfaces of revolution: local frames, lines in these frames, and intersections with a shape's parts.
+//! Surfaces of revolution: local frames, lines in local coordinates, and intersections with a shape's parts.
 
 use std::f64::consts::PI;
 
@@ -65,7 +65,7 @@ impl AxialFrame {
         self.swept_sphere_bounds(height, radius, 0.0)
     }
 
-    /// Bounding box of all balls of radius `ball` with centers on a circle around the axis. Expanded to
+    /// Bounding box of all balls with radius `ball` with centers on a circle around the axis. Expanded to
     /// account for rounding.
     pub fn swept_sphere_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point_to_world(DVec3::new(0.0, 0.0, height));
@@ -89,7 +89,8 @@ pub struct LocalLine {
     pub start: f64,
 }
 
-/// Interval on a line, relative to the line's foot. Each end is stored with the index of its part.
+/// Interval on a line, relative to the line's closest point to the origin. Each end is stored with the index
+/// of its part.
 #[derive(Clone, Copy, Debug)]
 pub struct LineInterval {
     /// Start of the interval.
@@ -167,7 +168,7 @@ pub fn first_hit(
 /// root of a unit in the last place.
 const NEAR_START: f64 = 1e-12;
 
-/// Whether a distance from a surface is within the rounding error of numbers up to `size`.
+/// Whether a distance from a surface is within the rounding error of numbers with magnitudes up to `size`.
 pub fn is_within_rounding_error(distance: f64, size: f64) -> bool {
     distance.abs() <= 8.0 * f64::EPSILON * size
 }
@@ -234,7 +235,7 @@ pub fn angle_to_u(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
-/// Inverse of [`angle_to_u`]: the direction at a value of `u`.
+/// Inverse of [`angle_to_u`]: the direction for a value of `u`.
 pub fn direction_at_u(u: f64) -> DVec2 {
     let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
     DVec2::new(cos, sin)
@@ -252,7 +253,7 @@ pub(super) mod tests {
 
     #[test]
     fn rays_do_not_rehit_curved_shapes_at_origin() {
-        // All of these shapes are in z ≥ 0 and touch the origin.
+        // All of these shapes touch the origin and have z ≥ 0.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);
         for _ in 0..2000 {
@@ -294,7 +295,7 @@ pub(super) mod tests {
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
     }
 
-    /// Checks hit points of distant rays, where both crossings of the side round to the same distance.
+    /// Checks hit points of rays so distant that both crossings of the side round to the same distance.
     pub fn hits_from_afar<T: Thin + std::fmt::Debug>() {
         let mut ambiguous = 0;
         for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {

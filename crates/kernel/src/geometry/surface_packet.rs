@@ -14,7 +14,7 @@ pub struct SurfacePacket {
     pub point: Vec3x16,
     /// Bounds on the errors of the points.
     pub error: Vec3x16,
-    /// Unit geometric normals of the fronts.
+    /// Unit geometric normals on the front sides.
     pub normal: Vec3x16,
     /// Mask of the lanes whose shading normal and shadow point are set.
     pub smooth: u32,
@@ -30,7 +30,7 @@ pub struct SurfacePacket {
 pub struct SurfacePointF64 {
     /// The point in world coordinates.
     pub point: DVec3,
-    /// Normal of the front, not necessarily of unit length.
+    /// Normal on the front side, not necessarily of unit length.
     pub normal: DVec3,
     /// Largest magnitude among the lengths used to compute the point.
     pub reach: f64,

@@ -6,8 +6,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle is considered huge if its coordinates exceed this multiple of the coordinates of the ray's
-/// origin and the hit.
+/// A triangle is considered huge if its coordinates exceed those of the ray's origin and of the hit by this
+/// factor.
 const HUGE: f64 = 1024.0;
 
 /// A triangle. The front faces along (b − a) × (c − a).

@@ -44,7 +44,7 @@ const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
 const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 
-/// Maximum coordinate error at which a miss can be decided with certainty.
+/// Maximum coordinate error at which a miss is still certain.
 const BLUNT: f32 = 0.125;
 
 /// Maximum of D/(2A), multiplied by the extent of all triangles.
@@ -393,8 +393,9 @@ impl Facet {
     }
 }
 
-/// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram: first the
-/// first triangle's outer corner, last the second triangle's outer corner. `None` for other triangles.
+/// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram. The first
+/// triangle's outer corner becomes its first corner, and the second triangle's outer corner becomes its last.
+/// `None` for other triangles.
 fn pair_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
@@ -413,8 +414,8 @@ fn pair_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Ve
     (is_flat && is_near).then_some([[a, b, c], [b, c, d]])
 }
 
-/// Maximum distance of the fourth corner of a flat quadrilateral from its plane, relative to the largest
-/// coordinate.
+/// Maximum distance of the fourth corner of a flat quadrilateral from the plane of the other three, relative
+/// to the largest coordinate.
 const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
 
 /// Maximum deviation of the fourth corner from a parallelogram, relative to the edges.

@@ -167,8 +167,8 @@ fn greatest(a: f32, b: f32) -> f32 {
 }
 
 /// Finds the point on the segment from p to q that is nearest to the ray. z coordinates are distances along
-/// the ray. Returns the squared distance from the ray, the fraction of the segment, and the distance along
-/// the ray.
+/// the ray. Returns the squared distance from the ray, the position on the segment as a fraction, and the
+/// distance along the ray.
 fn nearest_on_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
@@ -199,8 +199,8 @@ mod tests {
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {
-            // A tilted square, split into a narrow strip of this width across the middle and two remaining
-            // parts.
+            // Split a tilted square into three parts: a strip of this width across the middle, and the two
+            // remaining parts.
             let point = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.2 * y);
             let [low, high] = [-width, width].map(|w| 0.5 * w);
             let quad = |a: f32, b: f32| {

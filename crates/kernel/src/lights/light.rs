@@ -9,7 +9,8 @@ use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 
-/// A light of any kind. Not boxed because area lights, the most common kind, should be contiguous in memory.
+/// A light of any kind. Area lights, the most common kind, are not boxed because they should be contiguous in
+/// memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
@@ -25,7 +26,7 @@ pub enum Light {
     Area(AreaLight),
 }
 
-/// A light as a member of one of three families. The lights in a family have common methods.
+/// A light of one of the three families. All lights in a family have the same methods.
 #[derive(Clone, Copy)]
 pub enum LightFamily<'a> {
     /// A light without extent.
@@ -97,7 +98,7 @@ impl Light {
         inverse
     }
 
-    /// [`Light::inverse_pdfs`] for a single sample, from its direction and weight.
+    /// [`Light::inverse_pdfs`] for a single sample, computed from its direction and weight.
     #[inline(always)]
     pub(super) fn inverse_pdf(&self, direction: Vec3, weight: Vec3) -> f32 {
         match self {
@@ -162,8 +163,8 @@ impl Light {
         }
     }
 
-    /// The light's center, and the light's own geometry, which rays toward the center must ignore. `None` for
-    /// an environment.
+    /// The light's center, and the light's own geometry. Rays toward the center must ignore this geometry.
+    /// `None` for an environment.
     pub fn center(&self) -> Option<(LightCenter, LightGeometry)> {
         Some(match self.family() {
             LightFamily::Delta(light) => {

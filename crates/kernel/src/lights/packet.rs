@@ -1,4 +1,4 @@
-//! Samples of one light for a packet of points.
+//! Samples one light for a packet of points.
 
 use super::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::math::Vec3;
@@ -14,11 +14,11 @@ pub struct LightSamplePacket {
     pub targets: Vec3x16,
     /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
-    /// Geometry to be ignored by shadow rays.
+    /// Geometry that the shadow rays ignore.
     pub sources: LightObjectPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
-    /// Inverse pdfs in sr, only for environments. Other lights compute them on request.
+    /// Inverse pdfs in sr, set only for environments. For other lights, they are computed on request.
     pub(super) environment_inverse_pdfs: F32x16,
 }
 
@@ -26,7 +26,7 @@ pub struct LightSamplePacket {
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct LightObjectPacket {
-    /// Object index, or [`LightObjectPacket::NONE`] for no geometry.
+    /// Object index, or [`LightObjectPacket::NONE`] if there is no geometry.
     pub object: [u32; PACKET_SIZE],
     /// Primitive index, or [`LightObjectPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
@@ -35,7 +35,7 @@ pub struct LightObjectPacket {
 }
 
 impl LightObjectPacket {
-    /// Marks a lane that has no object, or that refers to an entire object.
+    /// Marks a lane that has no object, or a lane that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
     /// Marks a [`LightGeometry::SeeThrough`] lane. No primitive has this index.
@@ -85,7 +85,8 @@ fn object_and_part(source: LightGeometry) -> (u32, u32) {
 }
 
 /// Builds a packet from the direction, target, and weight of each lane. This is a macro because a function
-/// with a closure is not always inlined, and would then not be compiled with the caller's instruction set.
+/// with a closure is not always inlined, in which case it would not be compiled with the caller's instruction
+/// set.
 macro_rules! packet_of {
     ($source:expr, $i:ident => $sample:expr) => {{
         let mut row = $crate::lights::packet::LightSamplePacket::black($source);

@@ -1,4 +1,4 @@
-//! Light samples for a packet of points, where each point has its own light.
+//! Light sampling for a packet of points in which each point has its own light.
 
 use super::area::mesh::{AreaSampledTriangles, MeshEmitter};
 use super::area::packet::triangle_packet_of;
@@ -46,7 +46,7 @@ impl Lights {
         }
         let mut row = LightSamplePacket::black(LightGeometry::Nothing);
         let mut left = used;
-        // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, and
+        // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, but
         // their results are discarded.
         while left != 0 {
             let first = left.trailing_zeros() as usize % PACKET_SIZE;
@@ -79,7 +79,7 @@ impl Lights {
                 };
                 LightSamplePacket::sample_one_by_one(points, of, sample)
             };
-            // Usually, all lanes have picked lights of the same kind.
+            // Usually, all lanes have lights of the same kind.
             if of == used {
                 row = found;
             } else {
@@ -124,7 +124,7 @@ fn area_sampled(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     light.shape.as_mesh().and_then(MeshEmitter::area_sampled).map(|facets| (facets, light))
 }
 
-/// Returns the lights of one kind. Adds the lanes that have such a light to `of`. The other lanes get
+/// Returns each lane's light of one kind. Adds the lanes that have such a light to `of`. The other lanes get
 /// `filler`.
 #[inline(always)]
 fn lights_of_kind<'a, T: Copy>(

@@ -2,7 +2,7 @@
 
 use crate::math::Vec3;
 
-/// A sample of the light arriving at a point.
+/// A sample of the light that arrives at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// End of the shadow ray.
@@ -25,7 +25,7 @@ pub enum ShadowRayEnd {
     Beyond,
 }
 
-/// Position of a light's center.
+/// Location of a light's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightCenter {
     /// A point in world coordinates.
@@ -43,7 +43,7 @@ pub enum LightGeometry {
     Object(u32),
     /// A surface point on a see-through object. Other parts of the object may attenuate a ray to the point.
     SeeThrough(u32),
-    /// One primitive of an object.
+    /// A single primitive of an object.
     Primitive(u32, u32),
 }
 
@@ -54,7 +54,7 @@ pub struct LightHit {
     pub direction: Vec3,
     /// Distance to the point.
     pub distance: f32,
-    /// Unit normal on the light's front.
+    /// Unit normal on the light's front side.
     pub normal: Vec3,
     /// Index of the hit primitive.
     pub primitive: u32,

@@ -24,16 +24,16 @@ pub struct Lights {
     environment: Option<(u32, Environment)>,
     /// Tree over all lights. `None` if there are few lights.
     tree: Option<Arc<LightTree>>,
-    /// Tree over all lights except those at infinity. `None` if paths sample every light.
+    /// Tree over all lights except lights at infinity. `None` if path vertices sample every light.
     local_tree: Option<Arc<LightTree>>,
 }
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplingMode {
-    /// Direct lighting only, where light sampling is the only source of noise.
+    /// Only direct lighting. Light sampling is the only source of noise.
     Eye,
-    /// Path vertices, where the image also has other noise.
+    /// Path tracing. The image also has noise from other sources.
     Paths,
 }
 
@@ -42,19 +42,19 @@ pub enum SamplingMode {
 pub struct LightSampler<'a> {
     /// Tree over the lights to choose from.
     pub tree: &'a LightTree,
-    /// How much work to spend on picking.
+    /// Effort to spend on picking lights.
     pub picks: LightSamplingEffort,
     /// Whether lights at infinity are sampled at every vertex instead of being in the tree. Their bounds
     /// ignore occlusion.
     pub leaves_beyond: bool,
 }
 
-/// How much work to spend on picking lights at a vertex.
+/// Effort to spend on picking lights at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightSamplingEffort {
     /// Number of lights to pick for each requested light sample.
     pub count: u32,
-    /// Maximum number of tree nodes to examine for all picks together.
+    /// Maximum total number of tree nodes to examine for all picks.
     nodes: usize,
 }
 
@@ -62,17 +62,18 @@ impl LightSamplingEffort {
     /// Effort for direct lighting. Gives results as good as examining each of a thousand lights.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
-    /// Effort for path vertices. More shadow rays are not worthwhile because of the other noise.
+    /// Effort for path vertices. Additional shadow rays are not worthwhile because the image also has other
+    /// noise.
     pub const PATHS: Self = Self { count: 1, nodes: 8 };
 
-    /// Creates a cut of a tree for this effort.
+    /// Creates a cut through a tree for this effort.
     #[inline(always)]
     pub fn cut(self, tree: &LightTree) -> LightTreeCut<'_> {
         LightTreeCut::new(tree, self.nodes)
     }
 }
 
-/// Expected number of samples for each light at a vertex, per requested sample.
+/// Expected number of samples that each light gets at a vertex, per requested sample.
 pub struct ExpectedSamples<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
 impl ExpectedSamples<'_> {
@@ -89,7 +90,7 @@ impl ExpectedSamples<'_> {
     }
 }
 
-/// The lights on one object.
+/// The lights that belong to one object.
 #[derive(Clone, Debug, PartialEq)]
 enum ObjectLights {
     /// A single light.
@@ -129,8 +130,8 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Path vertices sample all local lights if there are at most this many, and otherwise pick one. Measured
-    /// in rooms with 3 to 12 lights.
+    /// Path vertices sample all local lights if there are at most this many. Otherwise, they pick one.
+    /// Measured in rooms with 3 to 12 lights.
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.

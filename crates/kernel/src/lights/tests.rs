@@ -46,7 +46,7 @@ fn lights_of(shape: &Shape) -> Lights {
 const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
-/// A ray's hit on a shape.
+/// Finds the point where a ray hits a shape.
 pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
@@ -54,7 +54,7 @@ pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit
     Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
-/// Samples of a light from a point: directions, targets, and inverse pdfs.
+/// Samples a light from a point. Returns directions, targets, and inverse pdfs.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
         let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(number));
@@ -146,12 +146,12 @@ fn points() -> [Vec3; 3] {
 }
 
 #[test]
-fn sample_pdf_equals_pdf_of_its_hit() {
+fn sample_pdf_equals_pdf_of_hit() {
     for shape in shapes() {
         let lights = lights_of(&shape);
         let (mut compared, mut hidden) = (0, 0);
         for from in points() {
-            // Skip the point light.
+            // Skip the point light, which rays cannot hit.
             for (number, light) in lights.iter().skip(1) {
                 for (direction, target, factor) in samples(light, number, from, 64) {
                     let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
@@ -161,7 +161,7 @@ fn sample_pdf_equals_pdf_of_its_hit() {
                         continue;
                     }
                     let (found, light_at) =
-                        lights.light_at(OBJECT, hit.primitive, Side::Front).expect("the object is a light");
+                        lights.light_at(OBJECT, hit.primitive, Side::Front).expect("expected a light");
                     assert_eq!(found, number, "{shape:?}");
                     let product = light_at.pdf(from, Vec3::Y, &light_hit) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
@@ -169,7 +169,7 @@ fn sample_pdf_equals_pdf_of_its_hit() {
                 }
             }
         }
-        assert!(compared >= 64 && hidden * 3 < compared, "{shape:?}: {compared}, {hidden} hidden");
+        assert!(compared >= 64 && hidden * 3 < compared, "{shape:?}: {compared} compared, {hidden} hidden");
     }
 }
 
@@ -229,7 +229,7 @@ fn two_sided_samples_cover_the_visible_shape() {
 }
 
 #[test]
-fn back_sample_pdf_equals_pdf_of_its_hit() {
+fn back_sample_pdf_equals_pdf_of_hit() {
     let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false));
     for shape in shapes().into_iter().chain([tube]) {
         let light = Light::Area(back_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
@@ -242,7 +242,7 @@ fn back_sample_pdf_equals_pdf_of_its_hit() {
                 if (from + direction * light_hit.distance - target).length() > 1e-3 {
                     continue;
                 }
-                assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: sample is on the front");
+                assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: a sample is on the front");
                 let product = light.pdf(from, Vec3::Y, &light_hit) * factor;
                 assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                 compared += 1;
@@ -423,7 +423,7 @@ fn non_parallelograms_are_sampled_by_area() {
         ([x + y + DVec3::Z * 0.1, y, x], "a fold"),
         ([x + y, x, y], "opposite orientations"),
         ([x + y, y + x * 1e-3, x], "no common edge"),
-        ([x + y, x * 2.0, y * 2.0], "at most one common corner"),
+        ([x + y, x * 2.0, y * 2.0], "no common corner"),
     ] {
         assert!(mesh_light(&[first, second]).shape.as_quad().is_none(), "{what}");
     }
@@ -443,7 +443,7 @@ fn area_samples_are_proportional_to_area() {
     const COUNT: u32 = 1 << 14;
     for sample in 0..COUNT {
         let u = PixelSampler::new(3, 1, 4, sample).pair(1, Dimension::ChosenLight);
-        let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("seen from the front") };
+        let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("expected a sample") };
         let LightGeometry::Primitive(OBJECT, part) = sample.source else { panic!("expected a triangle") };
         counts[(part - 5) as usize] += 1;
         flux += f64::from(sample.weight.x * -sample.direction.z) / f64::from(COUNT);

@@ -48,7 +48,7 @@ fn spread(samples: &[f64]) -> (f64, f64) {
     (mean, variance.sqrt() / mean)
 }
 
-/// Shapes with a size of about 1, at a distance of `gap` above or next to the origin.
+/// Shapes about 1 unit in size, at a distance of `gap` above or next to the origin.
 fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
     let at = |x: f64, y: f64| DVec3::new(x, y + gap, 0.0);
     let slant = DVec3::new(0.1, 1.0, 0.05).normalize();
@@ -110,11 +110,11 @@ fn area_light_variance_is_bounded() {
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
-/// Two relative standard deviations: for a sphere in the same mean direction with the shape's solid angle
-/// (above and below the floor), and for the cosine at the receiver if directions are uniform over the shape's
-/// solid angle.
+/// Computes two relative standard deviations. The first is for a sphere with the same mean direction and
+/// solid angle as the shape (above and below the floor). The second is for the cosine at the receiver if
+/// directions are uniform over the shape's solid angle.
 fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
-    // Shoot rays around the shape's center and keep those that hit its front.
+    // Trace rays in a cone around the shape's center, and keep the rays that hit its front.
     let frame = Frame::from_normal((shape.centroid().as_vec3() - from).normalize());
     let (mut solid_angle, mut sum, mut cosines) = (0.0, Vec3::ZERO, Vec::new());
     let around = shape.bounds().expect("expected a finite shape");
@@ -139,12 +139,12 @@ fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
 
 /// Number of direction cells along each axis.
 const SIDE: usize = 20;
-/// Number of squares per side of a cell. The pdf is evaluated once per square.
+/// Number of squares along each side of a cell. The pdf is evaluated once per square.
 const FINE: usize = 30;
 /// Number of samples per light.
 const COUNT: usize = 400_000;
 
-/// Gaps below the lights, and points on the floor from which the lights are sampled.
+/// Distances from the floor to the lights, and points on the floor for which the lights are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];
 
 #[test]
@@ -163,7 +163,7 @@ fn shape_samples_follow_their_pdf() {
 #[test]
 fn textured_quad_samples_follow_their_pdf() {
     for (gap, from) in PLACES {
-        // If the quad were closer, the borders of bright areas would be too slanted for the squares.
+        // If the quad were closer, the edges of bright areas would be too slanted relative to the squares.
         for (name, shape, light) in textured_quads(gap + 0.3) {
             let name = format!("{name} at {gap}");
             assert!(follows_its_pdf(&name, &shape, &light, from), "{name}");
@@ -222,7 +222,7 @@ fn textured_quad_pdf_matches_its_samples() {
 
 #[test]
 fn small_bright_areas_have_low_variance() {
-    // One hundredth of the square is bright. It has the same irradiance as a square one tenth as wide.
+    // One hundredth of the square is bright. It causes the same irradiance as a square one tenth as wide.
     let bright =
         |[x, y]: [f64; 2]| -> f32 { if x > 0.3 && x < 0.4 && y > 0.6 && y < 0.7 { 1.0 } else { 0.0 } };
     for gap in [0.3, 2.0] {
@@ -254,7 +254,8 @@ fn small_bright_areas_have_low_variance() {
     }
 }
 
-/// The expected number of samples in each cell (the integral of the pdf), and the variance of this estimate.
+/// Computes the expected number of samples in each cell by integrating the pdf. Also returns the variance of
+/// this estimate.
 fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Directions) -> Vec<(f64, f64)> {
     let square = directions.solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
     let mut random = PcgRandom(3);
@@ -277,7 +278,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
     bins
 }
 
-/// Compares sample counts with expected counts. Returns whether enough cells have samples.
+/// Compares sample counts with expected counts. Returns whether enough cells contain samples.
 fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
     let total: f64 = expected.iter().map(|(wanted, _)| wanted).sum();
     let off = total - bins.iter().sum::<usize>() as f64;
@@ -304,7 +305,7 @@ fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
     cells >= 5
 }
 
-/// Checks the irradiance at the origin, on the floor, from a light with radiance 1. Compares an estimate from
+/// Checks the irradiance from a light with radiance 1 at the origin, on the floor. Compares an estimate from
 /// independent samples with the exact value. The difference must be within four standard errors, and the
 /// standard error has an upper bound.
 #[track_caller]
@@ -356,7 +357,7 @@ fn irradiance_matches_closed_forms() {
         assert_irradiance(&Shape::Box(Cuboid::new(center, DVec3::ONE, DVec3::ZERO)), exact, error);
     }
     // The irradiance from a distant convex body is its radiance times its projected area: 2·R·h for a
-    // cylinder seen from the side, R·h for a cone.
+    // cylinder seen from the side, and R·h for a cone.
     let up = DVec3::Y * 1e5;
     let far = |shown: f64| shown * 1e-10;
     let bar = Cylinder::new(up - DVec3::X, up + DVec3::X, 0.5, true);
@@ -387,7 +388,7 @@ impl Directions {
     }
 }
 
-/// Number of samples in each direction cell. `None` if there are no samples.
+/// Counts the samples in each direction cell. Returns `None` if there are no samples.
 fn histogram(light: &AreaLight, from: Vec3) -> Option<(Directions, Vec<usize>)> {
     let mut random = PcgRandom(11);
     let samples: Vec<Vec3> = (0..COUNT)

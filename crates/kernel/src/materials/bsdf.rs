@@ -17,7 +17,7 @@ use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Vec3x16};
 /// A packet of texture coordinates.
 pub type UvRow = [[f64; PACKET_SIZE]; 2];
 
-/// The lobes that contribute to an image.
+/// The lobes that an image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShownLobes {
     /// Lobes selected by role.
@@ -81,23 +81,23 @@ impl BsdfValues {
     }
 }
 
-/// Sampled directions for continuing paths, on either side of the surfaces.
+/// Sampled directions in which paths continue, on either side of the surfaces.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct SideSamples {
     /// Unit directions.
     pub directions: Vec3x16,
-    /// Pdfs of the directions in sr⁻¹. 0 if no light arrives from there.
+    /// Pdfs of the directions in sr⁻¹. 0 for directions from which no light arrives.
     pub densities: F32x16,
     /// f·cosθ of the lobe divided by the pdf.
     pub shares: F32x16,
-    /// Factors to be applied to `shares` for the shown lobes.
+    /// Factors to apply to `shares` for the shown lobes.
     pub shown: F32x16,
-    /// Mask of directions on the opposite side from the packet's light.
+    /// Mask of the directions on the side opposite the packet's light.
     pub beyond: Mask,
 }
 
-/// Shape of a narrow lobe for light selection, as a power of the cosine around an axis.
+/// Shape of a narrow lobe, approximated as a power of a cosine around an axis. Used for light selection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NarrowLobe {
     /// Unit direction of the axis.
@@ -111,8 +111,8 @@ pub struct NarrowLobe {
 }
 
 impl NarrowLobe {
-    /// A microfacet lobe with the given α and reflectance, in addition to wide lobes. Around the mirror
-    /// direction, an exponent of 1/2α² matches the curvature of the peak.
+    /// Approximates a microfacet lobe with the given α and reflectance, in addition to wide lobes. An
+    /// exponent of 1/2α² matches the curvature of the peak in the mirror direction.
     #[inline(always)]
     pub(super) fn of_microfacets(
         normal: Vec3,
@@ -133,13 +133,13 @@ impl NarrowLobe {
 
 /// A non-specular material with textures and parameters.
 pub trait RoughMaterial {
-    /// The material at one point.
+    /// The material at a single point.
     type Point: RoughPoint;
 
-    /// The material at one point, with its textures looked up. Counts texture lookups in `lookups`.
+    /// Looks up the textures and returns the material at a single point. Counts texture lookups in `lookups`.
     fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Self::Point;
 
-    /// The material with all textures replaced by white.
+    /// The material with all textures replaced by white ones.
     fn with_white_textures(&self) -> Self::Point;
 
     /// The material's values if it has no textures.
@@ -148,17 +148,17 @@ pub trait RoughMaterial {
     /// The material's main color. Counts texture lookups in `lookups`.
     fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
 
-    /// Reflectance of ambient light.
+    /// Reflectance for ambient light.
     fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
 
     /// All textures of the material.
     fn textures(&self) -> impl Iterator<Item = &Arc<Texture>>;
 
-    /// Whether packets can be filled with the material, with at most a lookup of
+    /// Whether packets can be filled with the material by looking up at most one texture,
     /// [`RoughMaterial::row_texture`].
     fn supports_packets(&self) -> bool;
 
-    /// The texture that packets look up, if any.
+    /// The texture that packets look up. `None` if there is no such texture.
     fn row_texture(&self) -> Option<&Texture>;
 
     /// Whether the material depends on [`SurfaceDirections::tangent`](super::bxdf::SurfaceDirections::tangent).
@@ -168,12 +168,12 @@ pub trait RoughMaterial {
     }
 }
 
-/// A non-specular material at one point.
+/// A non-specular material at a single point.
 pub trait RoughPoint {
     /// Whether the surface reflects nothing.
     fn is_black(&self) -> bool;
 
-    /// Reflectance of ambient light.
+    /// Reflectance for ambient light.
     fn ambient(&self) -> Vec3;
 
     /// The material with its color multiplied by `color`.

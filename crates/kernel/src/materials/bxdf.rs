@@ -13,8 +13,8 @@ use super::bsdf::{LobeSet, NarrowLobe, RoughPoint};
 use crate::math::Vec3;
 use crate::math::soa::Soa;
 
-/// Properties of a BSDF, or of any BSDF in a packet. The bits from [`BxdfFlags::FIRST_OWN`] up belong to the
-/// kind.
+/// Properties of a BSDF, or properties that at least one BSDF in a packet has. The bits from
+/// [`BxdfFlags::FIRST_OWN`] up belong to the kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BxdfFlags(pub u32);
 
@@ -25,7 +25,7 @@ impl BxdfFlags {
     /// Has narrow lobes.
     pub const NARROW: Self = Self(2);
 
-    /// The first bit for properties that only concern one kind of BSDF.
+    /// The first bit for properties that exist only for one kind of BSDF.
     pub const FIRST_OWN: u32 = 2;
 
     /// Whether all given flags are set.
@@ -34,19 +34,19 @@ impl BxdfFlags {
         self.0 & other.0 == other.0
     }
 
-    /// These flags if the condition holds, and otherwise none.
+    /// These flags if the condition holds. Otherwise, no flags.
     #[inline(always)]
     pub const fn when(self, condition: bool) -> Self {
         Self(if condition { self.0 } else { 0 })
     }
 
-    /// All flags of both.
+    /// All flags that are set in either operand.
     #[inline(always)]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// These flags except the others.
+    /// These flags without the flags in `other`.
     #[inline(always)]
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
@@ -60,7 +60,7 @@ pub struct LobeValue {
     pub f: Vec3,
     /// The largest component of f, computed from the largest components of colors.
     pub max: f32,
-    /// A number that [`Bxdf::pdf`] has in common with f, such as f for a reflectance of 1.
+    /// An intermediate result shared by f and [`Bxdf::pdf`], such as f for a reflectance of 1.
     pub shape: f32,
 }
 
@@ -81,15 +81,15 @@ pub struct SurfaceDirections {
     pub tangent: Vec3,
 }
 
-/// A non-specular BSDF at one point, without the values that depend on the view direction.
+/// A non-specular BSDF at a single point. Values that depend on the view direction are stored separately.
 pub trait Bxdf: Soa + Default {
-    /// The material's parameters at one point.
+    /// The material's parameters at a single point.
     type Point: RoughPoint;
 
     /// Values that depend on the view direction.
     type View: Soa + Default;
 
-    /// Whether shading normals are rotated to face the viewer, see
+    /// Whether shading normals are rotated to face the viewer. See
     /// [`rotate_toward_viewer`](super::microfacet::rotate_toward_viewer).
     const TURNS_NORMALS: bool = true;
 
@@ -99,17 +99,19 @@ pub trait Bxdf: Soa + Default {
     /// Whether rays in the narrow lobe continue beyond the point where other paths end, to show reflections.
     const SENDS_RAYS: bool = true;
 
-    /// Whether the wide lobes are constant over all directions, even behind the surface.
+    /// Whether the wide lobes are constant for all directions, even those behind the surface.
     const HAS_CONSTANT_WIDE: bool = false;
 
-    /// Whether functions are inlined into every caller. Other kinds have one copy per instruction set,
-    /// because calls cost little compared with their work, and additional copies would bloat the program.
+    /// Whether functions are inlined into every caller. For other kinds, there is one copy per instruction
+    /// set, because a call is cheap compared with the work it does, and additional copies would bloat the
+    /// program.
     const IS_INLINED: bool = false;
 
     /// Flags of all BSDFs of this kind.
     const ALWAYS: BxdfFlags;
 
-    /// A flag for which [`Bxdf::narrow`] is compiled to two loops, one with the flag and one without it.
+    /// A flag for which [`Bxdf::narrow`] is compiled into two loops, one for surfaces with the flag and one
+    /// for surfaces without it.
     const SPLITS_NARROW: BxdfFlags = BxdfFlags(0);
 
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
@@ -164,25 +166,25 @@ pub trait Bxdf: Soa + Default {
         any: BxdfFlags,
     ) -> Vec3;
 
-    /// Shape of the narrow lobe for light selection, if the flags say that there is one.
+    /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe.
     fn narrow_lobe(&self, view: &Self::View) -> Option<NarrowLobe>;
 
-    /// Exponent of the narrow lobe as a power of a cosine, if light samples are inefficient for lobes with
-    /// large exponents. 0 for kinds whose narrow lobes send rays.
+    /// Exponent of the narrow lobe if it is approximated as a power of a cosine. Light samples are
+    /// inefficient for large exponents. 0 for kinds whose narrow lobes send rays.
     #[inline(always)]
     fn exponent(&self) -> f32 {
         0.0
     }
 }
 
-/// Chooses between two vectors, without a branch.
+/// Chooses one of two vectors without a branch.
 #[inline(always)]
 pub(super) fn choose(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
     let pick = |yes: f32, no: f32| if condition { yes } else { no };
     Vec3::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
 }
 
-/// The shading normal for the lobes, given a normal on the lit side and the direction to the viewer.
+/// Computes the lobes' shading normal from a normal on the lit side and the direction to the viewer.
 #[inline(always)]
 pub fn facing_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
     use super::microfacet::rotate_single_toward_viewer as turn;

@@ -13,13 +13,13 @@ use crate::math::soa::Soa;
 use glimt_base::soa;
 
 soa! {
-    /// Factors on the lobes, for the lobes that an image shows.
+    /// Factors that select which lobes an image shows.
     pub struct LobeFactors in LobeFactorsPacket {
-        /// Factor on the wide lobes.
+        /// Factor for the wide lobes.
         wide: f32 = 0.0,
-        /// Factor on the narrow lobes.
+        /// Factor for the narrow lobes.
         narrow: f32 = 0.0,
-        /// f in sr⁻¹ to show instead of the lobes.
+        /// Value of f in sr⁻¹ that is shown instead of the lobes.
         unit: f32 = 0.0,
     }
 }
@@ -44,7 +44,7 @@ pub struct BxdfPacket<B: Bxdf> {
     bsdf: B::Packet,
     view: <B::View as Soa>::Packet,
     shown: LobeFactorsPacket,
-    /// Flags of any of the BSDFs.
+    /// Flags that at least one of the BSDFs has.
     any: BxdfFlags,
     /// Whether all lobes of all BSDFs are shown.
     shows_all: bool,
@@ -62,7 +62,7 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
     }
 }
 
-/// Flags with a known value of [`BxdfFlags::NARROW`], which compilers use to remove code from loops.
+/// Flags in which the compiler knows the value of [`BxdfFlags::NARROW`], so it can remove code from loops.
 #[inline(always)]
 fn with_narrow<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
     if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
@@ -86,7 +86,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         LobeFactors::from(shown).set(&mut self.shown, i);
     }
 
-    /// Copies a surface of another packet.
+    /// Copies a surface from another packet.
     #[inline(always)]
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         B::get(&other.bsdf, from).set(&mut self.bsdf, i);
@@ -96,9 +96,9 @@ impl<B: Bxdf> BxdfPacket<B> {
         self.shows_all &= other.shows_all;
     }
 
-    /// Sets the surfaces of some lanes to a material with these values, and its color to a texture at the given
-    /// coordinates, if any. Later entries of `shown` override earlier ones. Returns a mask of surfaces that
-    /// reflect nothing.
+    /// Sets the surfaces of some lanes to a material with these values. If there is a texture, its values at
+    /// the given coordinates replace the color. Later entries of `shown` override earlier ones. Returns a
+    /// mask of surfaces that reflect nothing.
     #[inline(always)]
     pub fn fill(
         &mut self,
@@ -131,8 +131,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         simd.movemask(&black)
     }
 
-    /// Sets the shading normals on the viewer's side and the incoming ray directions of the lanes in `of`, or
-    /// of all lanes. Replaces `normals` with the normals rotated by
+    /// Sets the shading normals (on the viewer's side) and the directions of the incoming rays, for the lanes
+    /// in `of` or for all lanes. Replaces `normals` with the normals rotated by
     /// [`facing_normal`](super::bxdf::facing_normal).
     #[inline(always)]
     pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
@@ -142,7 +142,8 @@ impl<B: Bxdf> BxdfPacket<B> {
                 set_lane(normals, i, turned);
             }
         }
-        // Write to a separate packet, because the loop is not vectorized if it writes to what it reads.
+        // Write to a separate packet, because the loop is not vectorized if it reads and writes the same
+        // packet.
         let mut view = B::View::default().splat();
         for i in 0..PACKET_SIZE {
             let (normal, wo) = (lane(normals, i), -lane(directions, i));
@@ -209,8 +210,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
     }
 
-    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are around `normals`. `values` are
-    /// those of [`BxdfPacket::f`].
+    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are around `normals`. `values` is
+    /// the result of [`BxdfPacket::f`].
     #[inline(always)]
     pub fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
         if self.has_narrow_lobes() {
@@ -293,7 +294,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         B::get(&self.bsdf, i).narrow_lobe(&B::View::get(&self.view, i))
     }
 
-    /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine to the given power.
+    /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine raised to the power
+    /// `exponent`.
     #[inline(always)]
     pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
         let mut narrow = 0;
@@ -303,14 +305,16 @@ impl<B: Bxdf> BxdfPacket<B> {
         narrow & self.narrow_lobes() & of
     }
 
-    /// f of a surface's shown lobes in sr⁻¹, if f of all its lobes is constant over all directions.
+    /// Returns f of a surface's shown lobes in sr⁻¹ if all of the surface's lobes are constant over all
+    /// directions.
     #[inline(always)]
     pub fn constant_f(&self, i: usize) -> Option<Vec3> {
         let is_constant = B::HAS_CONSTANT_WIDE && !self.flags(i).contains(BxdfFlags::NARROW);
         is_constant.then(|| self.f_at(i, Vec3::Z)[0])
     }
 
-    /// f of a surface in sr⁻¹ for light from a direction: of its shown lobes, and of all lobes.
+    /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes and f of all
+    /// lobes.
     #[inline]
     pub fn f_at(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
@@ -348,8 +352,8 @@ impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
     }
 }
 
-/// Calls of the large functions. Depending on [`Bxdf::IS_INLINED`], they are inlined or call one copy per
-/// instruction set.
+/// Wrappers around the large functions. Depending on [`Bxdf::IS_INLINED`], they inline the function or call
+/// the copy for the instruction set.
 impl<B: Bxdf> BxdfPacket<B> {
     /// [`BxdfPacket::f`].
     #[inline(always)]

@@ -1,4 +1,5 @@
-//! A smooth coat over a non-specular base: a δ lobe, and the base's lobes for the transmitted light.
+//! A smooth coat over a non-specular base. The coat has a δ lobe, and the base's lobes scatter the
+//! transmitted light.
 
 use std::sync::Arc;
 
@@ -20,8 +21,8 @@ pub struct Coated {
 }
 
 impl Coated {
-    /// The coat's Fresnel reflectance, given the cosine of the angle of incidence. Does not include the
-    /// factor `specular`.
+    /// Computes the coat's Fresnel reflectance from the cosine of the angle of incidence. Does not include
+    /// the factor `specular`.
     #[inline]
     pub fn fresnel(&self, cosine: f32) -> f32 {
         dielectric(cosine, self.ior).0

@@ -13,24 +13,24 @@ pub struct Dielectric {
     pub ior: f32,
     /// Transmittance per unit length inside the shape, rounded to `f32`.
     pub tint: Vec3,
-    /// The square root of α. Constant 0 for smooth glass.
+    /// The square root of α. For smooth glass, it is a constant 0.
     pub roughness: Number,
-    /// Absorption in halvings per unit length. In `f32`, the tint of colored glass could underflow in scenes
-    /// with large units, and round to 1 in scenes with small units.
+    /// Absorption in halvings per unit length. If the tint of colored glass were stored in `f32`, it could
+    /// underflow in scenes with large units and round to 1 in scenes with small units.
     density: Vec3,
 }
 
 impl Dielectric {
-    /// Smooth glass with the given transmittance per unit length inside the shape, in [0, 1].
+    /// Creates smooth glass from its transmittance per unit length inside the shape, in [0, 1].
     pub fn new(ior: f32, tint: DVec3) -> Self {
-        // Opaque glass gets a large but finite density because ∞ · 0 would be NaN.
+        // Give opaque glass a large but finite density because ∞ · 0 would be NaN.
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
         let density = Vec3::from_array(tint.to_array().map(halvings));
         Self { ior, tint: tint.as_vec3(), roughness: Number::Constant(0.0), density }
     }
 
-    /// The same glass with the given surface roughness.
+    /// The same glass with a different surface roughness.
     pub fn with_roughness(self, roughness: Number) -> Self {
         Self { roughness, ..self }
     }

@@ -27,7 +27,7 @@ pub struct Emission {
     pub texture: Option<Arc<Texture>>,
     /// Which sides emit.
     pub sides: EmissionSides,
-    /// Clear coat that attenuates the radiance depending on direction. `None` without a coat.
+    /// Clear coat that attenuates the radiance by a direction-dependent factor. `None` without a coat.
     pub coat: Option<Arc<EmissionCoat>>,
 }
 
@@ -60,8 +60,8 @@ impl Emission {
         self.is_emissive() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at the given texture coordinates, in a direction with the given cosine. Counts texture
-    /// lookups in `lookups`.
+    /// The radiance at the given texture coordinates, in a direction at the given cosine to the normal.
+    /// Counts texture lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(1.0, |coat| coat.transmittance(at, cosine, lookups));

@@ -1,11 +1,11 @@
-//! Footprints: the texture areas covered by single lookups.
+//! Footprints: the areas of a texture that single lookups cover.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
 /// One of a mesh's UV sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UvSet {
-    /// The first set. Shapes only have this set.
+    /// The first set. Analytic shapes have only this set.
     #[default]
     First,
     /// The second set, or the first set if the mesh has only one.
@@ -61,9 +61,9 @@ impl Footprint {
 
     /// Footprint of a ray cone on a surface, where `width` is the cone's width and `direction` a unit vector
     /// (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
-    /// Detail Using Ray Cones*, JCGT 2021, section 5). The ellipse has this width perpendicular to the
-    /// direction, and this width divided by the cosine along the direction. `tangents` are ∂p/∂u and ∂p/∂v.
-    /// If they are parallel or 0, the footprint is a point.
+    /// Detail Using Ray Cones*, JCGT 2021, section 5). The ellipse is as wide as the cone perpendicular to
+    /// the direction. Along the direction, it is longer by a factor of 1 / cosine. `tangents` are ∂p/∂u and
+    /// ∂p/∂v. If they are parallel or 0, the footprint is a point.
     #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
@@ -85,12 +85,12 @@ impl Footprint {
     /// Minimum cosine, which limits the size of footprints.
     const MIN_COSINE: f32 = 1e-4;
 
-    /// Length of the longer axis in texels, given the texels per unit of u and v.
+    /// Length of the longer axis in texels. `per_unit` is the number of texels per unit of u and v.
     pub fn major_axis_texels(&self, per_unit: Vec2) -> f32 {
         self.major_axis_length(|axis| axis * per_unit)
     }
 
-    /// Length of the longer axis after a linear map.
+    /// Length of the longer axis after applying a linear map.
     #[inline]
     pub fn major_axis_length(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
         let lengths = self.axes.map(|axis| map(axis).length());
@@ -106,7 +106,7 @@ mod tests {
     fn footprints_stretch_along_the_direction() {
         let tangents = [Vec3::X * 2.0, Vec3::Y * 4.0];
         let straight = Footprint::of_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
-        // 0.5 units are a quarter of u and an eighth of v.
+        // A length of 0.5 spans a quarter of u and an eighth of v.
         assert!((straight.major_axis_texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
         assert!((straight.major_axis_texels(Vec2::new(0.0, 100.0)) - 12.5).abs() < 1e-4);
         let steep = Footprint::of_cone(0.5, Vec3::new(0.0, 0.8, -0.6), Vec3::Z, tangents);

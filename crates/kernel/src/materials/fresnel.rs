@@ -2,10 +2,10 @@
 
 use crate::math::Vec3;
 
-/// Unpolarized reflectance of a dielectric boundary, and the cosine of the transmitted direction. The cosine
-/// is `None` for total internal reflection. `cos_incident` ≥ 0 is the cosine on the ray's side, and `eta` is
-/// n(far side)/n(ray's side). Uses the exact equations for both polarizations (Born and Wolf, *Principles of
-/// Optics*, section 1.5.2).
+/// Reflectance of a dielectric boundary for unpolarized light, and cosine of the transmitted direction. The
+/// cosine is `None` for total internal reflection. `cos_incident` ≥ 0 is the cosine on the ray's side, and
+/// `eta` is n(far side)/n(ray's side). Uses the exact equations for both polarizations (Born and Wolf,
+/// *Principles of Optics*, section 1.5.2).
 #[inline]
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
@@ -20,20 +20,21 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
-/// [`dielectric`] from outside (`eta` ≥ 1), in `f32` for packets.
+/// [`dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
 pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
     dielectric_from_cos2(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
-/// [`dielectric`] from either side, in `f32` for packets. 1 for total internal reflection.
+/// [`dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
 #[inline(always)]
 pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
     dielectric_from_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
-/// Reflectance of a dielectric boundary, given η² times the squared cosine of the transmitted direction.
+/// Computes the reflectance of a dielectric boundary from η² times the squared cosine of the transmitted
+/// direction.
 #[inline(always)]
 fn dielectric_from_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
@@ -44,8 +45,8 @@ fn dielectric_from_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// Transmittance of a boundary for unpolarized light, from the cosines and the indices of refraction on both
-/// sides. The result is bit-identical in both directions, and computed without cancellation.
+/// Computes the transmittance of a boundary for unpolarized light from the cosines and the indices of
+/// refraction on both sides. Avoids cancellation. The result is bit-identical in both directions.
 #[inline(always)]
 pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     let (parallel, perpendicular) = (n_2 * cos_1 + n_1 * cos_2, n_1 * cos_1 + n_2 * cos_2);
@@ -53,7 +54,8 @@ pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     2.0 * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse
 }
 
-/// Unpolarized reflectance of a conductor with index η and extinction k (Born and Wolf, *Principles of Optics*, section 14.2).
+/// Reflectance of a conductor with index η and extinction k, for unpolarized light (Born and Wolf,
+/// *Principles of Optics*, section 14.2).
 #[inline(always)]
 pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let cos2 = cos_incident * cos_incident;
@@ -86,7 +88,7 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
     squared * squared * rest
 }
 
-/// The refracted direction (Snell's law) of the unit vector `incident`, given the unit normal on its side and
+/// Direction in which Snell's law refracts the unit vector `incident`, given the unit normal on its side and
 /// the cosine from [`dielectric`].
 pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
     let cos_incident = -incident.dot(normal);
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn reflectance_at_known_angles() {
+    fn reflectance_is_correct_at_special_angles() {
         assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-7);
         assert!((reflectance(90.0, 1.5) - 1.0).abs() < 1e-5);
         // At Brewster's angle, the reflectance is half of the perpendicular reflectance.
@@ -181,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn total_reflection_beyond_the_critical_angle() {
+    fn reflection_is_total_beyond_critical_angle() {
         for (n, critical) in [(1.5, 41.8103), (1.33, 48.7535), (2.4, 24.6244)] {
             let transmitted = |degrees: f64| dielectric(degrees.to_radians().cos() as f32, 1.0 / n).1;
             assert!(transmitted(critical - 0.01).is_some(), "{n}");
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn hemispherical_means_match_known_values() {
+    fn hemispherical_means_match_reference_values() {
         let mean = |eta: f32| {
             let n = 1_000_000;
             let cos2 = |i: i32| (f64::from(i) + 0.5) / f64::from(n);

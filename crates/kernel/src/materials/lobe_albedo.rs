@@ -29,7 +29,7 @@ pub struct LobeAlbedo {
 }
 
 impl LobeAlbedo {
-    /// The albedo at μ ≥ 0.
+    /// Evaluates the albedo at μ ≥ 0.
     #[inline]
     pub fn at(&self, cosine: f32) -> f32 {
         evaluate(cosine, |number| self.terms[number])
@@ -41,13 +41,13 @@ impl LobeAlbedo {
         Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
     }
 
-    /// Fits an albedo function and stores its exact mean.
+    /// Fits a polynomial to an albedo function, and stores the function's exact mean.
     pub fn fit_with_exact_mean(albedo: impl Fn(f64) -> f64) -> Self {
         Self { mean: cosine_weighted_mean(&albedo) as f32, ..Self::fit(albedo) }
     }
 
-    /// Fits a polynomial. Also stores the polynomial's mean, so that the light that reaches the base is
-    /// consistent with the fit.
+    /// Fits a polynomial to an albedo function, and stores the polynomial's mean. This keeps the light that
+    /// reaches the base consistent with the fit.
     fn fit(albedo: impl Fn(f64) -> f64) -> Self {
         const NODES: usize = 32;
         // Evaluate the albedo at nodes that are denser at grazing angles.
@@ -122,7 +122,7 @@ impl AlbedoTable {
     }
 }
 
-/// The albedo at μ ≥ 0, given a function that returns the coefficients.
+/// Evaluates the albedo at μ ≥ 0. A function returns the coefficients.
 #[inline(always)]
 pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
@@ -224,12 +224,12 @@ fn gauss_legendre(count: usize) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// The facets that are visible from a direction. They are parameterized by a point (x, b) on the unit disk,
-/// where x is perpendicular to the plane of incidence and b is in it.
+/// The facets that are visible from a direction, parameterized by a point (x, b) on the unit disk. The x axis
+/// is perpendicular to the plane of incidence, and the b axis is in this plane.
 struct VisibleFacets {
     alpha: f64,
     to_eye: DVec3,
-    /// The stretched direction, followed by the axis of b.
+    /// The stretched view direction, and the direction of the b axis.
     view: DVec3,
     second: DVec3,
     /// Smith's Λ of the view direction.
@@ -257,13 +257,14 @@ impl VisibleFacets {
         [between, 2.0 * between * half.z - to_eye.z]
     }
 
-    /// Height of the reflected direction at a point on the chord at x. The point is given relative to the
-    /// chord's center, in units of half its length.
+    /// Height of the reflected direction for a point on the chord at x. `part` is the point's position
+    /// relative to the chord's center, in units of half the chord's length.
     fn height(&self, x: f64, part: f64) -> f64 {
         self.reflection_cosines(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
-    /// A point on the chord for which light is reflected above the surface, if there is one.
+    /// A point on the chord at x whose facet reflects light above the surface. `None` if there is no such
+    /// point.
     fn lit_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
@@ -271,8 +272,8 @@ impl VisibleFacets {
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
-    /// The ends of the part of the chord around `lit` for which light is reflected above the surface,
-    /// relative to the chord's center and in units of half its length.
+    /// The ends of the interval around `lit` on the chord in which facets reflect light above the surface.
+    /// Both are relative to the chord's center, in units of half the chord's length.
     fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
         [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.height(x, part) > 0.0))
     }
@@ -337,8 +338,8 @@ pub fn dielectric(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel + square(cosine - root, cosine + root))
 }
 
-/// Effective reflectance of a diffuse base under a coat for light that has entered the coat: kd/(1 −
-/// kd·F_dr). `returned` is the coat's internal reflectance F_dr.
+/// Effective reflectance kd/(1 − kd·F_dr) of a diffuse base under a coat, for light that has entered the
+/// coat. `returned` is the coat's internal reflectance F_dr.
 pub fn under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
     diffuse / (Vec3::ONE - diffuse * returned)
 }
@@ -403,7 +404,7 @@ mod tests {
 
     #[test]
     fn smooth_lobes_match_fresnel() {
-        // 2 ∫ F(μ) μ dμ for η = 1.5.
+        // The expected mean is 2 ∫ F(μ) μ dμ for η = 1.5.
         let smooth = LobeAlbedo::fit_with_exact_mean(|cosine| dielectric(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
         let narrow = LobeAlbedo::of(0.001, |cosine| dielectric(cosine, 1.5));

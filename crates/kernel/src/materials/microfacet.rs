@@ -20,10 +20,10 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer, see [`rotate_toward_viewer`].
+/// Minimum cosine between a normal and the direction to the viewer. See [`rotate_toward_viewer`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
-/// A lobe's α along u and along v. The base value, roughness², is stretched by an anisotropy in [−1, 1].
+/// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
 #[inline]
 pub fn alphas(roughness: f32, anisotropy: f32) -> [f32; 2] {
     let alpha = roughness * roughness;
@@ -43,7 +43,7 @@ pub fn rotate_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`rotate_toward_viewer`] for a single normal, which rarely needs rotation.
+/// [`rotate_toward_viewer`] for a single normal. Optimized for normals that do not need rotation.
 #[inline(always)]
 pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_toward_viewer(normal, to_eye) } else { normal }
@@ -52,7 +52,8 @@ pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
 /// The unnormalized half vector of two unit directions.
 #[derive(Clone, Copy)]
 pub struct HalfVector {
-    /// Squared length. For a reflection, this is (2 cosθ)², where θ is the angle to either direction.
+    /// Squared length. For a reflection, this is (2 cosθ)², where θ is the angle between the half vector and
+    /// either direction.
     pub squared: f32,
     /// Component along the normal.
     pub along: f32,
@@ -69,8 +70,8 @@ impl HalfVector {
         Self { squared: sum.length_squared(), along, across: sum - normal * along }
     }
 
-    /// The half vector of a refraction, up to its sign. It is the sum of the directions, weighted by the
-    /// indices of refraction on their sides (Walter et al. 2007, section 5.3). Also returns this sum.
+    /// The half vector of a refraction, up to its sign: the sum of the two directions, each weighted by the
+    /// index of refraction on its side (Walter et al. 2007, section 5.3). Also returns this sum.
     #[inline(always)]
     pub fn refracted(normal: Vec3, [one, other]: [Vec3; 2], [of_one, of_other]: [f32; 2]) -> (Self, Vec3) {
         let sum = one * of_one + other * of_other;
@@ -91,14 +92,15 @@ impl HalfVector {
         self.distribution(self.across.length_squared() / squared, squared)
     }
 
-    /// Anisotropic D in sr⁻¹, along the tangents of a frame.
+    /// Anisotropic D in sr⁻¹, with a separate α along each tangent of a frame.
     #[inline(always)]
     pub fn anisotropic(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
         self.distribution(x * x + y * y, u * v)
     }
 
-    /// D, given the squared perpendicular component divided by α², and the product of the two α values.
+    /// Computes D from two values: the squared perpendicular component divided by α², and the product of both
+    /// α values.
     #[inline(always)]
     fn distribution(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
@@ -116,7 +118,7 @@ pub struct SmithTerms {
 }
 
 impl SmithTerms {
-    /// Isotropic terms of a direction.
+    /// Computes the isotropic terms for a direction.
     #[inline(always)]
     pub fn isotropic(normal: Vec3, direction: Vec3, alpha: f32) -> Self {
         let cosine = normal.dot(direction);
@@ -125,7 +127,7 @@ impl SmithTerms {
         Self { cosine, slope }
     }
 
-    /// Anisotropic terms of a direction, along the tangents of a frame.
+    /// Computes the anisotropic terms for a direction, with a separate α along each tangent of a frame.
     #[inline(always)]
     pub fn anisotropic(frame: &Frame, direction: Vec3, [u, v]: [f32; 2]) -> Self {
         let cosine = frame.n.dot(direction);
@@ -139,14 +141,15 @@ impl SmithTerms {
         self.cosine > MIN_COSINE
     }
 
-    /// D·G/(4 cosθᵢ cosθₒ) in sr⁻¹, given D. 0 if either direction is below the surface.
+    /// Computes D·G/(4 cosθᵢ cosθₒ) in sr⁻¹ from D. 0 if either direction is below the surface.
     #[inline(always)]
     pub fn reflected(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
         if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
     }
 
-    /// Pdf in sr⁻¹ of a direction that is sampled by [`sample_reflection`] for this view direction, given D.
+    /// Computes the pdf in sr⁻¹ of a direction from D. The direction is sampled by [`sample_reflection`] for
+    /// this view direction.
     #[inline(always)]
     pub fn pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
@@ -192,9 +195,9 @@ pub fn reflect_at(half: Vec3, to_eye: Vec3) -> Vec3 {
     direction * (1.0 / direction.length_squared().sqrt())
 }
 
-/// The light direction that a facet with the given unit normal refracts toward the viewer. `eta` is the index
-/// of refraction on the light's side divided by the index on the viewer's side. Returns an arbitrary unit
-/// vector for total internal reflection.
+/// The direction from which a facet with the given unit normal refracts light toward the viewer. `eta` is the
+/// index of refraction on the light's side divided by the index on the viewer's side. Returns an arbitrary
+/// unit vector for total internal reflection.
 #[inline(always)]
 pub fn refract_at(half: Vec3, to_eye: Vec3, eta: f32) -> Vec3 {
     let cosine = half.dot(to_eye);

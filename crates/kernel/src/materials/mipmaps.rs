@@ -7,7 +7,8 @@ use std::ops::Mul;
 use super::texels::{TexelData, Texels};
 use crate::math::{Vec3, Vec4};
 
-/// All mip levels of an image except the image itself, in linear color space. The last level has one texel.
+/// The mip levels of an image in linear color space, not including the image itself. The last level has one
+/// texel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mipmaps {
     levels: Vec<Texels>,
@@ -43,7 +44,7 @@ impl Mipmaps {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Memory in bytes for the mip levels of an image with this size. `has_alpha` is true for images with
+    /// Memory in bytes that the mip levels of an image of this size need. `has_alpha` is true for images with
     /// alpha.
     pub fn memory_bytes_of(width: u32, height: u32, has_alpha: bool) -> u64 {
         let texel_bytes = if has_alpha { size_of::<Vec4>() } else { size_of::<Vec3>() };
@@ -74,7 +75,7 @@ impl<'a> ImageHalver<'a> {
         self.height
     }
 
-    /// Creates empty storage for the smaller image's rows.
+    /// Creates empty storage for the rows of the smaller image.
     pub fn start(&self) -> TexelData {
         let count = self.width as usize * self.height as usize;
         if self.of.has_alpha() {
@@ -112,7 +113,7 @@ impl<'a> ImageHalver<'a> {
     }
 }
 
-/// Up to three texels of the larger image that a texel of the smaller image covers along one axis.
+/// The texels of the larger image (up to three) that one texel of the smaller image covers along an axis.
 struct CoveredTexels {
     first: u32,
     weights: [f32; 3],
@@ -120,8 +121,8 @@ struct CoveredTexels {
 
 impl CoveredTexels {
     fn new(index: u32, of: u32, from: u32) -> Self {
-        // In a common unit, a texel of the larger image is `of` wide and a texel of the smaller image is
-        // `from` wide.
+        // In a common unit of length, a texel of the larger image is `of` wide and a texel of the smaller
+        // image is `from` wide.
         let (start, end) = (u64::from(index) * u64::from(from), u64::from(index + 1) * u64::from(from));
         let first = start / u64::from(of);
         let weight = |next: u64| {

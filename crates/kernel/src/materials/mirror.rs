@@ -17,7 +17,7 @@ pub enum Mirror {
 }
 
 impl Mirror {
-    /// Reflectance at the given cosine of the incident angle, with the color multiplied by `tint`. Counts
+    /// Reflectance at an incident angle with the given cosine. The color is multiplied by `tint`. Counts
     /// texture lookups in `lookups`.
     #[inline]
     pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {

@@ -50,7 +50,7 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether any property depends on texture coordinates or on tangents.
+    /// Whether any material property depends on texture coordinates or tangents.
     pub fn is_textured(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.has_textures() || rough.has_direction(),
@@ -66,8 +66,8 @@ impl Material {
             || of_opacity.is_some()
     }
 
-    /// Whether light may pass through the surface undeflected, because it is a thin pane or partially
-    /// transparent.
+    /// Whether light may pass through the surface undeflected, because the surface is a thin pane or is
+    /// partially transparent.
     #[inline]
     pub fn has_null_interaction(&self) -> bool {
         let is_pane = match &self.bsdf {
@@ -77,8 +77,8 @@ impl Material {
         is_pane || self.opacity.is_some()
     }
 
-    /// Fraction of light that passes undeflected, at the given texture coordinates and cosine of the incident
-    /// angle. `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
+    /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.
+    /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
@@ -145,7 +145,7 @@ impl Bsdf {
         self.rough().is_some()
     }
 
-    /// Whether the lobes depend on the texture axes' directions.
+    /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
     pub fn has_direction(&self) -> bool {
         self.rough().is_some_and(Rough::has_direction)

@@ -12,7 +12,7 @@ use crate::math::frame::Frame;
 pub struct NormalMap {
     /// The normals.
     pub texture: Arc<Texture>,
-    /// Factor applied to the slopes. 0 makes the surface smooth.
+    /// Factor applied to the slopes. A factor of 0 makes the surface flat.
     pub strength: f32,
 }
 
@@ -77,7 +77,7 @@ mod tests {
         // The texture's first coordinate equals −v.
         let bent = turned.perturb(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
-        // Rotated, stretched, and skewed coordinates: the texture coordinates are u' = 2 u cos + 3 v sin and
+        // Rotate, stretch, and skew the coordinates. The texture coordinates are u' = 2 u cos + 3 v sin and
         // v' = 3 v cos − 2 u sin with an angle of −30°. The tangent along u' is the direction in which v' is
         // constant.
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
@@ -86,7 +86,7 @@ mod tests {
             (UvTransform::new(UvSet::First, -30.0, DVec2::ZERO).map(Box::new), Vec2::new(2.0, 3.0));
         let (dpdu, dpdv) = (Vec3::new(2.0, 0.5, 0.0), Vec3::new(-0.3, 0.7, 0.0));
         let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
-        // u' changes by 1 where 2 u = cos and 3 v = sin.
+        // A step with 2 u = cos and 3 v = sin changes u' by 1.
         let along = dpdu * (cosine / 2.0) + dpdv * (sine / 3.0);
         let bent = turned.perturb(&middle(), Vec3::Z, dpdu, dpdv);
         let expected = along.normalize() * 0.6 + Vec3::Z * 0.8;
@@ -123,7 +123,7 @@ mod tests {
         let tilted = map(Vec3::new(0.6, 0.0, 0.8));
         let bent = tilted.perturb(&middle(), n, Vec3::new(0.0, 3.0, 1.0), Vec3::new(-2.0, 0.0, 0.0));
         assert!((bent - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
-        // A mirrored parameterization perturbs in the opposite direction along v.
+        // A mirrored parameterization perturbs the normal in the opposite direction along v.
         let along_v = map(Vec3::new(0.0, 0.6, 0.8));
         let bent = along_v.perturb(&middle(), n, Vec3::X, Vec3::NEG_Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6);

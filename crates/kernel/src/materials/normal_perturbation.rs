@@ -1,4 +1,4 @@
-//! Perturbs shading normals with normal maps and bump maps. The shape stays unchanged.
+//! Perturbs shading normals with normal maps and bump maps. The shape itself does not change.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::math::Vec3;
 pub struct NormalPerturbation {
     /// The normals.
     pub normal_map: Option<NormalMap>,
-    /// Heights above the surface, added to the normal map's relief.
+    /// Heights above the surface. They are added to the relief from the normal map.
     pub bump: Option<Bump>,
 }
 
@@ -44,7 +44,7 @@ impl NormalPerturbation {
         bent
     }
 
-    /// Textures of both maps.
+    /// All textures of both maps.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
         of_normals.into_iter().chain(self.bump.as_ref().map(|bump| &bump.texture))
@@ -57,7 +57,7 @@ impl NormalPerturbation {
 pub struct Bump {
     /// The heights.
     pub texture: Arc<Texture>,
-    /// Length that corresponds to a height of 1. Negative values invert the relief.
+    /// Length that a height of 1 represents. Negative values invert the relief.
     pub scale: f32,
 }
 
@@ -104,7 +104,7 @@ mod tests {
         })
     }
 
-    /// Heights that increase by 1 per unit of u near the center.
+    /// A bump map whose heights increase by 1 per unit of u near the center.
     fn ramp(scale: f32) -> Bump {
         Bump { texture: texture(&[0.0, 0.25, 0.5, 0.75].map(Vec3::splat)), scale }
     }
@@ -143,7 +143,7 @@ mod tests {
         let map = NormalMap { texture: texture(&[Vec3::new(0.8, 0.5, 0.9)]), strength: 1.0 };
         let normal_perturbation = NormalPerturbation { normal_map: Some(map), bump: Some(ramp(0.5)) };
         let (bent, lookups) = bent(&normal_perturbation, Vec3::Z, [Vec3::X, Vec3::Y]);
-        // A slope of 0.6/0.8 from the normal map and −0.5 from the ramp.
+        // The normal map has a slope of 0.6/0.8, and the ramp has a slope of −0.5.
         assert!((bent - Vec3::new(0.25, 0.0, 1.0).normalize()).length() < 1e-6, "{bent}");
         assert_eq!(lookups, 5);
     }

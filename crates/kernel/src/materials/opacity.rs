@@ -8,7 +8,7 @@ use super::scalar::Number;
 pub struct Opacity {
     /// The opacity, clamped to [0, 1].
     pub value: Number,
-    /// Threshold for the opacity, or 0 for no threshold. The surface is opaque at and above the threshold,
+    /// Opacity threshold, or 0 if there is no threshold. The surface is opaque at and above the threshold,
     /// and fully transparent below it. If there is a threshold, the texture's mip levels contain the fraction
     /// of opaque texels.
     pub cutoff: f32,

@@ -20,7 +20,7 @@ choice! {
     }
 }
 
-/// The value that a scalar texture reads from a pixel.
+/// Value that a scalar texture reads from a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PixelValue {
     /// The luminance of the pixel.
@@ -42,7 +42,7 @@ pub enum PixelValue {
 pub enum Number {
     /// A constant value.
     Constant(f32),
-    /// A texture that contains the value in each of its channels.
+    /// A texture. Each of its channels contains the value.
     Texture(Arc<Texture>),
 }
 

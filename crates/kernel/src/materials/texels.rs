@@ -1,4 +1,4 @@
-//! Image texels, stored as compactly as in the file.
+//! Image texels, stored as compactly as they were in the file.
 
 use crate::math::color::{SRGB8_TO_LINEAR, srgb8_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
@@ -13,7 +13,7 @@ pub struct Texels {
     pub height: u32,
     /// The `width · height` texels.
     pub data: TexelData,
-    /// Number of texels that are negative or not finite in the file. Such texels are stored as 0.
+    /// Number of texels that were negative or not finite in the file. They are stored as 0.
     pub unusable: u64,
 }
 
@@ -26,7 +26,7 @@ pub enum TexelData {
     Linear8(Vec<[u8; 3]>),
     /// Linear floats from 16-bit and floating-point files.
     Float(Vec<Vec3>),
-    /// sRGB bytes and alpha. In interpolation, colors are weighted by alpha.
+    /// sRGB bytes and alpha. Interpolation weights colors by alpha.
     SrgbAlpha8(Vec<[u8; 4]>),
     /// Linear bytes and alpha.
     LinearAlpha8(Vec<[u8; 4]>),
@@ -92,7 +92,8 @@ impl Texels {
         (self.at(place) * weight).extend(weight)
     }
 
-    /// Thresholds the red channel. The result is 1 where the channel is at least `least`, otherwise 0.
+    /// Applies a threshold to the red channel. The result is 1 where the channel is at least `least`,
+    /// otherwise 0.
     pub fn threshold(&self, least: f32) -> Self {
         let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
@@ -107,7 +108,7 @@ impl Texels {
         values
     }
 
-    /// Linear values at packets of texel indices. Written in place because compilers handle large return
+    /// Linear values at packets of texel indices. Writes them in place because compilers handle large return
     /// values poorly.
     #[inline(always)]
     pub fn gather_packets(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
@@ -187,7 +188,7 @@ impl Texels {
         }
     }
 
-    /// Whether red, green and blue are equal in all texels.
+    /// Whether red, green, and blue are equal in all texels.
     pub fn is_gray(&self) -> bool {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => {

@@ -24,11 +24,11 @@ choice! {
 }
 
 choice! {
-    /// How a texture continues outside [0, 1].
+    /// How a texture continues beyond [0, 1].
     pub enum Wrap {
         /// Periodic.
         Repeat = "repeat",
-        /// The border texels are extended.
+        /// Border texels are repeated outside the image.
         Clamp = "clamp",
         /// Periodic. Every other tile is mirrored.
         Mirror = "mirror",
@@ -44,11 +44,11 @@ pub struct Texture {
     pub mipmaps: Option<Arc<Mipmaps>>,
     /// Interpolation.
     pub filter: TextureFilter,
-    /// How the texture continues outside [0, 1].
+    /// How the texture continues beyond [0, 1].
     pub wrap: Wrap,
-    /// Number of repetitions in u and v.
+    /// Number of repetitions along u and v.
     pub repeat: Vec2,
-    /// Transform after repetition. `None` for the identity on the first UV set.
+    /// Transform that is applied after repetition. `None` if it is the identity on the first UV set.
     pub moved: Option<Box<UvTransform>>,
     /// Scale and offset applied to looked-up values. `None` for the identity. Does not affect heights and
     /// their slopes.
@@ -93,7 +93,7 @@ impl ScaleAndOffset {
 /// A UV set, and a transform that rotates and then translates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
-    /// Sine and cosine of the rotation angle, from u to v.
+    /// Sine and cosine of the rotation angle, measured from u toward v.
     turn: (f64, f64),
     /// Translation.
     offset: DVec2,
@@ -102,14 +102,14 @@ pub struct UvTransform {
 }
 
 impl UvTransform {
-    /// A transform that rotates about the origin by an angle in degrees, then translates. Returns `None` if
-    /// it would change nothing.
+    /// Creates a transform that first rotates about the origin by an angle in degrees, then translates.
+    /// Returns `None` if it would change nothing.
     pub fn new(of: UvSet, degrees: f64, offset: DVec2) -> Option<Self> {
         let is_moved = of != UvSet::First || degrees != 0.0 || offset != DVec2::ZERO;
         is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset, of })
     }
 
-    /// The point in the second UV set, if the transform uses that set.
+    /// The point in the second UV set, if the transform applies to that set.
     #[inline]
     fn second_uv_point<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
@@ -196,7 +196,7 @@ impl Texture {
         self.factor.map_or(value, |factor| factor.apply(value))
     }
 
-    /// The value at the given tile coordinates. `level` is called if the filter uses mip levels.
+    /// The value at the given tile coordinates. `level` is called only if the filter uses mip levels.
     #[inline]
     fn lookup_in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded =
@@ -230,8 +230,8 @@ impl Texture {
         second.map_or(first, |second| second.tangents)
     }
 
-    /// Slopes of the red channel along u and v. Computed as central differences over one texel of the image,
-    /// or of the mip level chosen by the footprint.
+    /// Slopes of the red channel along u and v. They are central differences over one texel of the image or,
+    /// with mip levels, over one texel of the level chosen by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
         let tiles = self.tile_coordinates(at);
         let level = match (self.filter, &self.mipmaps) {
@@ -361,7 +361,7 @@ impl Texture {
         }
     }
 
-    /// The (fractional, nonnegative) mip level at which the footprint is one texel wide.
+    /// The mip level at which the footprint is one texel wide. It is nonnegative, and may be fractional.
     fn mip_level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
             None => at.footprint.major_axis_texels(size(&self.texels) * self.repeat),
@@ -394,8 +394,8 @@ impl Texture {
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
     }
 
-    /// The two images around a mip level, and the weight of the second image. `None` if only the original
-    /// image is used.
+    /// The two images closest to a fractional mip level, and the weight of the second image. `None` if only
+    /// the original image is used.
     #[inline(always)]
     fn adjacent_levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
@@ -408,8 +408,8 @@ impl Texture {
         Some((of(number), of(number + 1), level - number as f32))
     }
 
-    /// The fraction of the footprint where the red channel is at least `cutoff`. For lookups in the original
-    /// image, the fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
+    /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
+    /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tile_coordinates(at);
         let folded =
@@ -426,7 +426,7 @@ impl Texture {
         near + (of(far) - near) * part
     }
 
-    /// Bilinear lookups for a packet in texels with alpha.
+    /// Bilinear lookups of texels with alpha, for a packet.
     #[cold]
     #[inline(never)]
     fn weighted_packet(&self, folded: &[F32x16; 2]) -> Vec3x16 {
@@ -438,7 +438,7 @@ impl Texture {
         colors
     }
 
-    /// Bilinear interpolation of premultiplied texels and their alpha.
+    /// Interpolates premultiplied texels and their alpha bilinearly.
     #[cold]
     #[inline(never)]
     fn bilinear_premultiplied(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
@@ -471,15 +471,15 @@ impl Texture {
     }
 }
 
-/// Rounds down. Unlike [`f32::floor`], this never requires a library call, which is slow on processors
-/// without the instruction.
+/// Rounds down. Unlike [`f32::floor`], this never requires a library call. On processors without a rounding
+/// instruction, such a call is slow.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from(towards_zero as f32 > x)
 }
 
-/// Index of a texel, from its column and its row, where rows are counted from the bottom.
+/// Index of the texel in a column and a row. Rows are counted from the bottom.
 #[inline(always)]
 fn texel_index(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
     (height - 1 - row) as usize * width as usize + column as usize
@@ -573,7 +573,7 @@ impl Wrap {
     fn wrap_index(self, i: i32, size: i32) -> i32 {
         match self {
             Self::Repeat => i + if i < 0 { size } else { 0 } - if i >= size { size } else { 0 },
-            // Mirroring also repeats the border texel.
+            // Mirroring also repeats the texel at the border.
             Self::Clamp | Self::Mirror => i.max(0).min(size - 1),
         }
     }
@@ -598,7 +598,7 @@ mod tests {
     use crate::materials::mipmaps::ImageHalver;
     use crate::materials::texels::TexelData;
 
-    /// A texture with the values [[0, 1], [2, 3]]. The bottom row is first.
+    /// A texture with the values [[0, 1], [2, 3]]. The bottom row comes first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
@@ -610,7 +610,7 @@ mod tests {
     }
 
     #[test]
-    fn bilinear_lookups_return_known_values() {
+    fn bilinear_lookups_return_expected_values() {
         for (u, v, expected) in [(0.25, 0.25, 0.0), (0.5, 0.5, 1.5), (0.5, 0.25, 0.5), (0.75, 0.75, 3.0)] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 assert!((bilinear(wrap, u, v) - expected).abs() < 1e-6, "{wrap:?} at {u}, {v}");
@@ -639,7 +639,7 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.repeat = Vec2::new(2.0, 1.0);
         texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
-        // (u, v) maps to (−v, 2u + ½). For example, (0.1, 0.3) maps to (−0.3, 0.7), which wraps to (0.7,
+        // (u, v) is mapped to (−v, 2u + ½). For example, (0.1, 0.3) maps to (−0.3, 0.7), which wraps to (0.7,
         // 0.7).
         assert_eq!(at(&texture, 0.1, 0.3), 3.0);
         assert_eq!(at(&texture, 0.1, 0.7), 2.0);
@@ -688,7 +688,7 @@ mod tests {
     #[test]
     fn slopes_follow_the_texture_transform() {
         // Near the center, values increase by 1 per texel to the right and by 2 per texel upward. Relative to
-        // the image size, this is 2 and 4.
+        // the image size, the slopes are 2 and 4.
         let mut texture = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::sharp(DVec2::new(u, v)));
         assert_eq!(at(&texture, 0.5, 0.5), Vec2::new(2.0, 4.0));
@@ -777,7 +777,7 @@ mod tests {
         Mipmaps::of(image, halved).ok().map(Arc::new)
     }
 
-    /// A clamped texture from a row of texels.
+    /// Creates a clamped texture from a row of texels.
     fn row(width: u32, data: TexelData, filter: TextureFilter) -> Texture {
         let texels = Arc::new(Texels { width, height: 1, data, unusable: 0 });
         let (mipmaps, wrap, repeat) = (levels(&texels), Wrap::Clamp, Vec2::ONE);
@@ -811,7 +811,7 @@ mod tests {
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }
         }
-        // Colors are weighted by partial alpha.
+        // Partial alpha also weights the colors.
         let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
         let color = row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::sharp(DVec2::new(0.5, 0.5)));
         assert!((color - Vec3::new(0.2, 0.8, 0.0)).length() < 1e-6, "{color}");

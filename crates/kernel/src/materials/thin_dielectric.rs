@@ -1,4 +1,4 @@
-//! Thin panes: two parallel glass surfaces with no distance between them.
+//! Thin panes: two parallel glass surfaces that are infinitely close together.
 
 use super::fresnel::dielectric;
 use super::texture::Color;
@@ -13,8 +13,8 @@ pub struct ThinDielectric {
 }
 
 impl ThinDielectric {
-    /// Reflectance at the given cosine of the incident angle. It is 2R/(1 + R), where R is the reflectance of
-    /// one side. This includes all reflections between the two sides.
+    /// Reflectance at an incident angle with the given cosine. It is 2R/(1 + R), where R is the reflectance
+    /// of a single side. This accounts for all reflections between the two sides.
     #[inline]
     pub fn reflectance(&self, cosine: f32) -> f32 {
         let (side, _) = dielectric(cosine.abs(), self.ior);
@@ -33,7 +33,7 @@ mod tests {
         for degrees in [0.0_f32, 30.0, 60.0, 80.0, 89.0] {
             let cosine = degrees.to_radians().cos();
             let r = f64::from(dielectric(cosine, 1.5).0);
-            // R + T²R + T²R³ + …
+            // Sum the series R + T²R + T²R³ + …
             let series: f64 = r + (0..2000).map(|k| (1.0 - r).powi(2) * r.powi(2 * k + 1)).sum::<f64>();
             assert!((f64::from(pane.reflectance(cosine)) - series).abs() < 1e-6, "{degrees}");
         }

@@ -1,9 +1,9 @@
-//! Eviction of values cached for earlier scenes.
+//! Evicts values cached for earlier scenes.
 
 use super::Engine;
 use crate::cache::first_request_that_fits;
 
-/// Memory limit for files and trees that the current scene does not need.
+/// Memory limit for cached files and trees that the current scene does not need.
 const MAX_SPARE_BYTES: usize = 256 << 20;
 
 impl Engine {

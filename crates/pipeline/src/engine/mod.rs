@@ -110,7 +110,7 @@ pub(super) struct Engine {
     films: FilmCache,
     written: WrittenImages,
     own: Option<OwnImage>,
-    /// Number of saves before the newest request with a valid scene.
+    /// Save count from the newest request with a valid scene.
     saves: u64,
     /// Whether the film of the scene's own image is kept while other images are rendered.
     pins_own: bool,
@@ -127,20 +127,20 @@ pub(super) struct Engine {
     query_context: Option<QueryContext>,
     /// The last valid scene, with the files it references.
     good: Option<LastValidScene>,
-    /// Rendering rate of the most recent first image, in pixels per second.
+    /// Speed at which the most recent first image was rendered, in pixels per second.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// Assets of the last valid scene, which are watched while the scene file is broken.
     assets: Vec<FileRead>,
     /// All files that must not be written: the files of the last valid scene and all files referenced since.
     inputs: Inputs,
-    /// Whether the current scene file is invalid, in which case its referenced files are unknown.
+    /// Whether the current scene file is invalid, which means that its referenced files are unknown.
     is_broken: bool,
-    /// The checkpoint file's lock, and the checkpoints that have been reported.
+    /// Lock on the checkpoint file, and the checkpoints already reported.
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// Maximum number of attempts to read all of the scene's files without any of them changing meanwhile.
+/// Maximum number of attempts to read one consistent version of the scene's files.
 const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
@@ -149,14 +149,14 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: KeyedWorld,
-    /// Key of all surfaces, lights and textures. It does not depend on `origin`.
+    /// Key for all surfaces, lights and textures. It does not depend on `origin`.
     surfaces: Key,
     origin: DVec3,
     /// The film's key.
     film: Key,
     texels_loaded: u64,
     texture_memory_bytes: u64,
-    /// The part of the image that this process renders. `None` for the whole image.
+    /// Share of the image that this process renders. `None` for the whole image.
     share: Option<Shard>,
 }
 
@@ -261,7 +261,7 @@ impl Engine {
         (self.films.current().map(|state| state.key), view)
     }
 
-    /// Sends a preview of the current image at another size, outside of a request.
+    /// Sends a preview of the current image in another size, outside of a request.
     pub(super) fn show_preview_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
         if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
             PreviewTarget { bounds, plan, sink }.show(state, pool, token);
@@ -389,7 +389,7 @@ impl Engine {
         Ok(photons_key)
     }
 
-    /// Runs [`Self::prepare`] with one version of all files.
+    /// Runs [`Self::prepare`] on one consistent version of all files.
     fn prepare_consistent(
         &mut self,
         request: &Request,
@@ -403,8 +403,8 @@ impl Engine {
         })
     }
 
-    /// Calls `read`. If a file changes in the meantime, calls it again, so that neither an image nor an error
-    /// results from a mix of two versions of the files. `read` must verify the files that it loads.
+    /// Calls `read`, and calls it again whenever a file changes in the meantime. This way, images and errors
+    /// never result from a mix of file versions. `read` must verify the files that it loads.
     fn read_consistently<T>(
         &mut self,
         token: &CancelToken,
@@ -437,7 +437,8 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let containers = Containers::default();
         let show = ModelView::of(&request.overrides);
-        // The thread count does not depend on the scene, and reading a model uses all threads.
+        // Create the thread pool before parsing, because reading a model uses all threads. The thread count
+        // does not depend on the scene.
         let pool = self.thread_pool(thread_count(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
             let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
@@ -467,7 +468,7 @@ impl Engine {
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.check_conflicts(request, &plan, findings, table.sink);
-        // The current image still shows the previous scene and may yet be written.
+        // The current image still shows the previous scene and may still have to be written.
         self.inputs.add(before);
         looked?;
         if findings.conflicts.is_empty() {
@@ -492,7 +493,7 @@ impl Engine {
         Ok(ready)
     }
 
-    /// Builds the trees, lights and world of a loaded scene.
+    /// Builds the trees, lights and world for a loaded scene.
     fn build(
         &mut self,
         request: &Request,
@@ -505,7 +506,7 @@ impl Engine {
         let scene = &plan.scene;
         let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-        // The orbiter is small, so the key includes it as text.
+        // The orbiter camera is small, so include it in the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin();
@@ -584,7 +585,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
         let watch = Stopwatch::start(context.token);
-        // Borrow the state that the stage modifies separately from the state it reads.
+        // Borrow the state that the stage modifies separately from the state that it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
         let is_own = request.own.is_none();
@@ -646,12 +647,12 @@ impl Engine {
         rendered
     }
 
-    /// Returns the pool for a render with `--threads` or its default.
+    /// Returns the thread pool for a render with `--threads` or the default thread count.
     fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
         self.thread_pool_for(threads, true)
     }
 
-    /// Returns a pool with the given number of threads, reusing the current pool if it has that many.
+    /// Returns a pool with `threads` threads, reusing the current pool if it already has that many.
     fn thread_pool_for(&mut self, threads: usize, has_threads_option: bool) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());

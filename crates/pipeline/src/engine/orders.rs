@@ -12,7 +12,7 @@ use crate::sink::Sink;
 /// Reasons for interrupting a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interruption {
-    /// The user wants another image or none. The render will not be resumed.
+    /// The user requested another image, or none at all. The render will not be resumed.
     Replaced,
     /// The user quit. A long render will be resumed later.
     Left,
@@ -34,13 +34,13 @@ pub(crate) trait PendingOrders {
     fn interruption(&self) -> Interruption;
 }
 
-/// Tokens and orders of a running request.
+/// Tokens and orders for a running request.
 pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
     /// Cancels the write stage, which runs last.
     pub(crate) writing: &'a CancelToken,
     pub(crate) orders: &'a dyn PendingOrders,
-    /// Whether the front end has been told that its write order is postponed.
+    /// Whether the front end has already been told that its write order is postponed.
     is_postponed: Cell<bool>,
 }
 

@@ -55,7 +55,7 @@ const COLUMNS: usize = 120;
 /// Outcome of a finished request.
 pub(super) struct Outcome {
     pub(super) report: Report,
-    /// Reasons why no image is written.
+    /// Reasons why the image is not written.
     pub(super) conflicts: Vec<Diagnostic>,
     /// Likely mistakes in the scene.
     pub(super) warnings: Vec<Diagnostic>,

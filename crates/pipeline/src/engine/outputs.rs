@@ -14,7 +14,7 @@ use crate::control::CancelToken;
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCENE_HAS_ERRORS};
 use crate::output::OutputError;
 
-/// Removes a report that does not describe the plan's image files.
+/// Removes an existing report that does not describe the plan's image files.
 pub(super) fn remove_outdated_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
         sink.write_failed(None, format!("the report describes an earlier image: {error}"));

@@ -1,5 +1,5 @@
 //! The scene's own image, which is the saved scene rendered with the command-line overrides. While the user
-//! views other images by changing settings with keys, the film, checkpoint and files of this image are kept.
+//! views other images by changing settings with keys, its film, checkpoint and files are kept.
 
 use std::sync::Arc;
 
@@ -30,19 +30,20 @@ use crate::world::TextureNeeds;
 pub(super) struct OwnImage {
     /// Key of the film.
     pub(super) film: Key,
-    /// Key of the finished image and its output files.
+    /// Key for the finished image and its output files.
     pub(super) image: Key,
     parsed: Arc<Parsed>,
     pub(super) plan: Plan,
     camera: CameraChange,
-    /// Files that affect the image.
+    /// Files that the image depends on.
     files: Vec<FileRead>,
     /// Share of the image that this process renders. `None` for the whole image.
     pub(super) share: Option<Shard>,
 }
 
 impl OwnImage {
-    /// Computes the keys of the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are keys.
+    /// Computes the keys for the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are
+    /// the keys for the surfaces and meshes.
     pub(super) fn new(
         (parsed, plan, eye): (&Arc<Parsed>, Plan, &RequestCamera),
         (surfaces, meshes): (&Key, &[Key]),
@@ -64,7 +65,7 @@ impl OwnImage {
     }
 }
 
-/// Returns the key of a finished image and its output files.
+/// Returns the key for a finished image and its output files.
 fn image_key(film: Key, plan: &Plan) -> Key {
     let mut key = FingerprintHasher::new("own image");
     key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
@@ -89,9 +90,9 @@ impl Engine {
         self.own = Some(own);
     }
 
-    /// Checks a request's memory use. If the request shows another image, the film of the scene's own image
-    /// also counts. If the two films do not fit together, the film of the scene's own image may be dropped,
-    /// provided that this image has been written.
+    /// Checks whether a request fits in memory. If the request shows another image, the film of the scene's
+    /// own image also counts. If both films do not fit together, the film of the scene's own image may be
+    /// dropped, but only if that image has been written.
     ///
     /// # Errors
     /// The request needs more memory than is available.
@@ -112,7 +113,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Returns the size in bytes of the scene's own film, if it is kept in addition to the request's film.
+    /// Returns the size of the scene's own film in bytes if it is kept in addition to the request's film.
     fn own_film_bytes(&self, request: &Request, (plan, own_image_plan): (&Plan, Option<&Plan>)) -> u64 {
         let (Some(own), Some(own_image_plan)) = (&self.own, own_image_plan) else { return 0 };
         let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
@@ -122,15 +123,15 @@ impl Engine {
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// Lets the scene's own image replace one with changes made with keys if the scene was saved in between.
+    /// If the scene has been saved since the last request, lets its own image replace an image with keyboard
+    /// changes.
     pub(super) fn note_saves(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
             self.written.release();
         }
     }
 
-    /// Records which share of the scene's own image this process renders, if that is the image being
-    /// rendered.
+    /// If the scene's own image is being rendered, records which share of it this process renders.
     pub(super) fn record_own_share(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
@@ -147,7 +148,7 @@ impl Engine {
         });
     }
 
-    /// Whether the output files are up to date with the scene's own image.
+    /// Whether the output files contain the current version of the scene's own image.
     pub(super) fn is_own_written(&self) -> bool {
         self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }
@@ -192,8 +193,8 @@ impl Engine {
         Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
 
-    /// Calls `work`, with a checkpointer if `film` belongs to the scene's own image and checkpoints are
-    /// enabled for it.
+    /// Calls `work`. If `film` belongs to the scene's own image and checkpoints are enabled for that image,
+    /// passes it a checkpointer.
     pub(super) fn with_checkpointer<T>(
         &self,
         film: Option<Key>,
@@ -242,8 +243,8 @@ impl Engine {
     }
 }
 
-/// Whether a plan's render uses checkpoints. The output must be a regular file, and checkpoints must be
-/// enabled or the render must resume from one.
+/// Whether a plan's render uses checkpoints. The output must be a regular file. In addition, checkpoints must
+/// be enabled, or the render must resume from one.
 fn uses_checkpoints(plan: &Plan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
@@ -254,21 +255,21 @@ fn uses_checkpoints(plan: &Plan) -> bool {
 /// Returns the plan for the scene's own image if the request shows another one.
 ///
 /// # Errors
-/// Returns the errors of [`plan`].
+/// Returns the errors from [`plan`].
 pub(super) fn own_image_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
     let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
     own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Returns which textures a request needs. Includes the textures of the scene's own image, because the key of
-/// its film depends on them.
+/// Returns the textures that a request needs. These include the textures for the scene's own image, because
+/// its film key depends on them.
 pub(super) fn needed_textures(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))
 }
 
-/// Returns the request's overrides for the scene's own image.
+/// Returns the overrides that apply to the scene's own image.
 pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }

@@ -1,4 +1,4 @@
-//! Tests for values that are kept between requests.
+//! Tests that values are kept between requests.
 
 use std::fs;
 use std::sync::mpsc;
@@ -180,7 +180,7 @@ fn error_mentions_the_renamed_scene() {
 }
 
 #[test]
-fn checked_files_have_one_version() {
+fn check_never_mixes_file_versions() {
     for (renamed, is_moved) in
         [(SCENE.replace("radius = 0.5", "radius = 0.6"), false), (SCENE.replace("skin.ppm", "new.ppm"), true)]
     {
@@ -188,7 +188,8 @@ fn checked_files_have_one_version() {
         let at = |name: &str| fixture.folder.path().join(name);
         let scene = at("scene.toml");
         fs::write(&scene, SCENE).expect("written");
-        // The scene is replaced while its mesh is read. If the texture has moved, the old one is invalid.
+        // The scene is replaced while its mesh is being read. In the second case, the texture has been
+        // renamed and the file with the old name is invalid.
         if is_moved {
             fs::rename(at("skin.ppm"), at("new.ppm")).expect("renamed");
             fs::write(at("skin.ppm"), "P6\n").expect("written");

@@ -51,7 +51,7 @@ impl LastValidScene {
 }
 
 impl Engine {
-    /// Renders and writes the last valid scene with the overrides of the newest request, whose own scene
+    /// Renders and writes the last valid scene with the overrides from the newest request, whose own scene
     /// cannot be loaded. Does not overwrite files that the broken scene might reference.
     pub(super) fn try_last_valid_scene(
         &mut self,
@@ -60,7 +60,7 @@ impl Engine {
         context: &RequestContext<'_>,
     ) {
         let before = self.shown_image();
-        // The failed request has already reported its errors, so errors from this render are dropped.
+        // Drop errors from this render, because the failed request has already reported its own.
         let end = match self.render_last_valid_scene(newest, sink, context) {
             Ok(Some(is_reused)) => {
                 LastValidSceneOutcome::Finished { unchanged: is_reused && self.shown_image() == before }
@@ -110,15 +110,15 @@ impl Engine {
                 self.run_write_stage(&request, &ready.plan, &Findings::default(), sink, context.writing);
             is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);
             if is_written_now {
-                // The existing report does not describe this image.
+                // Remove the existing report, because it does not describe this image.
                 remove_outdated_report(&ready.plan, &self.inputs, sink);
             }
         }
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
-    /// Loads any additional textures that this view needs. `None` if the scene's files have changed: they may no
-    /// longer match the files in memory.
+    /// Loads any additional textures that this view needs. Returns `None` if the scene's files have changed,
+    /// because they may no longer match the files in memory.
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,
@@ -140,7 +140,7 @@ impl Engine {
         if reading.contents.changed().is_some() {
             return Ok(None);
         }
-        // A texture is missing if its file has since become invalid.
+        // A texture is missing here if its file has since become invalid.
         let files = [good.files, findings.files].concat();
         let good = LastValidScene { textures: Arc::new(found.value), needed, files, ..good };
         self.good = Some(good.clone());

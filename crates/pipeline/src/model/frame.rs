@@ -7,13 +7,14 @@ use crate::turntable::TurntableFrame;
 
 /// Vertical field of view in degrees.
 pub(super) const FOV: f64 = 30.0;
-/// Fraction of the image's width and height that the model may fill.
+/// Fraction of the image's width and height that the model may occupy.
 const FILLED: f64 = 0.88;
 
 /// Minimum model size.
 const LEAST: f64 = 1e-30;
 
-/// Maximum number of turntable frames to measure. More would not change the result noticeably.
+/// Maximum number of turntable frames for which to measure the model. More would not change the result
+/// noticeably.
 const MAX_MEASURED: u32 = 72;
 
 /// Position and orientation of a camera.
@@ -40,7 +41,7 @@ impl Side {
 }
 
 /// Returns the closest camera that keeps all `points` inside the image in each of the `turns` turntable
-/// frames. `least` and `greatest` are opposite corners of the bounding box.
+/// frames. `least` and `greatest` are opposite corners of the model's bounding box.
 pub(super) fn frame_model(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],

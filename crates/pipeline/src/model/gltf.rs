@@ -25,7 +25,7 @@ use crate::scene::toml_string;
 use crate::settings::Side;
 use crate::stages::containers::Containers;
 
-/// Where the generated scene's meshes and images are stored.
+/// Storage for the generated scene's meshes and images.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ExportNaming {
     /// In the glTF file and the files it references.
@@ -100,10 +100,10 @@ struct Writer<'a> {
     files: UniqueNames,
     assets: Vec<ExportedFile>,
     names: HashMap<ExportSource, String>,
-    /// Images used by materials.
+    /// Images that materials use.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
-    /// Other files that affect the text.
+    /// Other files that the text depends on.
     companions: Vec<Companion>,
 }
 
@@ -319,7 +319,7 @@ fn is_clear(material: &ModelMaterial) -> bool {
     is_clear && material.glass.is_none()
 }
 
-/// Whether a material may cast caustics. Assumes that a texture contains any value up to its factor.
+/// Whether a material may cast caustics. Assumes that a texture may contain any value up to its factor.
 fn is_polished(material: &ModelMaterial) -> bool {
     let is_smooth = |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < ROUGH;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
@@ -344,14 +344,14 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     lights.iter().map(of_light).sum()
 }
 
-/// Reads the first bytes of a file. Returns `None` on failure.
+/// Reads the first bytes of a file. Returns `None` if this fails.
 fn first_bytes(path: &Path) -> Option<[u8; 4]> {
     let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
     let mut start = [0; 4];
     file.read_exact(&mut start).ok().map(|()| start)
 }
 
-/// Detects an image format from the first bytes of a file and returns its extension.
+/// Detects an image format from a file's first bytes and returns the extension for it.
 fn image_extension(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"\xff\xd8") {
         "jpg"
@@ -367,8 +367,7 @@ fn zero_if_tiny(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
-/// Converts a camera from the file. The distance to `look_at` is the camera's distance from the model's
-/// center.
+/// Converts a camera from the file. Places `look_at` on its view axis, at the depth of the model's center.
 fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
     let size = (greatest - least).length().max(1e-12);
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);

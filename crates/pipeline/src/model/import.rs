@@ -29,7 +29,7 @@ pub struct Imported {
 pub enum ImportError {
     /// The file or the command line is invalid.
     File(String),
-    /// Not enough memory or threads.
+    /// There is not enough memory, or a thread cannot be started.
     Work(String),
 }
 
@@ -57,8 +57,8 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
                     write::encode_ply(&container.part(part, &ignore_progress, token)?.mesh)
                 }
                 ExportSource::Image(image) => {
-                    // Check the content. Otherwise, a glTF file could make the import copy arbitrary files as
-                    // images.
+                    // Check the content. Otherwise, a malicious glTF file could make the import copy
+                    // arbitrary files as images.
                     container.check_image(image, token)?;
                     container.image_content(image, token)?
                 }
@@ -75,13 +75,13 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
     })
 }
 
-/// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` renders, because the
-/// files referenced by that text exist.
+/// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` would render, because
+/// the files referenced by that text already exist.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
     let shown =
         super::gltf::scene_text(path, (ModelView::default(), &ExportNaming::Inside), containers, token)?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
-    // Ignore errors about file names, which differ in the imported scene.
+    // Ignore errors about file names, because the imported scene uses different ones.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
     Err(AssetError::Malformed {

@@ -18,7 +18,7 @@ pub(super) trait ExportFiles {
     fn image(&mut self, image: usize) -> TextureFile;
 }
 
-/// File of a texture.
+/// A texture's file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TextureFile {
     /// Path as it appears in the scene.
@@ -27,7 +27,7 @@ pub(super) struct TextureFile {
     pub(super) image: Option<usize>,
 }
 
-/// How a texture's values are used. Each use has its own table.
+/// How a texture's values are used. Each use needs a separate table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum TextureUse {
     Colors,
@@ -38,7 +38,7 @@ enum TextureUse {
 /// Keys and values of a table.
 type TableKeys = Vec<(&'static str, String)>;
 
-/// Identity of a texture: its image, use, and other table keys.
+/// Identity of a texture: its image, its use and its other table keys.
 type TextureIdentity = (usize, TextureUse, String);
 
 /// Writer for materials and their textures.
@@ -64,7 +64,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
     }
 
     fn write_material(&mut self, material: &ModelMaterial, name: &str) {
-        // Collect the keys first, because texture tables precede the material's table.
+        // Collect the keys first, because texture tables must precede the material's table.
         let mut keys = TableKeys::new();
         match material.glass {
             Some(glass) => {

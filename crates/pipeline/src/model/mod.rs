@@ -23,7 +23,7 @@ use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::FingerprintHasher;
 
-/// View of a model, as requested on the command line.
+/// View of a model, as specified on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelView {
     /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if the file has no
@@ -47,7 +47,7 @@ impl Default for ModelView {
 }
 
 impl ModelView {
-    /// Returns the view requested on the command line.
+    /// Returns the view specified on the command line.
     pub(crate) fn of(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
             (None, None) => None,
@@ -127,16 +127,16 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Limit on indirect radiance per bounce: four times the sky's radiance. Used for scenes with polished
-/// surfaces, where caustics from the key light would appear as fireflies at low sample counts.
+/// surfaces, in which caustics from the key light would appear as fireflies at low sample counts.
 const CLAMP: &str = "2";
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
-/// quarter for roughness 0.4, but by a factor of ten for 0.2.
+/// quarter at roughness 0.4, but by a factor of ten at roughness 0.2.
 const ROUGH: f64 = 0.3;
 /// Phong exponent with a highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α =
 /// roughness².
 const NARROW: f32 = 245.0;
 
-/// Lighting of a model.
+/// Lighting for a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Lighting {
     /// A default sky and key light.
@@ -152,12 +152,12 @@ enum Lighting {
 }
 
 impl Lighting {
-    /// Lighting with the lights from the file. `irradiance` is their irradiance on the model.
+    /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
     fn from_file(irradiance: f64) -> Self {
-        // With this irradiance, a white surface is as bright as with the default lights.
+        // At this irradiance, a white surface is as bright as under the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
-        // Limits the sky's radiance to valid values, even if a light is very close.
+        // Keep the sky's radiance in the valid range even if a light is very close.
         const MAX_STOPS: f64 = 40.0;
         Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }
     }

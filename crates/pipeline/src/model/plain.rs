@@ -26,7 +26,7 @@ fn default_up_axis(path: &Path) -> UpAxis {
     if has("stl") || has("ply") && is_from_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
 
-/// Whether the header of a PLY file mentions Blender, which exports PLY files z-up.
+/// Whether the header of a PLY file mentions Blender, which exports PLY files with z as the up axis.
 fn is_from_blender(path: &Path) -> bool {
     const START: usize = 256;
     let mut start = [0; START];
@@ -147,7 +147,7 @@ pub(super) fn scene_text(
         toml.key("vertex_colors", "true");
     }
     write_ground(&mut toml, &mut names, bounds, &eye);
-    // The generated material hides the fact that the file lacks materials, so report it here.
+    // The generated material hides the fact that the file has no materials, so report it here.
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
     notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());

@@ -23,7 +23,7 @@ pub const NOT_USED_BY_PATH: &str = "not used by path";
 /// Photons need more than one bounce.
 pub const TOO_FEW_BOUNCES: &str = "no photons at max_depth 1";
 /// No surface causes caustics.
-pub const NO_SPECULAR_SURFACES: &str = "no mirror or glass reflects light";
+pub const NO_SPECULAR_SURFACES: &str = "no surface causes caustics";
 /// The part has already been finished.
 pub const PART_COMPLETE: &str = "the part is already finished";
 /// The checkpoint contains all samples.
@@ -36,10 +36,10 @@ pub const NOISE_TARGET_REACHED: &str = "noise target reached in some tiles";
 pub const ALREADY_WRITTEN: &str = "already written";
 /// The request's image will not be written.
 pub const PREVIEW_ONLY: &str = "preview only";
-/// The output files contain an image with changes made with keys, which the user wrote with a key.
+/// The output files contain an image with keyboard changes, which the user wrote with a key.
 pub const OTHER_IMAGE_WRITTEN: &str = "w wrote another image";
 
-/// Prefix of the reason for a render that continued from existing samples.
+/// Start of the reason for a render that continued from existing samples.
 pub const RESUMED: &str = "resumed after ";
 
 /// Returns the reason for a render that continued from `samples` samples per pixel.

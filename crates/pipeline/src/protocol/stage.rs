@@ -75,6 +75,6 @@ pub struct StageReport {
     pub seconds: f64,
     /// CPU time used by all threads of the process during the stage.
     pub processor_seconds: f64,
-    /// Why the stage was skipped or reused, or a summary of its result. May be empty.
+    /// Why the stage was skipped or its result reused, or a summary of its result. May be empty.
     pub why: String,
 }

@@ -1,4 +1,4 @@
-//! Cache of recent films. Switching back to an earlier setting reuses its film.
+//! Cache for recent films. Switching back to an earlier setting reuses its film.
 
 use super::film_state::FilmState;
 use crate::scene::fingerprint::Key;
@@ -15,7 +15,7 @@ pub(crate) struct FilmCache {
     /// Key of the pinned film, which is kept regardless of its size.
     pinned: Option<Key>,
     most_kept_bytes: u64,
-    /// Number of films created.
+    /// Number of films created so far.
     made: u64,
 }
 
@@ -49,15 +49,15 @@ impl FilmCache {
         self.pinned = None;
     }
 
-    /// Limits the total size of cached films, excluding the current and the pinned film. Evicts films that
-    /// exceed the limit.
+    /// Limits the total size of the cached films, not counting the current and the pinned film. Evicts films
+    /// to stay within the limit.
     pub(crate) fn limit(&mut self, bytes: u64) {
         self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);
     }
 
-    /// Makes the film with this key current if it is cached and usable. Otherwise, there is no current film.
-    /// Caches the previous film if there is room.
+    /// Makes the film with this key the current one if it is cached and usable. Otherwise, there is no
+    /// current film. Caches the previous film if there is room.
     pub(crate) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|state| state.key == key);
@@ -104,7 +104,7 @@ impl FilmCache {
     /// Caches a film, evicting others to make room. A film larger than the limit is dropped instead.
     fn insert(&mut self, state: FilmState) {
         let size = state.memory_bytes();
-        // Drop incomplete films from a moving camera. They would fill the cache and are never reused.
+        // Drop incomplete films from a moving camera, which would fill the cache but are never reused.
         let is_left_behind = state.is_passing && !state.covers_all_pixels();
         if !state.has_samples() {
             return;
@@ -149,7 +149,7 @@ mod tests {
         FingerprintHasher::new(name).finish()
     }
 
-    /// Creates a film of 64×32 pixels that has samples.
+    /// Creates a film with 64×32 pixels and some samples.
     fn state(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");

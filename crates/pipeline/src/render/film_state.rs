@@ -24,13 +24,14 @@ pub(crate) struct FilmState {
     /// Serial number, assigned by the film cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
-    /// Number of samples taken in each half of each cell. [`u32::MAX`] for cells that are not rendered.
+    /// Number of samples taken so far in each half of each cell. [`u32::MAX`] for cells that are not
+    /// rendered.
     pub(crate) done: Vec<[u32; 2]>,
     /// Number of rays traced in each cell.
     pub(crate) rays: Vec<u64>,
     /// CPU seconds spent on all rays.
     pub(super) seconds: f64,
-    /// Recent sample cost in each cell.
+    /// Cost of recent samples in each cell.
     costs: Vec<CellCost>,
     /// Per-pixel overhead of a job, in addition to the cost of its samples.
     pixel_share: PixelOverhead,
@@ -38,7 +39,7 @@ pub(crate) struct FilmState {
     pub(crate) goals: SampleGoals,
     /// Expected number of samples for halves without a goal.
     expected: ExpectedSamples,
-    /// First image at preview size, shown where pixels have no samples.
+    /// First image at preview size, shown in place of pixels without samples.
     pub(crate) base: Option<RadianceImage>,
     /// The previewer used for the last preview.
     pub(crate) previewer: Option<Previewer>,
@@ -46,7 +47,7 @@ pub(crate) struct FilmState {
     pub(crate) is_passing: bool,
     /// The time limit that ended the last render.
     pub(crate) ended_by: Option<f64>,
-    /// Total render time of all requests in seconds.
+    /// Total render time over all requests, in seconds.
     pub(crate) render_seconds: f64,
     /// Share of the image to render. `None` for the whole image.
     pub(crate) share: Option<Shard>,
@@ -135,7 +136,7 @@ impl FilmState {
         self.own.as_ref().is_none_or(|own| own[tile])
     }
 
-    /// Maps samples of this share to sample indices in the whole image. If the indices are not all
+    /// Maps this share's samples to sample indices in the whole image. If the indices are not all
     /// consecutive, returns only the first consecutive range.
     pub(crate) fn global_samples(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
@@ -144,12 +145,12 @@ impl FilmState {
         }
     }
 
-    /// Returns goals equal to the film's current sample counts.
+    /// Returns goals that are equal to the film's current sample counts.
     pub(super) fn goals_at_current_samples(&self) -> SampleGoals {
         SampleGoals { decided: self.done.clone(), ..SampleGoals::none(self.done.len()) }
     }
 
-    /// Updates the sample counts from the film.
+    /// Reads the sample counts from the film.
     pub(super) fn recount_samples(&mut self) {
         let halves: Vec<_> = self.halves().collect();
         for (cell, half) in halves {
@@ -169,8 +170,7 @@ impl FilmState {
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
-    /// Whether a plan's image is finished, either because all samples are done or because the time limit was
-    /// reached.
+    /// Whether a plan's image is finished because it has all samples or because the time limit was reached.
     pub(crate) fn is_finished(&self, plan: &Plan) -> bool {
         let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
         self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
@@ -233,8 +233,8 @@ impl FilmState {
             + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// Returns the jobs needed to raise both halves of every cell in `part` (`None` for all) to `target` or
-    /// their goals. If all cells of a tile need the same samples, the tile is a single job. Longer jobs
+    /// Returns the jobs that render both halves of every cell in `part` (`None` for all) up to `target` or
+    /// their goals. If all cells in a tile need the same samples, the tile is a single job. Longer jobs
     /// precede shorter ones, and jobs of equal length are in the film's tile order.
     pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<TileJob> {
         let missing = |cell: usize, half: usize| {
@@ -267,7 +267,7 @@ impl FilmState {
         jobs
     }
 
-    /// Records a finished job and its cost. Returns the number of pixels times samples in the job.
+    /// Records a finished job and its cost. Returns the job's total sample count over all pixels.
     pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
@@ -287,7 +287,7 @@ impl FilmState {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decides which tiles with `samples` samples (a power of two) need no more.
+    /// Decides which of the tiles with `samples` samples (a power of two) need no more.
     pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);
@@ -295,17 +295,18 @@ impl FilmState {
     }
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
-    /// noise of these tiles.
+    /// noise among them.
     pub(crate) fn tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.tiles_above_target(&self.film, error)
     }
 
-    /// Returns the number of pixels times samples rendered so far.
+    /// Returns the number of samples rendered so far, summed over all pixels.
     pub(crate) fn pixel_samples(&self) -> u64 {
         self.sum_pixel_samples(|tile, half| self.done[tile][half])
     }
 
-    /// Returns the expected total number of pixels times samples, with at most `most` samples per pixel.
+    /// Returns the expected final number of samples, summed over all pixels, with at most `most` samples per
+    /// pixel.
     pub(crate) fn expected_pixel_samples(&self, most: u32) -> u64 {
         self.sum_pixel_samples(|cell, half| self.expected_samples(cell, half, most))
     }
@@ -315,9 +316,9 @@ impl FilmState {
         self.seconds
     }
 
-    /// Estimates the CPU seconds for the remaining samples, up to `most` per pixel. `jobs` returns the number
-    /// of jobs between two sample counts. Assumes that samples cost as much as recent samples in the same
-    /// cell. For cells without samples, uses the mean cost.
+    /// Estimates the CPU seconds needed for the remaining samples, up to `most` per pixel. `jobs` returns the
+    /// number of jobs between two sample counts. Assumes that a sample costs as much as recent samples in the
+    /// same cell. Uses the mean cost for cells without samples.
     pub(crate) fn remaining_cpu_seconds(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         let is_there = |cell: &usize| self.is_own_tile(cell / CELLS) && self.film.cell_rect(*cell).is_some();
@@ -342,8 +343,8 @@ impl FilmState {
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Returns the highest current and the highest expected final sample count of any pixel. These are also the
-    /// current and final numbers of photon passes.
+    /// Returns two sample counts: the highest current count and the highest expected final count of any
+    /// pixel. These are also the current and final numbers of photon passes.
     pub(crate) fn photon_passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
@@ -354,7 +355,7 @@ impl FilmState {
         ]
     }
 
-    /// Whether the final number of samples can be estimated if there is a noise target.
+    /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
         self.halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
@@ -372,7 +373,7 @@ impl FilmState {
     }
 }
 
-/// Returns the needed samples if they are equal for all halves of all cells.
+/// Returns the sample range that all halves of all cells need, if it is the same for all of them.
 fn common_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
@@ -453,7 +454,8 @@ mod tests {
             record_job(&mut state, tile, 1..2, 1.0);
         }
         assert_eq!(state.cpu_seconds(), 10.0);
-        // The first job counts a quarter, and the second counts fully: 2 seconds for 1.25 samples.
+        // The first job has a weight of 1/4 and the second a weight of 1, which gives 2 seconds for 1.25
+        // samples.
         assert!(
             (state.remaining_cpu_seconds(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
             "{}",

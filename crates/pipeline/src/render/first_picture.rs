@@ -22,13 +22,13 @@ pub(crate) struct CoarseImages<'a> {
     pub(crate) plan: &'a Plan,
     /// Whether the camera is being moved.
     pub(crate) is_moved: bool,
-    /// Rendering rate of the most recent first image, in pixels per second.
+    /// Speed at which the most recent first image was rendered, in pixels per second.
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
 impl<'a> CoarseImages<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
-    /// camera is being moved. Excludes sizes that take almost as long as a full pass.
+    /// camera is being moved. Excludes sizes that would take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.default_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
@@ -52,7 +52,7 @@ impl<'a> CoarseImages<'a> {
         pixels(width, height) * 2 <= pixels(full_width, full_height)
     }
 
-    /// Traces a first image and records the pixels per second. Calls `tick` regularly.
+    /// Traces a first image and records how many pixels per second were rendered. Calls `tick` regularly.
     pub(crate) fn trace_picture(
         &self,
         photons: Option<&PhotonMaps>,
@@ -106,8 +106,8 @@ impl<'a> CoarseImages<'a> {
     }
 }
 
-/// Returns the size of an image that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second. `None` if the
-/// usual size is about as fast.
+/// Returns an image size that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second. `None` if
+/// rendering at the usual size is about as fast.
 fn size_within_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;

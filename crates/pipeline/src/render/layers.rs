@@ -1,7 +1,7 @@
 //! EXR layers: additional channels for the finished image.
 //!
-//! Each light or first-hit layer is rendered to its own film with the image's number of samples per pixel.
-//! This way, the light components add up to the image even if a noise target determined the number of
+//! Each light or first-hit layer is rendered to its own film with the same number of samples per pixel as the
+//! image. This way, the light components add up to the image even if a noise target determined the number of
 //! samples.
 
 use super::film_state::FilmState;
@@ -74,7 +74,7 @@ pub(crate) fn progress_range(layers: &[OutputLayer], number: Option<usize>) -> [
     }
 }
 
-/// Renders the layers of a finished film, in order.
+/// Renders a finished film's layers in order.
 ///
 /// # Errors
 /// The token is cancelled, or there is not enough memory for a film.

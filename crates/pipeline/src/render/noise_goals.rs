@@ -17,8 +17,8 @@ pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 /// early.
 pub(crate) const AIM: f64 = 0.85;
 
-/// A tile is reported if its noise exceeds the target by more than this factor. The factor allows for
-/// measurement error.
+/// A tile is reported if its noise exceeds the target by more than this factor, which allows for measurement
+/// errors.
 const TOO_MUCH: f64 = 1.5;
 
 /// Upper limit for the expected number of samples. [`u32::MAX`] means unknown.
@@ -32,9 +32,9 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 pub(crate) struct SampleGoals {
     /// Goal of each half of each cell. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
-    /// Sample count at which each tile was last judged. Tiles are judged only once per sample count.
+    /// Sample count at which each tile was last evaluated. Tiles are evaluated only once per sample count.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the [`Prepass`]. `None` until noise has been judged.
+    /// Mean luminance of the [`Prepass`]. `None` until noise has been evaluated.
     pub(super) brightness: Option<f64>,
 }
 
@@ -86,7 +86,7 @@ impl SampleGoals {
     }
 
     /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
-    /// their goals, and the highest noise of these tiles. This can happen because a half's own noise does not
+    /// their goals, and the highest noise among them. Such tiles exist because a half's own noise does not
     /// affect its goal.
     pub(crate) fn tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
@@ -131,7 +131,7 @@ impl SampleGoals {
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = aim.samples(&noise);
-                // Once the other half is finished, it provides no further information.
+                // A finished half provides no further information about the other one.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
                 }
@@ -143,9 +143,9 @@ impl SampleGoals {
 /// Noise measurements on which goals are based.
 #[derive(Debug)]
 pub(crate) struct NoiseMeasurements {
-    /// Noise of each tile. `None` for tiles that have goals or a different sample count.
+    /// Noise of each tile. `None` for tiles that already have goals or have a different sample count.
     pub(crate) noise: Vec<Option<TileNoise>>,
-    /// Sample count of the judged tiles.
+    /// Sample count of the evaluated tiles.
     pub(crate) samples: u32,
     pub(crate) aim: NoiseTarget,
 }
@@ -162,8 +162,8 @@ impl TileNoise {
     fn of(film: &Film, tile: usize) -> Self {
         let noise = |half| {
             let noise = film.tile_noise(tile, half)?;
-            // Use an upper bound on the noise. If it comes from a few bright samples, other bright samples may not
-            // have been taken yet.
+            // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
+            // other bright samples that have not been taken yet.
             Some(CellHalfNoise {
                 variance: noise.variance * (1.0 + film.tile_variance_uncertainty(tile, half)),
                 ..noise
@@ -192,8 +192,8 @@ impl NoiseTarget {
         }
         let part = AIM * self.error / relative;
         let doubled = noise.samples.saturating_mul(2);
-        // Treat samples up to the next power of two as independent. They only reduce the noise faster once the
-        // power of two is reached.
+        // Treat samples up to the next power of two as independent. They reduce the noise faster only once
+        // the power of two is reached.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
@@ -265,7 +265,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn goals_up_to_twice_the_samples_are_decided() {
+    fn goal_within_next_doubling_is_decided() {
         // The standard error is √(1/12/16) = 0.072, or up to 0.082 with so few pixels. Reaching the target
         // takes 24 samples.
         let goals = judged([(1.0, 1.0); 2], 16, 0.08);
@@ -291,8 +291,8 @@ pub(crate) mod tests {
         assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
 
-    /// Returns the mean of a tile with rare bright samples and an expected value of 1. Each half stops based
-    /// on the noise of the other half, or on its own noise if `by_own`.
+    /// Returns the mean over a tile with rare bright samples and an expected value of 1. Each half stops
+    /// based on the noise of the other half, or on its own noise if `by_own`.
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");

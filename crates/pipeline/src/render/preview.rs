@@ -84,7 +84,7 @@ impl PreviewTarget<'_> {
         true
     }
 
-    /// Sends a radiance image that lacks the light from photons.
+    /// Sends a radiance image that lacks light from photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
         self.sink.preview_without_photons(develop(image, &self.plan.tone.resolved_for(image)));
     }
@@ -98,9 +98,9 @@ impl PreviewTarget<'_> {
         self.sink.preview(develop(image, tone), range, section, source);
     }
 
-    /// Returns the tone mapping for a preview. Data views use the value range of the full image, because
-    /// preview pixels are averages. If some pixels have no samples or a large image must be shown quickly,
-    /// they use the preview's range instead.
+    /// Returns the tone mapping for a preview. Because preview pixels are averages, data views use the value
+    /// range of the full image. If some pixels have no samples or a large image must be shown quickly, they
+    /// use the preview's range instead.
     fn tone(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;

@@ -40,7 +40,7 @@ pub(crate) struct RenderStageInputs<'a> {
     pub(crate) photons: Option<&'a PhotonStore>,
     pub(crate) preview: Option<PreviewSize>,
     pub(crate) most_film_bytes: u64,
-    /// Whether to start with an empty film even if one is cached.
+    /// Whether to start with an empty film even if a film is cached.
     pub(crate) force: bool,
     /// Section to render first.
     pub(crate) first: Option<Section>,
@@ -52,7 +52,7 @@ pub(crate) struct RenderStageInputs<'a> {
     pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
     /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
-    /// Rendering rate of the most recent first image, in pixels per second.
+    /// Speed at which the most recent first image was rendered, in pixels per second.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
     /// Share of the image to render. `None` for the whole image.
     pub(crate) share: Option<Shard>,
@@ -67,14 +67,14 @@ pub(crate) struct Scheduler<'a> {
     screen: PreviewTarget<'a>,
     clock: PausableClock,
     forecast: Forecast,
-    /// Number of pixels times samples so far.
+    /// Number of samples so far, summed over all pixels.
     units: u64,
-    /// Number of pixels times samples from earlier renders.
+    /// Number of samples from earlier renders, summed over all pixels.
     units_before: u64,
     pub(crate) rays: RayCounters,
     /// Seconds spent by the process whose checkpoint this render resumed from.
     seconds_before: f64,
-    /// Whether some pixels have no sample. While this is true, only cancellation ends the render.
+    /// Whether any pixels lack samples. While this is true, only cancellation ends the render.
     is_first: bool,
     is_over_time: bool,
     next_progress: Instant,
@@ -122,19 +122,20 @@ impl<'a> Scheduler<'a> {
         ran
     }
 
-    /// Returns the rays traced by all requests for this film.
+    /// Returns the number of rays traced for this film by all requests.
     pub(crate) fn total_rays(&self) -> RayCounters {
         let mut traced = self.state.traced;
         traced += self.rays;
         traced
     }
 
-    /// Returns the seconds all requests have spent on this film.
+    /// Returns the number of seconds that all requests have spent on this film.
     fn rendered_seconds(&mut self) -> f64 {
         self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    /// Returns the render time in seconds, including the time of the process whose checkpoint was resumed.
+    /// Returns the render time in seconds, including time spent by the process whose checkpoint this render
+    /// resumed from.
     pub(crate) fn seconds(&mut self) -> f64 {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
@@ -177,7 +178,7 @@ impl<'a> Scheduler<'a> {
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
-    /// Renders the prepass of the whole image, even though this process renders only a share of it.
+    /// Renders a prepass over the whole image, even if this process renders only a share of it.
     fn render_prepass(&mut self) -> Result<(), Stop> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
@@ -203,7 +204,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Judges the noise of existing samples from a checkpoint or a cancelled request.
+    /// Evaluates the noise of existing samples from a checkpoint or a cancelled request.
     fn decide_goals_from_existing(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
@@ -213,7 +214,8 @@ impl<'a> Scheduler<'a> {
         }
     }
 
-    /// Runs passes until `part` (`None` for all) has `samples` samples or has reached its goals.
+    /// Runs passes until every pixel in `part` (`None` for all) has `samples` samples or has reached its
+    /// goal.
     fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.decide_goals_from_existing(part);
@@ -243,7 +245,7 @@ impl<'a> Scheduler<'a> {
         self.forecast.measure_noise_if_due(self.state, pool, seconds);
     }
 
-    /// Renders all tiles of `part` that have fewer samples than `target`.
+    /// Renders all tiles in `part` that have fewer than `target` samples.
     fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
         let Some(photons) = self.rendering.photons else {
             return self.render_jobs(part, |_, _| target, None, 0);
@@ -279,8 +281,8 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Returns the next sample count for each half of each cell if there is a time limit. Adds samples where
-    /// they reduce the error most. Returns `None` if there are photons, because their cost does not depend on
-    /// the number of cells, or a noise target, because it determines the sample placement.
+    /// they reduce the error most. Returns `None` with photons, whose cost does not depend on the number of
+    /// cells, and with a noise target, which determines the sample placement instead.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
@@ -290,7 +292,7 @@ impl<'a> Scheduler<'a> {
         next_round(&self.state.film, &self.state.done, &self.state.rays, samples)
     }
 
-    /// Renders both halves of all cells up to their goals in short steps.
+    /// Renders both halves of every cell in short steps until they reach their goals.
     fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
         const STEP: Duration = Duration::from_millis(30);
         /// Number of pixels in half a tile.

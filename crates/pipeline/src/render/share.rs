@@ -21,7 +21,7 @@ pub(crate) struct Shard {
     pub(crate) samples: u32,
     /// Sample blocks in this share. `None` if the share has all samples of its tiles.
     blocks: Option<Vec<u32>>,
-    /// Shard index and shard count for dividing tiles, among the shards with the same sample blocks.
+    /// Index and count that divide the tiles among the shares with the same sample blocks.
     of_tiles: (u32, u32),
 }
 
@@ -54,7 +54,8 @@ impl Shard {
         }
     }
 
-    /// Maps this share's samples `own` to sample indices in the whole image, up to the end of their block.
+    /// Maps this share's samples `own` to sample indices in the whole image, stopping at the end of the
+    /// block.
     pub(crate) fn global_samples(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
@@ -82,7 +83,7 @@ impl Shard {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
-    /// Returns whether each of `count` tiles belongs to this share.
+    /// Returns, for each of `count` tiles, whether it belongs to this share.
     pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
@@ -98,7 +99,7 @@ impl Shard {
     }
 }
 
-/// Returns the numbers below `count` in the order in which they are assigned.
+/// Returns the numbers below `count` in the order of their assignment.
 fn assignment_order(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     order.sort_by_key(|number| (hash(u64::from(*number)), *number));
@@ -141,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_of_a_share_are_spread_out() {
+    fn share_blocks_are_spread_out() {
         let share = Shard::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");

@@ -14,18 +14,17 @@ use crate::film::Film;
 /// Minimum number of samples for noise estimates.
 const LEAST: u32 = 16;
 
-/// Minimum number of samples per pixel, as a fraction of the mean. Each pixel's noise is estimated from these
-/// samples.
+/// Minimum number of samples per pixel, as a fraction of the mean. Noise is estimated from these samples.
 const SHARE: f64 = 1.0 / 8.0;
 
 /// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
 const ROUND: f64 = 0.4;
 
-/// Overhead of a sample in addition to its rays, measured in rays.
+/// Overhead per sample, in addition to its rays, measured in rays.
 const BESIDE: f64 = 1.0;
 
-/// Returns the next sample counts for the halves of each cell, at most `most`, based on their current samples
-/// and rays. Returns `None` if it is too early to decide.
+/// Returns the next sample counts for both halves of each cell, based on their current samples and rays. The
+/// counts are at most `most`. Returns `None` if it is too early to decide.
 pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
@@ -56,7 +55,7 @@ struct HalfCell {
     samples: u32,
     /// Number of samples after the next round.
     goal: u32,
-    /// Sum of the pixels' squared errors with one sample each.
+    /// Sum of the squared errors of all pixels with one sample each.
     error: f64,
     /// Exponent p: the squared error is proportional to the number of samples to the power −p.
     power: f64,
@@ -201,9 +200,9 @@ mod tests {
         );
     }
 
-    /// Returns the mean of many cells with rare bright samples and an expected value of 1. Runs a few rounds
-    /// with priorities based on the noise of the other half, or of the same half if `by_own`. Uses many
-    /// cells. With only a few, giving samples to one cell would noticeably reduce the samples in the others.
+    /// Returns the mean over many cells with rare bright samples and an expected value of 1. Runs a few
+    /// rounds with priorities based on the noise of the other half, or of the same half if `by_own`. With
+    /// only a few cells, giving samples to one of them would noticeably reduce the samples in the others.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");

@@ -47,7 +47,7 @@ pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport
     }
 }
 
-/// Writes a report to the plan's report file.
+/// Writes a report to the path in the plan.
 ///
 /// # Errors
 /// The file cannot be written. The error contains the file name.
@@ -66,8 +66,8 @@ pub(crate) fn write_report(
     write_guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
 }
 
-/// Removes an earlier image's report after an unfinished image has replaced that image. Does not remove files
-/// that a report must not replace.
+/// Removes the report for an earlier image after an unfinished image has replaced that image. Does not remove
+/// files that a report must not replace.
 ///
 /// # Errors
 /// The file cannot be removed. The error contains the file name.

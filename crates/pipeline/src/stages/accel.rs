@@ -1,5 +1,5 @@
 //! The accel stage: builds a tree for each mesh file whose content has changed, and one over all objects.
-//! Trees of previous scenes are kept while there is room.
+//! Trees from previous scenes are kept while there is room.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(crate) struct AccelCache {
     /// Meshes with distinct lights. `None` if the mesh in the file can be used.
     distinct: NamedCache<Key, Option<Arc<LoadedMesh>>>,
     geometry: NamedCache<Key, Geometry>,
-    /// Offsets for lights that are coplanar with other surfaces.
+    /// Offsets applied to lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
     /// Key of the current tree over all objects.
     last: Option<Key>,
@@ -55,7 +55,7 @@ impl AccelCache {
 /// Result of the accel stage.
 #[derive(Clone)]
 pub(crate) struct AccelResult {
-    /// Trees of the scene's mesh files.
+    /// Trees for the scene's mesh files.
     pub(crate) meshes: Vec<Arc<MeshTree>>,
     /// Tree over all objects.
     pub(crate) geometry: Arc<Geometry>,
@@ -115,7 +115,7 @@ fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Ve
     meshes.iter().zip(emissive_meshes(scene)).map(distinct).collect()
 }
 
-/// Returns the trees of all meshes and the number of trees that were cached.
+/// Returns the trees for all meshes, and how many of them were cached.
 fn trees(
     scene: &Scene,
     (meshes, distinct): (&Meshes, &[Option<Arc<LoadedMesh>>]),

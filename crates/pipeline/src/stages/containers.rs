@@ -10,7 +10,7 @@ use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
-/// Slot for a file, filled by its first user.
+/// Slot for a file. Its first user fills it.
 type SharedContainer = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
@@ -63,7 +63,7 @@ impl Containers {
         }
     }
 
-    /// Stores a mesh returned by [`Containers::mesh`] for its next caller.
+    /// Stores a mesh returned by [`Containers::mesh`] for the next call.
     pub(crate) fn store_mesh(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }

@@ -11,11 +11,11 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
 use crate::world::{self, CoplanarLight, coplanar_lights};
 
-/// Maximum number of lights to warn about, for each kind of overlap.
+/// Maximum number of lights to warn about for each kind of overlap.
 const MAX_WARNINGS: usize = 10;
 
-/// Warns about lights that are moved off the plane of another surface, and about lights that overlap. Reuses
-/// the previous search result if shapes and lights are unchanged.
+/// Warns about lights that are moved because they are coplanar with another surface, and about lights that
+/// overlap. Reuses the previous search result if shapes and lights are unchanged.
 pub(crate) fn warn_about_coplanar_lights(
     parsed: &Parsed,
     meshes: &Meshes,
@@ -57,7 +57,7 @@ pub(crate) fn warn_about_coplanar_lights(
     let overlap = |light, surface, more: &str| {
         let both = if surface == light { "faces of ".to_owned() } else { "this light and ".to_owned() };
         let both = both + &named(surface) + more;
-        format!("{both} overlap: there, the light counts twice, but only one of them is visible")
+        format!("{both} overlap: their light counts twice there, but only one of them is visible")
     };
     warn(&doubled, &overlap, "remove the duplicate, or move one off the plane of the other");
     memo.set(key, found);

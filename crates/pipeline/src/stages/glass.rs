@@ -14,7 +14,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
 use crate::world::{GlassSolids, OpenGlass};
 
-/// Visible effect of open glass, shown under the object's location.
+/// How open glass affects the image, shown under the object's location.
 const LACKS: &str = "glass refracts where a ray enters and leaves it; rays through the hole are neither refracted \
                      nor tinted";
 
@@ -44,7 +44,7 @@ pub(crate) fn glass(
     Ok(bodies)
 }
 
-/// A flaw that several objects may have. Each flaw causes one warning.
+/// A flaw, possibly shared by several objects. Each flaw causes one warning.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum GlassFlaw {
     /// A shape without an interior.
@@ -72,7 +72,7 @@ fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnost
     groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
 }
 
-/// Returns the flaw of an object that is not closed.
+/// Returns the flaw in an object that is not closed.
 fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.mesh().is_some() {
@@ -98,7 +98,7 @@ fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     })
 }
 
-/// Returns a single warning about all objects with a flaw. `members` must not be empty.
+/// Returns a single warning about all objects that have a flaw. `members` must not be empty.
 fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
     let first = &loaded.scene.objects[members[0].object as usize];
     let edges: usize = members.iter().map(|open| open.edges).sum();
@@ -136,7 +136,7 @@ fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Dia
     diagnostic
 }
 
-/// Lists the first objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
+/// Lists the first few objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
 fn names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
@@ -182,7 +182,7 @@ mod tests {
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::stages::meshes::CachedMesh;
 
-    /// Returns the warnings for a scene, substituting `mesh` for its mesh file.
+    /// Returns the warnings for a scene whose mesh file is replaced with `mesh`.
     fn warnings(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<Diagnostic> {
         let text = format!(
             "[materials.a]\ntype = '{material}'\n{text}\n[render]\nambient = [1, 1, 1]\n[camera]\nposition = [0, 1, 4]\n\

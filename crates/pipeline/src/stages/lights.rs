@@ -1,4 +1,4 @@
-//! The lights stage: collects the scene's lights if any of them has changed.
+//! The lights stage: collects the scene's lights again if any of them has changed.
 
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ pub(crate) fn lights(
     })
 }
 
-/// Describes the light tree for a scene with too many lights to sample all of them.
+/// Describes the light tree for a scene that has too many lights to sample each of them.
 fn describe_light_tree(which: &str, lights: &Lights) -> String {
     format!(", {which}; light tree {} kB", lights.memory_bytes().div_ceil(1000))
 }

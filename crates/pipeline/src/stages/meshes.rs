@@ -17,7 +17,7 @@ use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{FingerprintHasher, Key};
 use crate::scene::{LoadedScene, MeshBounds};
 
-/// A mesh file and the other files it references.
+/// A mesh file and the other files that it references.
 #[derive(Debug)]
 pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
@@ -61,7 +61,7 @@ pub(crate) fn meshes(
             let name = mesh_name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // The mesh probably still references the same files. Hash those files before they are read.
+                // The mesh probably still references the same files, so hash them before they are read.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
@@ -125,7 +125,7 @@ pub(crate) fn meshes(
     Ok(loading_result(meshes, counts))
 }
 
-/// Warns about objects that need data that their mesh files lack. Skips files that could not be read.
+/// Warns about objects whose mesh files lack data that the objects need. Skips files that could not be read.
 fn warn_about_missing_parts(
     loaded: &LoadedScene,
     files: &[MeshFile],
@@ -224,7 +224,8 @@ fn load_one(
     Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that was missing when the mesh was loaded now exists but has not been seen by this request.
+/// Whether a file that was missing when the mesh was loaded now exists without having been seen by this
+/// request.
 fn has_companion_appeared(
     companions: &[Companion],
     reading: &FileReadContext<'_>,
@@ -254,7 +255,7 @@ fn file_key(file: &MeshFile, content: Content) -> Key {
     key.finish()
 }
 
-/// Returns whether each mesh file's own materials are used by any object.
+/// Returns, for each mesh file, whether any object uses the file's own materials.
 fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
@@ -262,8 +263,8 @@ fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     shown
 }
 
-/// Warnings about mesh files, without duplicates. The numbers of dropped faces are summed over all parts of a
-/// file.
+/// Warnings about mesh files, without duplicates. The dropped faces in all parts of a file are counted
+/// together.
 #[derive(Default)]
 struct MeshWarnings<'a> {
     all: Vec<(&'a MeshFile, MeshWarning)>,
@@ -273,7 +274,7 @@ struct MeshWarnings<'a> {
 }
 
 enum MeshWarning {
-    /// Dropped faces and the number of affected parts.
+    /// Dropped faces, and the number of parts that had any.
     Dropped(Dropped, usize),
     Message(String),
 }
@@ -355,7 +356,7 @@ mod tests {
 
     const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
-    /// A folder with a mesh and its material, and the state needed to load them.
+    /// A folder containing a mesh and its material, and the state needed to load them.
     struct MeshFixture {
         folder: tempfile::TempDir,
         sink: Sink,
@@ -454,7 +455,7 @@ mod tests {
             (below_down, "", 1),
             (above_up, "translate = [0, 3, 0]", 0),
             (above_up, "scale = [1, 4, 1]", 0),
-            // Rotate the mesh onto its back, and upside down.
+            // Lay the mesh on its back, and turn it upside down.
             (above_up, "scale = [1, 4, 1]\nrotate = [90, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]\ntranslate = [0, -1.5, 0]", 0),
@@ -466,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn number_of_warnings_is_limited() {
+    fn warning_count_is_limited() {
         let mut fixture = MeshFixture::new();
         let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
         fixture.write("a.obj", &OBJ.replace("usemtl m\n", &names));

@@ -29,7 +29,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Reasons why a request ended early.
+/// Reasons for ending a request early.
 #[derive(Debug)]
 pub(super) enum Stop {
     Cancelled,
@@ -56,7 +56,7 @@ impl Stop {
     }
 }
 
-/// A stage's result, its status and the reason for the status.
+/// A stage's result, its status and the reason for that status.
 #[derive(Debug)]
 pub(super) struct StageResult<T> {
     pub(super) value: T,
@@ -90,13 +90,13 @@ pub(super) struct FileReadContext<'a> {
 /// Files, errors and warnings found by a request.
 #[derive(Debug)]
 pub(super) struct Findings {
-    /// A time before the first read.
+    /// A point in time before the first read.
     pub(super) begun: Instant,
     /// All files that the request tried to read, without duplicates.
     pub(super) files: Vec<FileRead>,
     known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
-    /// Current reasons why no image is written.
+    /// Current reasons for not writing an image.
     pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
@@ -115,7 +115,7 @@ impl Default for Findings {
 }
 
 impl Findings {
-    /// Resets everything except the start time of the request.
+    /// Resets everything except the request's start time.
     pub(super) fn reset(&mut self) {
         *self = Self { begun: self.begun, ..Self::default() };
     }
@@ -133,8 +133,8 @@ impl Findings {
         self.add_file(file);
     }
 
-    /// Watches files whose absence may have caused an error. The text underlined by each error is treated as
-    /// a file name.
+    /// Watches files whose absence may have caused an error. Treats the text underlined by each error as a
+    /// file name.
     pub(super) fn watch_underlined_files(
         &mut self,
         diagnostics: &[Diagnostic],
@@ -160,7 +160,7 @@ impl Findings {
         self.errors.push(diagnostic_at_span(loaded, span, Severity::Error, error.to_string()));
     }
 
-    /// Adds an error about a mismatch between the scene and its assets.
+    /// Adds an error about an asset that does not fit the scene.
     pub(super) fn add_error(
         &mut self,
         loaded: &LoadedScene,
@@ -183,7 +183,7 @@ impl Findings {
     }
 }
 
-/// Creates a diagnostic without help at a span of the scene file.
+/// Creates a diagnostic at a span in the scene file, without a help text.
 fn diagnostic_at_span(
     loaded: &LoadedScene,
     span: Range<usize>,
@@ -197,7 +197,7 @@ fn diagnostic_at_span(
 pub(super) struct LoadedAsset<T> {
     /// The file, followed by the files it references.
     pub(super) files: Vec<FileRead>,
-    /// The value, and whether it was cached.
+    /// The value, and whether it came from the cache.
     pub(super) result: Result<(Arc<T>, bool), AssetError>,
 }
 
@@ -214,7 +214,7 @@ pub(super) fn loading_result<T>(value: T, counts: FileCounts) -> StageResult<T> 
     StageResult::done(value, parts.join(", "))
 }
 
-/// File counts of a stage.
+/// File counts for a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct FileCounts {
     pub(super) loaded: usize,

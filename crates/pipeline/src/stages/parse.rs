@@ -28,16 +28,16 @@ use crate::scene::sanitize::visible;
 pub(crate) struct Parsed {
     pub(crate) loaded: Arc<scene::LoadedScene>,
     pub(crate) orbiter: Option<OrbiterCamera>,
-    /// Files that the scene references without the overrides, and files that these files reference.
+    /// Files that the scene references without the overrides, and the files that those files reference.
     pub(crate) named: Vec<PathBuf>,
-    /// Files that a model's scene depends on, except the model itself.
+    /// Files that a generated model scene depends on, except the model itself.
     companions: Vec<FileRead>,
-    /// Approximations made for a model's scene.
+    /// Approximations made when the scene for a model was generated.
     notes: Vec<Diagnostic>,
     orbiter_content: Option<Content>,
 }
 
-/// Scene to parse: path, overrides, and the view if it is a model.
+/// The scene to parse: its path, the overrides and, for a model, the view.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneSource<'a> {
     /// Path of a scene file or model.
@@ -48,7 +48,7 @@ pub(crate) struct SceneSource<'a> {
     pub(crate) show: ModelView,
 }
 
-/// Generates a scene for a model. Also returns the other files that the scene depends on.
+/// Generates a scene for a model. Also returns all other files that the generated scene depends on.
 fn model_scene(
     SceneSource { path, sets, show }: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
@@ -132,8 +132,8 @@ pub(crate) fn parse(
     let (loaded, content, companions, notes) = match &known {
         Some(parsed) => (parsed.loaded.clone(), content, parsed.companions.clone(), parsed.notes.clone()),
         None => {
-            // Record the current content in case parsing fails. After a success, replace it with the content
-            // that was parsed.
+            // Record the current content in case parsing fails. After a successful parse, replace it with the
+            // parsed content.
             findings.add_file(FileRead { path: path.to_owned(), content });
             read_scene(origin, (contents, containers), memo.latest(), findings, token)?
         }
@@ -154,7 +154,7 @@ pub(crate) fn parse(
     Ok(StageResult::done(parsed, ""))
 }
 
-/// A scene, the content of its file, the other files it depends on, and the approximations made.
+/// A scene, its file's content, the other files it depends on, and the approximations made.
 type ReadScene = (Arc<scene::LoadedScene>, Content, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read_scene(
@@ -179,7 +179,7 @@ fn read_scene(
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
-/// Returns the key of a scene whose file has this content.
+/// Returns the key for a scene whose file has this content.
 fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
     let mut key = FingerprintHasher::new("parse");
     content.add_to(key.path(path));
@@ -192,8 +192,8 @@ fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content
     key.finish()
 }
 
-/// If the scene file is missing, adds a hint to the error if another file has the same text as the last valid
-/// scene.
+/// If the scene file is missing but another file contains the same text as the last valid scene, adds a hint
+/// to the error.
 fn with_new_name_hint(
     mut errors: Vec<Diagnostic>,
     path: &Path,
@@ -222,8 +222,8 @@ fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<
     Ok(loaded.named.iter().cloned().chain(referenced).collect())
 }
 
-/// Lists the files that mesh and glTF files reference, without loading the files. Ignores other files, and
-/// errors in the files.
+/// Lists the files that mesh and glTF files reference, without loading the files. Ignores other kinds of
+/// files and any errors in the files.
 ///
 /// # Errors
 /// Returns [`Cancelled`] if the token is cancelled.

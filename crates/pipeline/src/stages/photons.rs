@@ -1,5 +1,5 @@
-//! The photons stage. It creates the data shared by all passes and traces the first pass. Later passes are
-//! traced during the render when they are needed. Maps are cached while there is room, so that images with
+//! The photons stage, which creates the data shared by all passes and traces the first pass. Later passes are
+//! traced during the render, when they are needed. Maps are cached while there is room, so that images with
 //! another camera or exposure can reuse them. Images of another size can reuse them if the scene sets the
 //! number of photons per pass.
 
@@ -33,10 +33,10 @@ const MAX_ALIVE: u32 = 1;
 /// Maximum number of samples rendered at once if no photons are emitted.
 const MAX_WITHOUT_TREE: u32 = 4096;
 
-/// Cache of the photons stage: the photons of the last scene.
+/// Cache of the photons stage: photons for the last scene.
 pub(crate) type PhotonCache = Memo<PhotonStore>;
 
-/// Context in which photon passes are traced.
+/// Context for tracing photon passes.
 #[derive(Clone, Copy)]
 pub(crate) struct PhotonContext<'a> {
     pub(crate) world: &'a World,
@@ -46,7 +46,7 @@ pub(crate) struct PhotonContext<'a> {
     pub(crate) sink: &'a Sink,
 }
 
-/// The photons of a scene.
+/// Photons for a scene.
 #[derive(Debug)]
 pub(crate) struct PhotonStore {
     photons: Photons,
@@ -73,7 +73,7 @@ impl PhotonStore {
         self.photons.emits_photons()
     }
 
-    /// Returns how many passes may be in use at the same time, assuming that they are as large as the first.
+    /// Returns how many passes may be in use at the same time, assuming that each is as large as the first.
     pub(crate) fn max_passes_at_once(&self) -> u32 {
         if !self.emits_photons() {
             return MAX_WITHOUT_TREE;
@@ -82,7 +82,7 @@ impl PhotonStore {
         ((MAX_ALIVE_BYTES / size) as u32).clamp(1, MAX_ALIVE)
     }
 
-    /// Average seconds to trace a pass. 0 if no pass was traced.
+    /// Average number of seconds needed to trace a pass. 0 if no pass was traced.
     pub(crate) fn seconds_of_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
         if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
@@ -184,8 +184,8 @@ fn run_with_ticks<T: Send>(
     })
 }
 
-/// Traces the first photons if the image gathers them. `wanted` comes from the command line, and `enabled`
-/// from the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
+/// Traces the first photons if the image uses them. `wanted` comes from the command line, and `enabled` from
+/// the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
 ///
 /// # Errors
 /// The token is cancelled, or `before` fails.

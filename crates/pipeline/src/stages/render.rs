@@ -72,7 +72,7 @@ pub(crate) fn render(
         }
         (false, _) if state.goals.are_below(wanted) => {
             let missed = state.tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
-                format!("; {tiles} with few noisy pixels: up to {worst:.2}")
+                format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
             });
             StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }

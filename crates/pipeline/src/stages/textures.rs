@@ -1,5 +1,5 @@
-//! The textures stage: decodes images that are used by visible materials and whose content has changed, in
-//! parallel.
+//! The textures stage: decodes images in parallel if they are used by visible materials and their content has
+//! changed.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
@@ -33,7 +33,7 @@ use crate::world::{
     textures_needed,
 };
 
-/// Maximum total size of a scene's texels in bytes.
+/// Maximum total size of a scene's texels, in bytes.
 const MAX_BYTES: u64 = 2 << 30;
 
 /// Canonical path of an image, and how to interpret its values.
@@ -43,14 +43,14 @@ fn texture_name(source: &TextureSource) -> TextureName {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
-/// Decoded texels, and warnings about ignored parts of the file.
+/// Decoded texels, and warnings about the parts of the file that were ignored.
 #[derive(Clone, Debug)]
 struct DecodedTexture {
     texels: Arc<Texels>,
     warnings: Vec<String>,
 }
 
-/// Texture cache. It has one entry per file and encoding, and one for the mipmaps if a material uses them.
+/// Texture cache. Each file and encoding has one entry, plus one for its mipmaps if a material uses them.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
     texels: NamedCache<TextureName, DecodedTexture>,
@@ -95,11 +95,11 @@ pub(crate) struct Textures {
     pub(crate) images: Images,
     /// Key of each image.
     pub(crate) key_of: HashMap<TextureSource, Key>,
-    /// Key of each texture, in the order of the needed textures.
+    /// Key of each texture, in the same order as the needed textures.
     pub(crate) keys: Vec<Key>,
     /// Keys of the textures used by materials from mesh files.
     pub(crate) of_files: Vec<Key>,
-    /// The environment map with its key.
+    /// The environment map and its key.
     pub(crate) environment: Option<(Key, Arc<Texels>)>,
     /// Number of texels that this request read from files.
     pub(crate) texels_loaded: u64,
@@ -111,9 +111,9 @@ pub(crate) struct Textures {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NeededTextures {
     pub(crate) textures: Vec<NeededTexture>,
-    /// Number of textures that are used by the scene but not needed for this view.
+    /// Number of textures that the scene uses but this view does not need.
     pub(crate) left_out: usize,
-    /// Whether a missing texture is an error even for a model. Otherwise, the model is shown without it.
+    /// Whether a missing texture is an error even in a model. If not, the model is shown without it.
     pub(crate) are_required: bool,
 }
 
@@ -139,13 +139,13 @@ pub(crate) fn needed(
 struct TextureRequest<'a> {
     name: TextureName,
     content: Content,
-    /// The image file referenced by the glTF file.
+    /// The image file that the glTF file references.
     linked: Option<FileRead>,
     kept: CachedTexture,
     asked_by: Vec<&'a NeededTexture>,
 }
 
-/// Cached data of an image.
+/// Data cached for an image.
 #[derive(Debug, Default)]
 struct CachedTexture {
     texels: Option<Arc<DecodedTexture>>,
@@ -233,7 +233,7 @@ pub(crate) fn textures(
                     match (&one.material, one.mesh_file) {
                         (Some(material), Some(file)) => {
                             let file = loaded.scene.mesh_files[file].value.display();
-                            let help = format!("it is used by the material \"{material}\" of {file}");
+                            let help = format!("it is used by the material \"{material}\" in {file}");
                             findings.add_error(
                                 loaded,
                                 reference_span(loaded, one),
@@ -255,8 +255,8 @@ pub(crate) fn textures(
     Ok(loading_result(textures, FileCounts { left_out: *left_out, ..counts }))
 }
 
-/// Warns about an unreadable image in a model and replaces it with a constant. The material's factors are
-/// preserved, except that emission is dropped. Materials from mesh files provide their own values for use
+/// Warns about an unreadable image in a model and replaces it with a constant. Preserves the material's
+/// factors, except that emission is dropped. Materials from mesh files provide their own values for use
 /// without a texture.
 fn substitute_texture(
     loaded: &LoadedScene,
@@ -267,7 +267,7 @@ fn substitute_texture(
 ) {
     let file = loaded.path.display();
     let mut warn = |material: &str| {
-        let help = format!("glimt shows the material \"{material}\" of {file} without it");
+        let help = format!("glimt shows the material \"{material}\" in {file} without it");
         let warning = loaded.diagnostic_at(
             reference_span(loaded, one),
             Severity::Warning,
@@ -302,7 +302,7 @@ fn substitute_texture(
     images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
 }
 
-/// Adds the line of the MTL file that refers to an image to a message about the image.
+/// Prefixes a message about an image with the MTL line that references the image.
 fn locate(one: &NeededTexture, message: &impl Display) -> String {
     match &one.statement {
         Some(statement) => format!("{statement}: {message}"),
@@ -310,7 +310,7 @@ fn locate(one: &NeededTexture, message: &impl Display) -> String {
     }
 }
 
-/// Warns about an image where it is referenced.
+/// Adds a warning about an image at the place where the image is referenced.
 fn warn(loaded: &LoadedScene, one: &NeededTexture, message: &str, findings: &mut Findings) {
     findings.add_warning(loaded, reference_span(loaded, one), locate(one, &message));
 }
@@ -400,7 +400,7 @@ impl TextureRequest<'_> {
     }
 }
 
-/// Groups the needed textures by file and encoding, preserving their order, and looks up cached data.
+/// Groups the needed textures by file and encoding, in their original order, and looks up cached data.
 fn images<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
@@ -463,7 +463,7 @@ fn load_all(
     reading.pool.install(|| images.par_iter().zip(over).map(load).collect())
 }
 
-/// Returns an error message for each image that exceeds the total limit.
+/// Returns an error message for each image that would exceed the total limit.
 fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     let mib = |bytes: u64| bytes.div_ceil(1 << 20);
     let mut before = 0;
@@ -483,10 +483,10 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// Content of a texture's file. If this is a glTF file, also contains the image file that it references.
+/// Content of a texture's file and, if this is a glTF file, of the image file that it references.
 type TextureContents = (Content, Option<FileRead>);
 
-/// An image, its mipmaps, and whether both were cached.
+/// An image and its mipmaps, and whether both came from the cache.
 type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
@@ -630,8 +630,8 @@ mod tests {
     fn memory_limit_applies_to_all_images_together() {
         let over = memory_limit_errors(&[600, 400, 0, 25, 1], 1001);
         assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
-        // Three run-length encoded images whose headers specify 15999 × 15999 pixels (732.3 MiB each) but
-        // which contain few pixels.
+        // Three run-length encoded images. Their headers specify 15999 × 15999 pixels (732.3 MiB each), but
+        // they contain only a few.
         let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.tga\"\n");
         let ball = |name: &str| {
             format!(
@@ -644,7 +644,7 @@ mod tests {
         let mut bench = Bench::new(&format!("{SCENE}{tables}"));
         let header = "\0\0\x0a\0\0\0\0\0\0\0\0\0\x7f\x3e\x7f\x3e\x18\0";
         for name in names {
-            // Minimum file length for this image size, with 128 pixels per run.
+            // Minimum file length for an image of this size, with 128 pixels per run.
             bench.write(&format!("{name}.tga"), &format!("{header}{}", "\0".repeat(3 << 20)));
         }
         let Failure::Scene(errors) = bench.failed() else { panic!("the scene should have errors") };

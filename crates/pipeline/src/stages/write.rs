@@ -32,13 +32,14 @@ const SCENE: &str = "glimt:scene";
 /// Images written by glimt.
 #[derive(Debug, Default)]
 pub(crate) struct WrittenImages {
-    /// Image key and file content after the write, for each file. Files without a key are written again.
+    /// For each file, the image key and the file content after the write. Files without a key are written
+    /// again.
     files: HashMap<PathBuf, (Option<Key>, Content)>,
-    /// Whether the files contain an image with changes made with keys.
+    /// Whether the files contain an image with keyboard changes.
     is_by_hand: bool,
     /// Key of the scene's own image, if all of its output files are up to date.
     pub(crate) own: Option<Key>,
-    /// Folders from which this write or turntable has already removed the temporary files of killed
+    /// Folders from which this write or turntable has already removed temporary files left by killed
     /// processes.
     sweep: SweptFolders,
 }
@@ -61,8 +62,8 @@ impl WrittenImages {
         self.files.is_empty()
     }
 
-    /// Whether a file on disk contains an image that the user wrote with changes made with keys. Only a save
-    /// or the user replaces it.
+    /// Whether a file on disk contains an image with keyboard changes that the user wrote. It is replaced
+    /// only after the scene is saved, or when the user writes another image.
     pub(crate) fn have_image_by_hand(&self, contents: &Contents) -> bool {
         self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content(path, *known, contents))
     }
@@ -93,12 +94,12 @@ pub(crate) struct Destination<'a> {
     pub(crate) layers: &'a [LayerImage],
     pub(crate) inputs: &'a Inputs,
     pub(crate) contents: &'a Contents,
-    /// Whether this is the scene's own image, without changes made with keys.
+    /// Whether this is the scene's own image, without keyboard changes.
     pub(crate) is_own: bool,
     pub(crate) sink: &'a Sink,
 }
 
-/// Checks all output files before starting to render.
+/// Checks all output files before rendering starts.
 ///
 /// # Errors
 /// With [`WriteMode::Must`], returns an error for the first file that cannot be written. Otherwise, reports
@@ -222,7 +223,7 @@ fn write(
     contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Report each failure separately, except for the last one if it is returned instead.
+            // Report each failure separately, except for the last one if it will be returned.
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
@@ -252,12 +253,12 @@ pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: 
     is_written
 }
 
-/// Finished frames of a turntable, with their sample counts.
+/// Finished turntable frames, with their sample counts.
 #[derive(Debug, Default)]
 pub(crate) struct TurntableFrames(Vec<(Picture, SampleStats)>);
 
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
-/// were written.
+/// have been written.
 ///
 /// # Errors
 /// The token is cancelled, or a file could not be written.
@@ -349,7 +350,7 @@ pub(crate) fn develop_settings(plan: &Plan) -> DevelopSettings {
     }
 }
 
-/// Like [`develop_settings`], with the scene's path relative to the image.
+/// Like [`develop_settings`], but with the scene's path relative to the image.
 fn develop_settings_for(plan: &Plan, path: &Path) -> DevelopSettings {
     let mut finish = develop_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
@@ -359,7 +360,7 @@ fn develop_settings_for(plan: &Plan, path: &Path) -> DevelopSettings {
     finish
 }
 
-/// Returns the metadata needed to reproduce an image, without the film's own metadata.
+/// Returns the metadata needed to reproduce an image, except for metadata stored in the film.
 fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [

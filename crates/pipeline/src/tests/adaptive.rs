@@ -56,7 +56,7 @@ fn image_does_not_depend_on_threads_or_history() {
         bench.done();
         pictures.push(bench.picture());
     }
-    // Request more samples in several steps, which include powers of two and another number.
+    // Increase the sample count in several steps, not all of which are powers of two.
     let mut bench = Bench::new(LIT);
     for samples in [16, 40, 256] {
         bench.overrides.samples = Some(samples);

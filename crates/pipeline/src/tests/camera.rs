@@ -15,7 +15,7 @@ fn moved() -> CameraChange {
     CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
 }
 
-/// Returns a request's camera: the scene's camera with the front end's changes.
+/// Returns a request's camera, which is the scene's camera with the front end's changes.
 fn camera(bench: &mut Bench) -> Viewpoint {
     let of = bench.send();
     let events = bench.until_end(of);
@@ -102,7 +102,7 @@ fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<SavedCamera, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
-/// Like [`keep`], but the camera was moved starting from `own` instead of the scene's camera.
+/// Like [`keep`], but for a camera that was moved starting from `own` instead of the scene's camera.
 fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<SavedCamera, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
@@ -158,7 +158,7 @@ fn changed_file_is_not_overwritten() {
 }
 
 #[test]
-fn camera_from_before_an_edit_is_not_saved() {
+fn outdated_camera_is_not_saved() {
     let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
     bench.done();
     let own = bench.own.get().expect("a camera");
@@ -170,7 +170,7 @@ fn camera_from_before_an_edit_is_not_saved() {
     let why = keep_moved_from(&mut bench, moved, own).expect_err("refused");
     assert_eq!(why, messages::CAMERA_CHANGED);
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
-    // A camera moved from the file's current camera is written and preserves the edit.
+    // If the move starts from the file's current camera, the camera is saved and the edit is preserved.
     let moved = Viewpoint { fov: 20.0, ..moved };
     assert!(keep(&mut bench, moved).expect("written").is_new);
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");

@@ -210,7 +210,7 @@ impl Bench {
     }
 }
 
-/// Returns one letter per stage, in order: `d` for done, `r` for reused, `s` for skipped.
+/// Returns one letter for each stage, in order: `d` for done, `r` for reused, `s` for skipped.
 pub(super) fn statuses(report: &Report) -> String {
     let names: Vec<Stage> = report.stages.iter().map(|stage| stage.name).collect();
     assert_eq!(names, Stage::ALL);

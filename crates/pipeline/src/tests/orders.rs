@@ -1,4 +1,4 @@
-//! Tests for failures and for orders during a render: cancelling, pausing and writing.
+//! Tests for failures, and for orders that arrive during a render: cancel, pause and write.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -130,7 +130,7 @@ fn oversized_film_is_an_error() {
     bench.done();
 }
 
-/// Renders slowly enough for orders to arrive during the render.
+/// Renders so slowly that orders arrive during the render.
 pub(super) fn slow(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -143,7 +143,7 @@ pub(super) fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Waits until the render of the last valid scene ends, for a request whose own scene is invalid.
+/// For a request with an invalid scene, waits until the render of the last valid scene ends.
 fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneOutcome {
     loop {
         match bench.next() {
@@ -173,7 +173,7 @@ fn broken_scene_file_does_not_stop_a_render() {
     let broken = bench.send();
     assert!(matches!(bench.until_end(first).last(), Some(Event::Cancelled { .. })));
     assert!(matches!(bench.until_end(broken).last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
-    // The render continues under the newest generation until it ends and is written.
+    // The render continues under the newest generation until the image is finished and written.
     let mut is_seen = false;
     loop {
         match bench.next() {
@@ -189,7 +189,7 @@ fn broken_scene_file_does_not_stop_a_render() {
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     let finished = |unchanged| LastValidSceneOutcome::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
-    // After a second typo, the image is still finished.
+    // A second typo does not keep the image from being finished.
     bench.edit("width = = 40", "width = = = 40");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     assert_eq!(last_good_end(&bench, bench.generation), finished(true));
@@ -199,7 +199,7 @@ fn broken_scene_file_does_not_stop_a_render() {
     assert_statuses(&report, "rrrrrsrr");
 }
 
-/// Returns the image of a valid scene after applying a change.
+/// Applies a change to a valid scene and returns its image.
 fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::new(scene);
     change(&mut bench);
@@ -218,7 +218,7 @@ fn last_valid_scene_applies_new_overrides() {
         |bench, _| bench.overrides.shadows = Some(Shadows::Off),
         |bench, _| bench.overrides.exposure = Some(-2.0),
     ];
-    // Errors in the scene file and in a referenced file.
+    // Test errors in the scene file and in a referenced file.
     type ChangeScene = fn(&Bench);
     let faults: [(ChangeScene, ChangeScene); 2] = [
         (|bench| bench.edit("width = 40", "width = = 40"), |bench| bench.edit("width = = 40", "width = 40")),
@@ -236,7 +236,7 @@ fn last_valid_scene_applies_new_overrides() {
             let of = bench.send();
             let failed = bench.until_end(of);
             assert!(matches!(failed.last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
-            // The image is shown and written under the generation of the key press.
+            // The image is shown and written under the generation of the request that the key press sent.
             let mut is_seen = false;
             loop {
                 match bench.next() {
@@ -294,7 +294,7 @@ fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")
 }
 
-/// Reads the sample count from the image's metadata on disk.
+/// Reads the sample count from the metadata of the image on disk.
 fn samples_on_disk(bench: &Bench) -> String {
     let text = String::from_utf8_lossy(&bench.picture()).into_owned();
     let line = text.lines().find_map(|line| line.strip_prefix("# glimt:samples: "));
@@ -302,7 +302,7 @@ fn samples_on_disk(bench: &Bench) -> String {
 }
 
 #[test]
-fn first_region_is_rendered_before_the_rest() {
+fn priority_region_is_rendered_first() {
     let text = wide().replace("width = 640", "width = 256").replace("height = 640", "height = 256");
     let text = text.replace("samples = 4", "samples = 32");
     let mut bench = Bench::with(&text, slow);
@@ -569,7 +569,7 @@ fn anisotropy_without_uvs_causes_a_warning() {
     assert_eq!(messages(&brushed.replace("anisotropy = 0.5", "anisotropy = 0"), OBJ), [""; 0]);
 }
 
-/// Renders slightly more slowly than normal.
+/// Renders slightly more slowly than usual.
 fn leisurely(
     photons: Option<&PhotonMaps>,
     world: &World,

@@ -135,8 +135,8 @@ fn write_now(keys: &mut ToggledBench) -> Vec<Event> {
     events
 }
 
-/// Begins the scene's own image, then writes it with another exposure. Returns the request and the written
-/// image.
+/// Starts rendering the scene's own image, then writes it with another exposure. Returns the request and the
+/// written image.
 fn write_brighter(keys: &mut ToggledBench) -> (u64, Vec<u8>) {
     begin(keys);
     let of = keys.show(|overrides| overrides.exposure = Some(2.0));
@@ -180,18 +180,19 @@ fn save_replaces_an_image_written_on_request() {
     let mut keys = ToggledBench::with(slow);
     let (of, written) = write_brighter(&mut keys);
     keys.0.until_end(of);
-    // A scene that cannot be read is not a new version.
+    // A scene that cannot be read does not count as a new version.
     keys.0.edit("[camera]", "[camera");
     keys.0.send();
     while !matches!(keys.0.next(), Event::LastGoodEnded { .. }) {}
     assert!(keys.0.picture() == written);
-    // The own image shares its film with the preview.
+    // The scene's own image shares its film with the preview.
     keys.0.edit("[camera", "[camera] # saved");
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
     assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
     let own = keys.0.picture();
     assert!(own != written);
-    // Without a shared film, the save is written when the user returns to the scene's settings.
+    // Without a shared film, the saved scene's image is written once the user returns to the scene's
+    // settings.
     keys.shown(no_shadows);
     write_now(&mut keys);
     assert!(keys.0.picture() != own);
@@ -203,7 +204,7 @@ fn save_replaces_an_image_written_on_request() {
 }
 
 #[test]
-fn removed_image_written_on_request_is_not_kept() {
+fn requested_image_is_not_kept_once_removed() {
     let mut keys = ToggledBench::with(slow);
     let (of, written) = write_brighter(&mut keys);
     fs::rename(keys.0.path("out.ppm"), keys.0.path("bright.ppm")).expect("moved");
@@ -213,7 +214,7 @@ fn removed_image_written_on_request_is_not_kept() {
 }
 
 #[test]
-fn failed_write_keeps_the_image_written_before() {
+fn failed_write_keeps_the_earlier_image() {
     let mut keys = ToggledBench::with(slow);
     let image = keys.0.path("images/out.ppm");
     fs::create_dir(keys.0.path("images")).expect("a folder");
@@ -247,17 +248,17 @@ fn checkpoint_remains_until_own_image_is_written() {
 }
 
 #[test]
-fn edit_while_toggled_keeps_the_old_image() {
+fn edit_during_another_view_keeps_old_image() {
     let mut keys = ToggledBench::new();
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
     assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::NotBegun; 2]);
     assert!(keys.0.picture() == old);
-    // Reverting the edit and adding a comment makes the image up to date again.
+    // After the edit is reverted and a comment added, the image is up to date again.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
     assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::Written; 2]);
-    // Save the shown settings in the scene, which makes this the scene's own image.
+    // Saving the shown settings in the scene makes this the scene's own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
     assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
@@ -265,7 +266,7 @@ fn edit_while_toggled_keeps_the_old_image() {
 }
 
 #[test]
-fn toggled_image_is_not_written_if_scene_is_broken() {
+fn other_view_is_not_written_if_scene_is_broken() {
     let mut keys = ToggledBench::new();
     keys.0.done();
     let own = keys.0.picture();
@@ -335,7 +336,7 @@ fn own_image_is_written_despite_exposure_change() {
 }
 
 #[test]
-fn checkpoint_of_own_image_is_saved_while_toggled() {
+fn own_checkpoint_is_saved_during_another_view() {
     let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
     for (end, is_kept) in [(Command::Suspend, true), (Command::Quit, false)] {
         let mut keys = ToggledBench::with(slow);
@@ -441,7 +442,7 @@ fn memory_check_includes_unfinished_own_film() {
         assert!(stops(&mut keys, |overrides| overrides.exposure = Some(1.0)).is_none());
         let failure = stops(&mut keys, no_shadows);
         assert_eq!(matches!(failure, Some(Failure::Work(_))), !fits, "{failure:?}");
-        // The own image's render continues when the user returns to the scene's settings.
+        // The scene's own image continues to render when the user returns to the scene's settings.
         let (report, _) = keys.0.done();
         assert_resumed(&report);
     }

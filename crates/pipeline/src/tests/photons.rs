@@ -50,7 +50,7 @@ fn write_is_handled_during_later_photon_passes() {
     let mut bench = Bench::new(&text);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    // Wait, because progress is not reported during photon passes, although they take most of the time.
+    // Wait for a fixed time. Photon passes take most of the time but do not report progress.
     std::thread::sleep(Duration::from_millis(50));
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_millis(100));
@@ -62,7 +62,7 @@ fn write_is_handled_during_later_photon_passes() {
 
 #[test]
 fn time_limit_ends_a_photon_pass() {
-    // A photon pass takes longer than the time limit, but an image sample does not.
+    // A photon pass takes longer than the time limit, but an image sample takes less.
     let text = wrapped(2_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     bench.overrides.time_seconds = Some(0.2);
@@ -86,8 +86,7 @@ fn without(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Returns two values for each preview: whether it lacked the light from photons, and whether the photons had
-/// been traced.
+/// Returns, for each preview, whether it lacked light from photons and whether the photons had been traced.
 fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
     let (of, mut previews, mut are_there) = (bench.send(), Vec::new(), false);
     loop {
@@ -113,7 +112,7 @@ fn first_preview_does_not_wait_for_photons() {
     assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
     assert!(WITHOUT.load(Ordering::SeqCst));
     assert!(previews.len() > 1 && previews[1..].iter().all(|it| *it == (false, true)), "{previews:?}");
-    // The first image of a moving camera reuses the cached photons.
+    // The first image from a moving camera reuses the cached photons.
     WITHOUT.store(false, Ordering::SeqCst);
     bench.overrides.camera.fov = Some(50.0);
     let previews = previews_of(&mut bench);
@@ -173,7 +172,7 @@ fn custom_kernel_is_used_with_photons() {
 }
 
 #[test]
-fn reason_for_skipping_photons_is_stable() {
+fn each_skip_of_photons_reports_its_own_reason() {
     let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
     let mut reason = |integrator| {
         bench.overrides.integrator = integrator;

@@ -62,7 +62,7 @@ fn previews_identify_their_image() {
         source.image
     };
     let own = source(&mut bench);
-    // Another size, a comment or a new render does not make it another image.
+    // A different size, a comment or a new render does not change the image's identity.
     bench.preview = Some(PreviewSize { width: 20, height: 30, around: None });
     assert!(source(&mut bench) == own);
     bench.edit("[camera]", "# a comment\n[camera]");

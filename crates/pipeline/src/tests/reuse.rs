@@ -108,7 +108,7 @@ fn companion_file_change_reloads_the_mesh() {
 }
 
 /// One file of each kind that a scene can reference: its name, old text and new text. The test replaces the
-/// file between hashing and decoding.
+/// file after it is hashed and before it is decoded.
 const KINDS: [(&str, &str, &str); 8] = [
     ("scene.toml", KINDS_SCENE, "#"),
     (
@@ -210,7 +210,7 @@ fn image_never_uses_unhashed_bytes() {
                 shown == new_image || shown == old_image,
                 "{name}, {is_cold}: the image should show one version or the other"
             );
-            // A file that is only hashed during decoding has not been replaced yet.
+            // A file that is hashed only during decoding has not been replaced yet.
             replacements().clear();
             bench.write(name, &new);
             assert!(
@@ -275,7 +275,7 @@ fn each_file_is_hashed_once_per_request() {
             // In the first round, the material file is unknown until the mesh is read, so it is hashed during
             // decoding.
             let reads = usize::from(name != "one.mtl" || round > 0);
-            // Files with a recent timestamp are hashed again once all files are loaded.
+            // Files with recent timestamps are hashed again once all files are loaded.
             let verified = usize::from(name != "out.ppm");
             let count = hashed.iter().filter(|path| **path == bench.path(name)).count();
             assert!((reads..=reads + verified).contains(&count), "{name}, round {round}: {count}");
@@ -623,7 +623,7 @@ fn emission_texture_changes_the_light() {
     assert_ne!(bench.picture(), before);
     bench.edit("scale = 2", "scale = 3");
     assert_statuses(&bench.done().0, "drrrdsdd");
-    // An emitter that is black or has a factor of 0 is not a light.
+    // An emissive material that is black or has a factor of 0 does not create a light.
     bench.write("slide.ppm", "P6\n1 1\n255\n\0\0\0");
     assert_eq!(bench.done().0.stages[Stage::Lights as usize].why, "1 light");
     bench.edit("scale = 3", "scale = 0");
@@ -632,7 +632,7 @@ fn emission_texture_changes_the_light() {
 }
 
 #[test]
-fn sample_views_do_not_take_new_samples() {
+fn sample_and_error_views_reuse_the_film() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let beauty = bench.picture();
@@ -648,7 +648,7 @@ fn sample_views_do_not_take_new_samples() {
     assert_eq!(bench.picture(), beauty);
 }
 
-/// A texture that is missing at first must be watched, and shown once it exists.
+/// A texture that is missing at first must be watched, and must be shown once it exists.
 #[test]
 fn model_texture_is_shown_once_it_exists() {
     let mut bench = Bench::new(SCENE);

@@ -60,8 +60,8 @@ fn only_the_changed_texture_is_read() {
     }
 }
 
-/// A light whose textures have two texels (normals), three (emission) and four (specular color). The ball's
-/// texture has one texel.
+/// A light whose textures for normals, emission and specular color have two, three and four texels. The
+/// ball's texture has one texel.
 const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
     [textures.gloss]\nfile = \"gloss.ppm\"\n\
     [materials.lamp]\nspecular = { texture = \"gloss\" }\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
@@ -106,8 +106,7 @@ fn view_loads_only_the_textures_it_needs() {
     assert_eq!(textures_of(bumpy, View::Shadow), textures('d', "2 loaded, 2 not needed", 5));
     assert_eq!(textures_of(bumpy, View::Emission), textures('d', "1 loaded, 3 not needed", 3));
     assert_eq!(textures_of(&ambient(bumpy), View::Ambient), textures('d', "1 loaded, 3 not needed", 1));
-    // The `bounds` view draws boxes over the image, and the color of a lobe affects how often the lobe is
-    // sampled.
+    // The `bounds` view draws boxes over the image, and a lobe's color affects how often the lobe is sampled.
     for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
         assert_eq!(textures_of(bumpy, view), textures('d', "4 loaded", 10), "{view:?}");
     }
@@ -146,7 +145,7 @@ fn unneeded_textures_do_not_change_a_view() {
         [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
     {
         for scene in [SCENE, &bumpy_scene] {
-            // A black texel reflects nothing, but incoming light must still be visible.
+            // A black texel reflects nothing, but the view must still show incoming light.
             let bench = |view| {
                 let bench = bumpy(scene, view);
                 bench.write("skin.ppm", "P6\n1 1\n255\n\0\0\0");
@@ -154,7 +153,8 @@ fn unneeded_textures_do_not_change_a_view() {
             };
             let mut without = bench(view);
             without.done();
-            // Textures for the beauty view stay loaded so that dependent lights and trees can be reused.
+            // Textures for the beauty view remain loaded so that lights and trees that depend on them can be
+            // reused.
             let mut with = bench(View::Beauty);
             with.done();
             with.overrides.view = Some(view);

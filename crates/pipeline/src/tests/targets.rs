@@ -66,7 +66,7 @@ fn material_files_are_checked_before_rendering() {
     let mut bench = Bench::new(SCENE);
     bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
     bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
-    // The check applies even if foreign files may be replaced.
+    // The check applies even if files not written by glimt may be replaced.
     bench.overrides.replaces_foreign = true;
     for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "an image")] {
         bench.overrides.report = Some(bench.path(name));
@@ -212,7 +212,7 @@ fn unwritable_later_frame_fails_before_rendering() {
     assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
 }
 
-/// Panics. Kernel for tests that must not start rendering.
+/// Panics when called. For tests that must not start rendering.
 fn unused(
     _: Option<&PhotonMaps>,
     _: &World,

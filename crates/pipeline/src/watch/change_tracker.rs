@@ -12,7 +12,7 @@ use super::{BETWEEN_CHANGES, WatchDelays};
 pub(super) struct ChangeTracker {
     delays: WatchDelays,
     pending: Option<PendingHints>,
-    /// Files that were written to and have not been closed.
+    /// Files that were written to but have not been closed.
     open: HashSet<OsString>,
     unsettled: Option<UnsettledChange>,
     /// Earliest time at which to report the next change.
@@ -29,7 +29,7 @@ struct PendingHints {
     is_complete: bool,
 }
 
-/// A reported change that may not be the last.
+/// A reported change that further changes may follow.
 #[derive(Clone, Copy, Debug)]
 struct UnsettledChange {
     since: Instant,
@@ -59,7 +59,7 @@ impl ChangeTracker {
                 self.open.remove(&name);
                 false
             }
-            // A save remains complete if a backup is removed or a timestamp is set afterwards.
+            // Removing a backup or setting a timestamp afterwards does not make a save incomplete.
             Hint::Touched => was_complete,
         };
         let due = if is_complete { now } else { (now + self.delays.quiet).min(first + self.delays.longest) };
@@ -86,8 +86,8 @@ impl ChangeTracker {
         self.pending = None;
     }
 
-    /// Whether it is too early to report a change that was found because of hints. `is_missing` is true if a file
-    /// is missing or empty, and `moves` is true if the previous check found a different change.
+    /// Whether it is too early to report a change that was found because of a hint. `is_missing` is true if a
+    /// file is missing or empty, and `moves` is true if the previous check found a different change.
     pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
         let Some(pending) = &mut self.pending else { return false };
         let due = if is_missing {

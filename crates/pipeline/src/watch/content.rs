@@ -1,4 +1,4 @@
-//! File contents, identified by hashes that are only recomputed if the file may have changed.
+//! File contents, identified by hashes that are recomputed only if the file may have changed.
 
 use std::collections::HashMap;
 use std::io::{self, ErrorKind, Read};
@@ -17,7 +17,7 @@ use crate::system::file::{self, FileKind, FileStamp};
 pub struct FileRead {
     /// Path of the file.
     pub path: PathBuf,
-    /// The content that was decoded, or the content during the request if the file was not decoded.
+    /// The decoded content or, if the file was not decoded, its content during the request.
     pub content: Content,
 }
 
@@ -28,7 +28,7 @@ pub enum Content {
     Missing,
     /// Not a regular file, or not readable.
     Unusable(Obstacle),
-    /// Hash of a regular file's bytes, or of its metadata if it is very long.
+    /// Hash of a regular file's bytes, or of its metadata if the file is very long.
     Hash([u8; 32]),
 }
 
@@ -56,12 +56,12 @@ impl Content {
     }
 }
 
-/// On some file systems, changes within this time may have the same timestamp.
+/// Changes within this time may result in the same timestamp on some file systems.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Maximum length of a hashed file in bytes. Longer files are never decoded. They are compared by metadata,
+/// Maximum length of a hashed file, in bytes. Longer files are never decoded. They are compared by metadata,
 /// to avoid reading sparse files of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
-/// Number of bytes between checks of the token.
+/// Number of bytes to read between checks of the token.
 const CHUNK: usize = 1 << 20;
 
 /// Cache of file hashes.
@@ -73,7 +73,8 @@ pub struct Contents {
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// For each path, another file and the bytes to write to it right after the file at the path has been hashed.
+    /// Maps a path to another file and the bytes to be written to it right after the file at the path has
+    /// been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, (PathBuf, Vec<u8>)>>,
 }
@@ -82,12 +83,12 @@ pub struct Contents {
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     content: Content,
-    /// Stamp before the content was read.
+    /// The file's stamp before its content was read.
     stamp: Option<FileStamp>,
 }
 
-/// File contents as seen by one request. A file's content must not change during a request. If it does, the
-/// request starts again. The watcher detects later changes.
+/// File contents as seen by a single request. A file's content must not change during a request. If it does,
+/// the request starts again. The watcher detects later changes.
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     contents: Arc<Contents>,
@@ -116,12 +117,12 @@ impl Snapshot {
     }
 
     /// Returns the content of a file whose decoded bytes have this hash. Records a change if the content
-    /// differs from what this request has seen before.
+    /// differs from what this request saw earlier.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
         self.decoded_with_stamp(path, hash, None)
     }
 
-    /// Like [`Snapshot::decoded`], but takes the file's stamp from before it was read.
+    /// Like [`Snapshot::decoded`], but takes a stamp obtained before the file was read.
     fn decoded_with_stamp(&self, path: &Path, hash: FileHash, stamp: Option<FileStamp>) -> Content {
         let content = Content::Hash(hash);
         if self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content != content {
@@ -130,7 +131,7 @@ impl Snapshot {
         content
     }
 
-    /// Returns a file referenced by another file, with the content that was decoded.
+    /// Returns a file referenced by another file, along with its decoded content.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
@@ -146,9 +147,9 @@ impl Snapshot {
         Ok(FileRead { path: path.clone(), content })
     }
 
-    /// Records a change if a file's content differs from the content that this request saw first. Must be called
-    /// after all files are loaded. Otherwise, a request could combine different versions of several files. A
-    /// removed file does not count as changed.
+    /// Records a change if a file's content differs from the content that this request first saw. Must be
+    /// called after all files are loaded. Otherwise, a request could combine different versions of its files.
+    /// A removed file does not count as changed.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
@@ -171,7 +172,7 @@ impl Snapshot {
         *self.changed.lock().unwrap_or_else(PoisonError::into_inner) = Some(path.to_owned());
     }
 
-    /// Returns a file that changed while this request was reading files.
+    /// Returns a file that changed while this request was reading its files.
     pub(crate) fn changed(&self) -> Option<PathBuf> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -186,12 +187,12 @@ impl Snapshot {
     }
 }
 
-/// Substitute content for a file that is too long to hash.
+/// Content to use for a file that is too long to hash.
 fn content_of_stamp(stamp: &FileStamp) -> Content {
     Content::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
 }
 
-/// Whether the stamp is guaranteed to differ after any change made after `now`.
+/// Whether any change made after `now` is guaranteed to change the stamp.
 fn is_settled(stamp: &FileStamp, now: SystemTime) -> bool {
     let latest = stamp.modified.0.max(stamp.changed.0).max(0).unsigned_abs();
     let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);

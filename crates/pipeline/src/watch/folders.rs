@@ -1,4 +1,4 @@
-//! Watches the folders that contain files of interest, and converts system notifications to hints.
+//! Watches the folders that contain relevant files, and converts system notifications to hints.
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
@@ -31,19 +31,19 @@ pub(super) struct WatchedFolders {
     names: Arc<Mutex<HashSet<OsString>>>,
     /// Folders to watch, and whether each is on a network file system, which sends no notifications.
     wanted: HashMap<PathBuf, bool>,
-    /// Watched folders and their identities at the time they were added.
+    /// Watched folders, with their identities at the time they were added.
     watched: HashMap<PathBuf, Identity>,
 }
 
-/// A folder's device and inode, which change if another folder takes its name.
+/// A folder's device and inode, which differ if another folder takes its name.
 type Identity = (u64, u64);
 
 fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// Returns the watcher if its thread could be started. Otherwise, the watcher's handler, which shares `names`,
-/// has been dropped, and any use of the watcher would panic, even dropping it.
+/// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
+/// been dropped, and any use of the watcher would panic, even dropping it.
 fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -111,7 +111,7 @@ impl WatchedFolders {
         self.watch_wanted();
     }
 
-    /// Renews all watches. After a missed notification, any watch may be broken.
+    /// Renews all watches. If a notification was missed, any watch may be broken.
     pub(super) fn renew(&mut self) {
         self.release(|_| true);
         self.watch_wanted();
@@ -135,7 +135,7 @@ impl WatchedFolders {
             if *is_remote || self.watched.contains_key(folder) {
                 continue;
             }
-            // Read the identity first, so that a replacement in between is detected later.
+            // Read the identity first, so that a replacement between the two steps is detected later.
             if let Some(identity) = identity(folder)
                 && watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
             {

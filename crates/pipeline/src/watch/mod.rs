@@ -39,7 +39,7 @@ const POLL: Duration = Duration::from_millis(200);
 /// Minimum time between reported changes. Long enough to show a first image during continuous saves.
 const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
 
-/// Delays before reacting to hints.
+/// Delays for reacting to hints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WatchDelays {
     /// Time without hints after which to check a file that is being written.
@@ -48,12 +48,12 @@ pub(super) struct WatchDelays {
     quiet_missing: Duration,
     /// Maximum time between a hint and the resulting check.
     longest: Duration,
-    /// Time without hints after which files count as settled. Programs that write a file in two steps take
+    /// Time without hints after which files count as settled. A program that writes a file in two steps takes
     /// only a fraction of this time.
     settle: Duration,
     /// Like `settle`, but while a file is open for writing. Longer than network stalls in `scp` or `sftp`.
     settle_open: Duration,
-    /// Maximum time until files count as settled, regardless of hints.
+    /// Maximum time before files count as settled, regardless of hints.
     settle_longest: Duration,
 }
 
@@ -77,7 +77,7 @@ pub enum WatchUpdate {
     Changed(Changed),
     /// The changed files appear to be complete.
     Settled,
-    /// A file written by glimt was changed, or restored to what glimt wrote.
+    /// A file written by glimt was changed, or was restored to what glimt wrote.
     Output(OutputChange),
 }
 
@@ -97,7 +97,7 @@ pub struct Watcher {
 enum Message {
     /// A hint about a watched file.
     Hint(Hint),
-    /// Files to watch: the files read after the given time, and the files read earlier.
+    /// Files to watch: those read after the specified time, and those read earlier.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
     /// The worker has written a file.
     Outputs,
@@ -149,9 +149,9 @@ impl Watcher {
         Ok(Self { orders })
     }
 
-    /// Sets the files to watch: `read`, which were read after `since`, and `before`, which were read earlier.
-    /// A file counts as changed if its content differs from the specified content, unless a change has been
-    /// reported since the file was read.
+    /// Sets the files to watch: those in `read`, which were read after `since`, and those in `before`, which
+    /// were read earlier. A file counts as changed if its content differs from the specified content, unless
+    /// a change has been reported since the file was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
@@ -173,10 +173,11 @@ struct WatchThread<F> {
     /// Whether the working directory exists.
     has_working_folder: bool,
     contents: Arc<Contents>,
-    /// Content of each file when it was last read or a change was last reported, and the time of this event.
+    /// Each file's content when the file was last read or a change was last reported, and the time of that
+    /// event.
     files: HashMap<PathBuf, (Content, Instant)>,
     change_tracker: ChangeTracker,
-    /// Changes found but not reported by the last check.
+    /// Changes that the last check found but did not report.
     pending: Vec<FileRead>,
     /// Output changes that may be temporary.
     suspects: UnconfirmedChanges,
@@ -255,7 +256,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         }
     }
 
-    /// Whether the result of a check should not be reported yet or contains no changes.
+    /// Whether a check found no changes, or found changes that should not be reported yet.
     fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
@@ -266,8 +267,8 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
             let moves = !before.is_empty() && before != found;
             self.change_tracker.is_early(is_missing(found), moves, now)
         } else {
-            // A notification was missed or is unavailable. Wait for the next check, because the file may be
-            // incomplete.
+            // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
+            // check.
             self.folders.renew();
             self.change_tracker.hint(Hint::Touched, now);
             true

@@ -16,9 +16,9 @@ pub enum ExternalChange {
     Removed,
     /// The file has different content.
     Replaced,
-    /// The file is now the image of another scene, which this scene's image does not replace.
+    /// The file is now another scene's image, which glimt must not replace.
     ReplacedByOtherScene,
-    /// The file is now another file that the image does not replace.
+    /// The file now has other content that glimt must not replace.
     ReplacedByForeign,
 }
 
@@ -32,7 +32,7 @@ impl ExternalChange {
         }
     }
 
-    /// Whether glimt does not replace the file.
+    /// Whether glimt keeps the file instead of replacing it.
     pub fn is_kept(self) -> bool {
         match self {
             Self::Removed | Self::Replaced => false,
@@ -46,11 +46,11 @@ impl ExternalChange {
 pub struct OutputChange {
     /// Path of the file.
     pub path: PathBuf,
-    /// The change. `None` if the file has the content that glimt wrote.
+    /// The change. `None` if the file again has the content that glimt wrote.
     pub lost: Option<ExternalChange>,
 }
 
-/// Written files by path. Shared by the worker and the watcher.
+/// Written files by path, shared by the worker and the watcher.
 #[derive(Debug, Default)]
 pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
 
@@ -68,7 +68,7 @@ struct Output {
 
 impl Outputs {
     /// Records that a file is about to be written. Its content is ignored until [`Self::end`]. `protection`
-    /// decides whether the image would replace the content that another program writes there.
+    /// decides whether glimt would replace what another program writes to the file.
     pub(crate) fn begin(&self, path: &Path, protection: Protection) {
         let mut known = self.lock();
         let output = known.entry(path.to_owned()).or_insert(Output {
@@ -117,7 +117,7 @@ impl Outputs {
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
 
-    /// Returns the last reported and current state of each file, except files that are being written.
+    /// Returns each file's last reported state and current state, except for files that are being written.
     fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
         let before: Vec<(PathBuf, Output)> = {
             let known = self.lock();
@@ -156,7 +156,7 @@ impl Outputs {
     }
 }
 
-/// Changes that may be temporary, since programs may remove a file before replacing it.
+/// Changes that may be temporary, because programs may remove a file before replacing it.
 #[derive(Debug, Default)]
 pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
 
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn replacement_that_the_image_keeps_is_reported() {
+    fn replacement_by_protected_file_is_reported() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
         let contents = Contents::default();

@@ -18,7 +18,7 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// Creates `a.toml` with the content `0` and watches it.
+    /// Creates `a.toml` containing `0` and watches the file.
     fn new(poll: bool) -> Self {
         Self::with(poll, WatchDelays::default())
     }
@@ -48,7 +48,7 @@ impl Scratch {
         };
         let since = Instant::now();
         self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);
-        // Give the watcher's thread time to start watching the folders.
+        // Give the watcher thread time to start watching the folders.
         std::thread::sleep(Duration::from_millis(150));
     }
 
@@ -98,7 +98,7 @@ fn replacement_by_special_file_is_reported() {
 /// Saves `content` as `a.toml` in a folder.
 type Save = fn(folder: &Path, content: &str);
 
-/// Methods used by editors to save files.
+/// Ways in which editors save files.
 const SAVE_METHODS: [(&str, Save); 6] = [
     ("truncate and write", |folder, content| {
         fs::write(folder.join("a.toml"), content).expect("written");
@@ -129,7 +129,7 @@ const SAVE_METHODS: [(&str, Save); 6] = [
     }),
 ];
 
-/// Runs tests concurrently, because they mostly wait. A failing test's name is reported as the thread name.
+/// Runs tests concurrently, because they mostly wait. The thread name identifies a failing test.
 fn run_concurrently<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str, T)>) {
     std::thread::scope(|scope| {
         for (name, one) in all {
@@ -156,7 +156,7 @@ macro_rules! named {
 }
 
 #[test]
-fn changes_of_watched_files_are_reported() {
+fn changes_to_watched_files_are_reported() {
     run_concurrently(named![
         replacement_by_special_file_is_reported,
         polling_detects_saves_of_equal_length,
@@ -165,16 +165,16 @@ fn changes_of_watched_files_are_reported() {
         same_content_and_other_files_are_ignored,
         missing_file_is_watched,
         recreated_folder_is_watched,
-        swapped_folder_is_watched,
+        replaced_folder_is_watched,
         change_before_watching_is_detected,
-        restored_file_is_reported_if_read_in_between,
+        restored_file_is_reported_if_change_was_read,
         continuous_saves_are_rate_limited,
         closed_file_is_complete,
         renamed_file_is_complete,
         backup_save_is_complete_after_last_step,
         open_file_is_checked_when_closed,
         open_file_settles_only_when_closed,
-        two_part_write_settles_after_the_second,
+        two_part_write_settles_after_second_part,
         endless_write_settles_eventually,
     ]);
 }
@@ -251,7 +251,7 @@ fn recreated_folder_is_watched() {
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-fn swapped_folder_is_watched() {
+fn replaced_folder_is_watched() {
     let scratch = impatient();
     let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
     fs::create_dir(&folder).expect("a folder");
@@ -276,12 +276,12 @@ fn change_before_watching_is_detected() {
     scratch.expect_one();
 }
 
-fn restored_file_is_reported_if_read_in_between() {
+fn restored_file_is_reported_if_change_was_read() {
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
     fs::write(&path, "said").expect("written");
     scratch.expect_one();
-    // The file temporarily had different content, which a request read but the watcher did not.
+    // The file temporarily had different content, which a request read but the watcher did not see.
     let content = Content::Hash(*blake3::hash(b"between").as_bytes());
     let between = vec![FileRead { path: path.clone(), content }];
     scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
@@ -289,7 +289,7 @@ fn restored_file_is_reported_if_read_in_between() {
     // Contents read before a save are ignored.
     scratch.watcher.set_files(Vec::new(), between, Instant::now());
     scratch.expect_none();
-    // A change reported after the start of a request is newer than the content that the request read.
+    // A change reported after the start of a request is newer than the content read by the request.
     let begun = Instant::now();
     fs::write(&path, "said later").expect("written");
     scratch.expect_one();
@@ -373,7 +373,7 @@ fn open_file_settles_only_when_closed() {
     assert!(matches!(scratch.next(), WatchUpdate::Settled));
 }
 
-fn two_part_write_settles_after_the_second() {
+fn two_part_write_settles_after_second_part() {
     let scratch = Scratch::with(
         false,
         WatchDelays { settle: 5 * WatchDelays::default().settle, ..WatchDelays::default() },

@@ -1,6 +1,6 @@
-//! Handles a working directory that is removed and recreated, for example by a checkout or a restored backup.
-//! The process is still in the removed directory at that point, so it must change to the new directory of the
-//! same name.
+//! Handles the removal and re-creation of the working directory, for example by a checkout or when a backup
+//! is restored. The process is then still in the removed directory, so it must change to the new directory of
+//! the same name.
 
 use std::env;
 use std::io::ErrorKind;
@@ -27,7 +27,7 @@ fn is_removed() -> bool {
     env::current_dir().is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
-/// Returns the working directory or the file's own folder if it is needed for the file but missing.
+/// Returns a missing folder that the file needs: the working directory or the file's own folder.
 pub fn missing_folder(file: &Path) -> Option<PathBuf> {
     if is_removed() && file.is_relative() {
         return HOME.get().cloned();

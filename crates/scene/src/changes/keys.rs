@@ -1,4 +1,4 @@
-//! Key-by-key comparison of two documents, with keys named as in `--set`.
+//! Compares two documents key by key. Keys have the same names as in `--set`.
 
 use std::collections::HashMap;
 
@@ -6,8 +6,8 @@ use crate::key_path::{quote_key_part, shortened_key};
 use crate::sanitize::shortened;
 use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
-/// Maximum size in bytes of a document to parse. At this size, parsing delays the new render by a few
-/// milliseconds.
+/// Maximum size of documents to parse, in bytes. Parsing a document of this size delays the new render by a
+/// few milliseconds.
 const MOST_BYTES: usize = 256 << 10;
 /// Maximum number of changes listed individually. The others are only counted.
 const MAX_LISTED: usize = 3;
@@ -33,7 +33,7 @@ pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
 
 /// Key differences found so far.
 struct KeyDifferences<'t> {
-    /// The source text before and after the edit.
+    /// The source texts before and after the edit.
     texts: [&'t str; 2],
     listed: Vec<String>,
     /// Number of differences, including unlisted differences.
@@ -106,7 +106,7 @@ impl KeyDifferences<'_> {
         }
     }
 
-    /// Adds a key that exists in only one document. Adds `[[name]]` tables one by one.
+    /// Adds a key that exists in only one document. Adds each `[[name]]` table separately.
     fn add_unmatched(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.item() {
             TomlValue::Array(array) if array.is_of_tables() => {
@@ -140,7 +140,7 @@ impl KeyDifferences<'_> {
         self.add(|| format!("{sign} {}{shown}", shortened_key(name, MAX_KEY_COLUMNS)));
     }
 
-    /// The source text of a value, on one line.
+    /// Returns a value's source text, on one line.
     fn value_text(&self, text: usize, value: &Value<'_>) -> String {
         if let TomlValue::Table(_) = value.item() {
             return "{…}".to_owned();
@@ -159,7 +159,8 @@ fn join_key(name: &str, key: &str) -> String {
     if name.is_empty() { quote_key_part(key) } else { format!("{name}.{}", quote_key_part(key)) }
 }
 
-/// Key parts that `--set` accepts for the elements of a list: unique names, or else 1-based positions.
+/// Returns the key parts by which `--set` refers to a list's elements: unique names or, failing that, 1-based
+/// positions.
 fn element_keys(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
     for name in all.iter().filter_map(table_name) {
@@ -249,7 +250,7 @@ mod tests {
         changed_to_two("[[quad]]\nname = \"\"\nu = 1", "quad.\"\".u 1 → 2");
     }
 
-    /// `--set` interprets a number as a position in the list and rejects ambiguous names.
+    /// `--set` interprets numbers as positions in the list, and rejects ambiguous names.
     #[test]
     fn ambiguous_names_become_positions() {
         changed_to_two("[[quad]]\nname = \"7\"\nu = 1", "quad.1.u 1 → 2");

@@ -1,4 +1,4 @@
-//! The `[camera]` table: camera, viewpoint and changes to them.
+//! The `[camera]` table: cameras, viewpoints and changes to them.
 
 use std::path::PathBuf;
 
@@ -24,21 +24,21 @@ pub enum Camera {
         /// Focus distance along the view axis, > 0.
         focus: f64,
     },
-    /// A gKit orbiter file, resolved against the scene's folder.
+    /// A camera defined by a gKit orbiter file.
     Orbiter {
         /// The orbiter file.
         file: Located<PathBuf>,
-        /// Vertical field of view in degrees, in (0, 180). `None` to use the field of view in the file.
+        /// Vertical field of view in degrees, in (0, 180). `None` uses the field of view in the file.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Focus distance. `None` to focus on the orbiter's center.
+        /// Focus distance. `None` focuses on the orbiter's center.
         focus: Option<f64>,
     },
 }
 
-/// A camera defined by vectors, created from either kind of [`Camera`]. The fields have the invariants of
-/// [`Camera::LookAt`].
+/// A camera defined by vectors, created from either kind of [`Camera`]. The fields have the same invariants
+/// as those of [`Camera::LookAt`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Position and orientation.
@@ -74,7 +74,7 @@ pub struct CameraChange {
 }
 
 impl Pose {
-    /// Distance from the camera to `look_at`.
+    /// Returns the distance from the camera to `look_at`.
     pub fn distance(&self) -> f64 {
         self.position.distance(self.look_at)
     }
@@ -114,15 +114,15 @@ impl From<Viewpoint> for Camera {
     }
 }
 
-/// Whether two distances are equal except for the rounding of camera moves. A move towards `look_at` changes
-/// the distance by 50 times this tolerance.
+/// Whether two distances are equal up to the rounding errors of camera moves. Moving one step towards
+/// `look_at` changes the distance by 50 times the tolerance.
 pub fn is_same_distance(a: f64, b: f64) -> bool {
     const ROUNDING: f64 = 1e-3;
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 impl Camera {
-    /// Whether the camera has this viewpoint, except for rounding of the focus distance.
+    /// Whether the camera has this viewpoint, up to rounding of the focus distance.
     pub fn is_nearly(&self, view: &Viewpoint) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {

@@ -23,7 +23,7 @@ pub enum Light {
 pub struct PointLight {
     /// Position of the light.
     pub position: DVec3,
-    /// Radiant intensity in W·sr⁻¹. With [`Falloff::None`], irradiance at normal incidence.
+    /// Radiant intensity in W·sr⁻¹. For [`Falloff::None`], the irradiance at normal incidence.
     pub intensity: Vec3,
     /// Falloff with distance.
     pub falloff: Falloff,
@@ -32,7 +32,7 @@ pub struct PointLight {
 /// A point light that shines into a cone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotLight {
-    /// Position and on-axis intensity.
+    /// The light's position and on-axis intensity.
     pub point: PointLight,
     /// A point on the axis, different from the position.
     pub look_at: DVec3,
@@ -45,7 +45,7 @@ pub struct SpotLight {
 /// A distant light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalLight {
-    /// Direction in which the light travels, with any nonzero length.
+    /// Direction in which the light travels. Any nonzero length.
     pub direction: DVec3,
     /// Irradiance at normal incidence.
     pub irradiance: Vec3,
@@ -58,7 +58,7 @@ pub struct DirectionalLight {
 pub struct Environment {
     /// Radiance, or a scale factor for the map.
     pub color: Vec3,
-    /// An equirectangular map, resolved against the scene's folder.
+    /// Path to an equirectangular map, resolved against the scene's folder.
     pub file: Option<Located<PathBuf>>,
     /// Rotation of the map about +y in degrees, counterclockwise when seen from above.
     pub rotate: f64,

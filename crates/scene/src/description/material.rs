@@ -15,15 +15,15 @@ use crate::math::{DVec3, Vec2, Vec3};
 pub struct Texture {
     /// Name of the texture in the scene file.
     pub name: String,
-    /// The image or glTF file, resolved against the scene's folder.
+    /// Path to the image or glTF file, resolved against the scene's folder.
     pub file: Located<PathBuf>,
-    /// Index of the image in a glTF file. `None` if the file is an image.
+    /// Index of the image within a glTF file. `None` if the file is itself an image.
     pub image: Option<u32>,
     /// Interpolation between texels.
     pub filter: TextureFilter,
-    /// Addressing mode outside of [0, 1].
+    /// Addressing mode for coordinates outside [0, 1].
     pub wrap: Wrap,
-    /// Tiling factors for u and v, not 0.
+    /// Tiling factors for u and v. Neither is 0.
     pub repeat: Vec2,
     /// Rotation of the repeated coordinates, in degrees from u to v.
     pub rotate: f64,
@@ -33,7 +33,7 @@ pub struct Texture {
     pub uv: UvSet,
     /// Encoding of the pixels.
     pub encoding: Encoding,
-    /// Scale factor for linear colors and numbers. Not applied to normals and heights.
+    /// Scale factor for linear colors and numbers. Normals and heights ignore it.
     pub factor: Vec3,
 }
 
@@ -67,7 +67,7 @@ pub enum NumberSource {
     Texture {
         /// Index into [`Scene::textures`](super::Scene::textures).
         texture: usize,
-        /// The channel. `None` for the key's default channel.
+        /// The channel. `None` selects the key's default channel.
         channel: Option<Channel>,
     },
 }
@@ -81,8 +81,8 @@ impl NumberSource {
         }
     }
 
-    /// Index of the texture, and how to compute the number from a pixel: from the specified channel, or as in
-    /// `usual` if no channel is specified. `None` if the number is constant.
+    /// Returns the texture's index, and how to compute the number from a pixel: from the specified channel if
+    /// there is one, and otherwise as in `usual`. `None` if the number is constant.
     pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
@@ -112,7 +112,8 @@ impl OpacitySource {
         }
     }
 
-    /// Index of the texture, and how to compute the opacity from a pixel. `None` if the opacity is constant.
+    /// Returns the texture's index, and how to compute the opacity from a pixel. `None` if the opacity is
+    /// constant.
     pub fn texture(&self) -> Option<(usize, PixelValue)> {
         self.value.texture(PixelValue::Opacity)
     }
@@ -139,7 +140,7 @@ pub struct EmissionSource {
     pub scale: Vec3,
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: Option<usize>,
-    /// Sides that emit light.
+    /// The sides that emit light.
     pub sides: EmissionSides,
 }
 
@@ -147,7 +148,7 @@ impl EmissionSource {
     /// No emission.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// Constant radiance from the front.
+    /// Creates a source that emits constant radiance from the front.
     pub const fn constant(radiance: Vec3) -> Self {
         Self { scale: radiance, texture: None, sides: EmissionSides::Front }
     }
@@ -183,7 +184,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material has a δ lobe, as a mirror, smooth glass and a smooth coat have.
+    /// Whether the material has a δ lobe, like a mirror, smooth glass or a smooth coat.
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
@@ -194,7 +195,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material is solid glass with an index of refraction of 1, which does not refract in air.
+    /// Whether the material is solid glass with index of refraction 1, which does not refract in air.
     pub fn is_index_matched_glass(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
@@ -207,7 +208,8 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material is anisotropic and therefore depends on the direction of texture coordinates.
+    /// Whether the material is anisotropic, and therefore depends on the direction in which texture
+    /// coordinates increase.
     pub fn is_anisotropic(&self) -> bool {
         match self {
             Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
@@ -220,7 +222,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material has a color that vertex colors can multiply.
+    /// Whether the material has a color that can be multiplied by vertex colors.
     pub fn has_color(&self) -> bool {
         match self {
             Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
@@ -238,8 +240,8 @@ impl MaterialKind {
         self.glass_medium_key().is_some()
     }
 
-    /// Bits of the index of refraction and the transmittance of solid glass, independent of roughness. `None`
-    /// for other materials.
+    /// Returns a key for the interior of solid glass: the bits of its index of refraction and transmittance,
+    /// but not its roughness. `None` for other materials.
     pub fn glass_medium_key(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
@@ -269,25 +271,25 @@ pub struct NormalMap {
 pub struct Bump {
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: usize,
-    /// The channel that contains the heights. `None` for luminance.
+    /// The channel that contains the heights. `None` selects the luminance.
     pub channel: Option<Channel>,
-    /// Displacement of white. Negative values invert the relief.
+    /// Displacement where the map is white. Negative values invert the relief.
     pub scale: f32,
 }
 
 impl Bump {
-    /// How to compute the height from a pixel.
+    /// Returns how to compute the height from a pixel.
     pub fn number(&self) -> PixelValue {
         self.channel.map_or(PixelValue::Luminance, PixelValue::Channel)
     }
 }
 
-/// Interpretation of a texture's pixels.
+/// How a texture's pixels are interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
     /// Pixels are colors.
     Color,
-    /// Pixels are colors of a surface whose opacity is the image's alpha channel.
+    /// Pixels are surface colors, and the image's alpha channel is the surface's opacity.
     CutOut,
     /// Pixels are tangent-space normals.
     Normal,
@@ -304,9 +306,9 @@ pub enum TextureRole {
     Specular,
     /// Ambient reflectance ka.
     Ambient,
-    /// Reflectance or index of refraction of microfacets.
+    /// Reflectance or index of refraction of the microfacets.
     Facets,
-    /// Roughness and other parameters of microfacets.
+    /// Roughness or another microfacet parameter.
     Roughness(PixelValue),
     /// Emitted radiance.
     Emission,
@@ -316,12 +318,12 @@ pub enum TextureRole {
     Bump(PixelValue),
     /// Opacity of the surface.
     Opacity(PixelValue),
-    /// Weight or roughness of the clear coat on an emitter.
+    /// Weight or roughness of an emitter's clear coat.
     EmissionCoat(PixelValue),
 }
 
 impl TextureRole {
-    /// How the texture's pixels are interpreted in this role.
+    /// Returns how the texture's pixels are interpreted in this role.
     pub fn texture_use(self) -> TextureUse {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
@@ -347,7 +349,7 @@ pub enum MaterialKind {
         specular: ColorSource,
         /// Phong exponent α ≥ 0.
         shininess: f32,
-        /// Ambient reflectance ka. `None` to use the diffuse color.
+        /// Ambient reflectance ka. `None` uses the diffuse color.
         ambient: Option<ColorSource>,
     },
     /// A perfect mirror.
@@ -357,10 +359,10 @@ pub enum MaterialKind {
     },
     /// Smooth or rough dielectric.
     Glass {
-        /// Index of refraction inside, in [0.1, 10]. Below 1, the inside is optically thinner than the
-        /// outside, like a bubble in water.
+        /// Index of refraction of the interior, in [0.1, 10]. If it is below 1, the interior is optically
+        /// thinner than the exterior, like a bubble in water.
         ior: f32,
-        /// Transmittance per unit length inside, in [0, 1].
+        /// Transmittance of the interior per unit length, in [0, 1].
         tint: DVec3,
         /// Square root of the GGX α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
@@ -394,7 +396,7 @@ pub enum MaterialKind {
     },
     /// The glTF material model. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
     Principled {
-        /// Diffuse reflectance of the dielectric part, and reflectance of the metal at normal incidence.
+        /// Diffuse reflectance of the dielectric part, and the metal's reflectance at normal incidence.
         color: ColorSource,
         /// Weight of the metal.
         metallic: NumberSource,
@@ -416,7 +418,7 @@ pub enum MaterialKind {
 }
 
 impl ColorSource {
-    /// Index of the texture. `None` if the color is constant.
+    /// Returns the texture's index. `None` if the color is constant.
     fn texture(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
@@ -426,7 +428,7 @@ impl ColorSource {
 }
 
 impl MaterialKind {
-    /// The color parameters that may be textures, and their roles.
+    /// Returns the color parameters that may be textures, each with its role.
     fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
@@ -455,7 +457,7 @@ impl MaterialKind {
         }
     }
 
-    /// The number parameters that may be textures.
+    /// Returns the number parameters that may be textures.
     fn numbers(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
@@ -480,7 +482,8 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// Weight and roughness of the clear coat on an emitter. `None` without emission or clear coat.
+    /// Returns the weight and roughness of an emitter's clear coat. `None` if there is no emission or no
+    /// clear coat.
     pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
             MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
@@ -496,8 +499,8 @@ impl Material {
         }
     }
 
-    /// The textures as indices into [`Scene::textures`](super::Scene::textures), and their roles. A texture
-    /// may occur several times.
+    /// Returns the material's textures, as indices into [`Scene::textures`](super::Scene::textures) with
+    /// their roles. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));

@@ -1,5 +1,5 @@
-//! Properties and supported settings of the integrators. Other code queries these properties instead of
-//! matching on the integrator.
+//! Properties of the integrators, and the settings they support. Other code queries these properties instead
+//! of matching on the integrator.
 
 use crate::choice;
 
@@ -13,14 +13,13 @@ choice! {
     }
 }
 
-/// Properties and supported settings of an integrator.
+/// Properties of an integrator, and the settings it supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
-    /// Whether camera paths split at glass. Otherwise, they choose randomly between reflection and
-    /// refraction.
+    /// Whether camera paths split at glass, rather than randomly choosing between reflection and refraction.
     pub splits: bool,
-    /// Whether paths scatter at rough surfaces and thus find all light. Otherwise, paths end at rough
-    /// surfaces, unless photons are gathered.
+    /// Whether paths continue at rough surfaces and thus account for all light. If not, they end at rough
+    /// surfaces, unless they gather photons.
     pub scatters: bool,
     /// Whether `[photons]` is supported.
     pub gathers: bool,
@@ -33,7 +32,7 @@ pub struct Method {
 }
 
 impl Integrator {
-    /// Returns the properties of the integrator.
+    /// Returns the integrator's properties.
     pub const fn method(self) -> Method {
         match self {
             Self::Whitted => Method {

@@ -1,5 +1,5 @@
-//! The validated scene, with all defaults filled in and independent of the file syntax. Objects refer to each
-//! other by index.
+//! The validated scene description. It has all defaults filled in and is independent of the file syntax.
+//! Objects refer to each other by index.
 //!
 //! Lengths are in scene units, angles in degrees, and colors in linear Rec. 709. All numbers are finite.
 
@@ -31,7 +31,7 @@ pub use shape::{LoweredShape, Mesh, MeshTransform, Object, Shape, Sheet, max_pro
 pub struct Scene {
     /// The `[render]` table.
     pub render: Render,
-    /// The key `output` of `[render]`, resolved against the scene's folder.
+    /// The value of `output` in `[render]`, resolved against the scene's folder.
     pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,
@@ -41,7 +41,7 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// `[materials.*]`, in file order.
     pub materials: Vec<Material>,
-    /// The mesh files and parts referenced by `[[mesh]]`, without duplicates.
+    /// The mesh files and glTF parts that `[[mesh]]` tables reference, without duplicates.
     pub mesh_files: Vec<MeshFile>,
     /// All shapes, in file order.
     pub objects: Vec<Object>,
@@ -67,7 +67,7 @@ pub struct MeshFile {
     pub value: PathBuf,
     /// Byte range of the path in the scene file.
     pub span: Range<usize>,
-    /// Index of the glTF part. `None` for the whole file.
+    /// Index of the glTF part. `None` means the whole file.
     pub part: Option<u32>,
 }
 

@@ -12,7 +12,7 @@ use crate::math::Vec3;
 use crate::math::limits::LARGEST;
 pub use crate::sampling::filter::PixelFilter;
 
-/// Maximum value of `max_depth`, the only limit on paths between perfect mirrors.
+/// Maximum value of `max_depth`, which is the only limit for paths between perfect mirrors.
 pub const MAX_BOUNCES: u32 = 10_000;
 
 #[doc(hidden)]
@@ -30,7 +30,7 @@ macro_rules! __render_keys {
             samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
             /// Noise threshold below which a tile is finished; 0 always takes all `samples`.
             error: f32 = 0.0, at_least(0.0), "fraction of the brightness", option;
-            /// Shadow rays per sample to each area light.
+            /// Shadow rays traced to each area light per sample.
             shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
             /// Maximum number of bounces along a path: 0 shows only emitted light, 1 adds direct light.
             max_depth: u32 = 8, whole(0, MAX_BOUNCES), "bounces", option;
@@ -107,12 +107,12 @@ macro_rules! __render_keys {
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
-/// Range of a `[render]` key.
+/// Range of values for a `[render]` key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyRange {
     /// Whole numbers.
     Whole(RangeInclusive<u32>),
-    /// Numbers of at most [`LARGEST`].
+    /// Numbers in this range, at most [`LARGEST`].
     Number(RangeInclusive<f64>),
     /// One of these names.
     Names(Vec<&'static str>),
@@ -125,7 +125,7 @@ pub enum KeyRange {
 pub struct RenderKey {
     /// Name of the key.
     pub name: &'static str,
-    /// Description, as one sentence without a period at the end.
+    /// Description: one sentence without a final period.
     pub doc: &'static str,
     /// Unit of the value, or an empty string.
     pub unit: &'static str,
@@ -192,7 +192,7 @@ macro_rules! settings {
             /// The default settings.
             pub const DEFAULT: Self = Self { $($name: $default),* };
 
-            /// The keys of `[render]`, except `output`.
+            /// Returns the keys in `[render]`, except `output`.
             pub fn keys() -> Vec<RenderKey> {
                 vec![$(RenderKey {
                     name: stringify!($name),
@@ -232,7 +232,8 @@ choice! {
     pub enum Accel {
         /// Bounding volume hierarchy.
         Bvh = "bvh",
-        /// BVH with spatial splits (SBVH): slower to build, faster to trace with long, diagonal triangles.
+        /// BVH with spatial splits (SBVH): slower to build, but faster to trace if triangles are long and
+        /// diagonal.
         BvhHigh = "bvh-high",
         /// kd-tree over the triangles of meshes.
         KdTree = "kdtree",

@@ -52,7 +52,7 @@ pub enum Shape {
     Plane {
         /// A point on the plane.
         point: DVec3,
-        /// Direction that the front side faces, with any nonzero length.
+        /// Direction that the front side faces. Any nonzero length.
         normal: DVec3,
     },
     /// An oriented box.
@@ -77,7 +77,7 @@ pub enum Shape {
     Disk {
         /// Center.
         center: DVec3,
-        /// Direction that the front side faces, with any nonzero length.
+        /// Direction that the front side faces. Any nonzero length.
         normal: DVec3,
         /// Radius, > 0.
         radius: f64,
@@ -90,7 +90,7 @@ pub enum Shape {
         b: DVec3,
         /// Radius, > 0.
         radius: f64,
-        /// Whether the ends are closed.
+        /// Whether disks close the ends.
         caps: bool,
     },
     /// A cone.
@@ -101,16 +101,16 @@ pub enum Shape {
         tip: DVec3,
         /// Radius of the base, > 0.
         radius: f64,
-        /// Whether the base is closed.
+        /// Whether a disk closes the base.
         cap: bool,
     },
     /// A torus.
     Torus {
         /// Center.
         center: DVec3,
-        /// Axis of symmetry, with any nonzero length.
+        /// Axis of symmetry. Any nonzero length.
         axis: DVec3,
-        /// Distance from the center to the middle of the tube, > `tube`.
+        /// Distance from the center of the torus to the middle of the tube, > `tube`.
         radius: f64,
         /// Radius of the tube, > 0.
         tube: f64,
@@ -122,15 +122,15 @@ pub enum Shape {
 /// An open surface, which does not enclose a volume on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sheet {
-    /// A parallelogram, given by its corners, which are counterclockwise when seen from the front.
+    /// The corners of a parallelogram, counterclockwise when seen from the front.
     Quad([DVec3; 4]),
-    /// A triangle, given by its corners in order.
+    /// The corners of a triangle, counterclockwise when seen from the front.
     Triangle([DVec3; 3]),
     /// A disk.
     Disk {
         /// Center.
         center: DVec3,
-        /// Normal of the front side, with any length.
+        /// Normal of the front side. Any length.
         normal: DVec3,
         /// Radius.
         radius: f64,
@@ -203,7 +203,7 @@ impl MeshTransform {
     }
 }
 
-/// A shape in the form used for tracing.
+/// A shape in the representation used for tracing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoweredShape<'a> {
     /// An analytic shape.
@@ -213,7 +213,7 @@ pub enum LoweredShape<'a> {
 }
 
 impl Shape {
-    /// Lowers the shape to coordinates relative to `origin`.
+    /// Lowers the shape, with coordinates relative to `origin`.
     pub fn lowered(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
         LoweredShape::Shape(match *self {
@@ -240,7 +240,7 @@ impl Shape {
         })
     }
 
-    /// Name of the shape's table, such as `sphere`.
+    /// Returns the name of the shape's table, such as `sphere`.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sphere { .. } => "sphere",
@@ -256,12 +256,12 @@ impl Shape {
         }
     }
 
-    /// The mesh instance. `None` for other shapes.
+    /// Returns the mesh instance. `None` for other shapes.
     pub fn mesh(&self) -> Option<&Mesh> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The shape as an open surface. `None` for closed shapes, planes and meshes.
+    /// Returns the shape as an open surface. `None` for closed shapes, planes and meshes.
     pub fn sheet(&self) -> Option<Sheet> {
         match *self {
             Self::Quad { corner, u, v } => {
@@ -281,7 +281,7 @@ impl Shape {
         }
     }
 
-    /// A point on or inside the shape. `None` for a mesh.
+    /// Returns a point on or inside the shape. `None` for a mesh.
     pub fn point(&self) -> Option<DVec3> {
         match *self {
             Self::Sphere { center, .. }
@@ -296,11 +296,11 @@ impl Shape {
         }
     }
 
-    /// Upper bound on the projection of the shape's points onto a unit direction. Infinite for planes that
-    /// are not perpendicular to the direction. `None` for a mesh.
+    /// Returns an upper bound on the projection of the shape's points onto a unit direction. Infinite for
+    /// planes that are not perpendicular to the direction. `None` for a mesh.
     pub fn max_projection_onto(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
-        // Extent of a circle around an axis, projected onto the direction.
+        // The projected extent of a circle around an axis.
         let round = |axis: DVec3, radius: f64| {
             let cosine = axis.try_normalize().map_or(0.0, along);
             radius * (1.0 - cosine * cosine).max(0.0).sqrt()
@@ -333,7 +333,7 @@ impl Shape {
     }
 }
 
-/// The largest projection of the points onto a unit direction.
+/// Returns the largest projection of any of the points onto a unit direction.
 pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
     points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }

@@ -9,7 +9,7 @@ use crate::math::DVec3;
 /// Default vertical field of view in degrees.
 pub(crate) const FOV_DEGREES: f64 = 40.0;
 
-/// `up` and the view direction are considered parallel if the sine of the angle between them is below this.
+/// `up` and the view direction count as parallel if the sine of the angle between them is below this.
 const MIN_SINE: f64 = 1e-6;
 
 pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
@@ -29,8 +29,7 @@ pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
     camera
 }
 
-/// Whether the orbiter file defines the camera. `--set` overrides it if both `position` and `look_at` are
-/// set.
+/// Whether the orbiter file defines the camera. It does not if `--set` sets both `position` and `look_at`.
 fn has_orbiter(table: &TableReader<'_>) -> bool {
     let is_set = |name| table.optional(name).span().is_some_and(|span| table.context.is_in_set_value(&span));
     let is_replaced = is_set("position") && is_set("look_at") && !is_set("orbiter");
@@ -102,7 +101,7 @@ fn read_orbiter(table: &TableReader<'_>) -> Option<Camera> {
     let focus = table.optional("focus").number(table.limits("focus"));
     for name in ["position", "look_at", "up"] {
         let message = format!("`{name}` conflicts with `orbiter`");
-        let help = "the orbiter file already sets the camera position: remove one of the two";
+        let help = "the orbiter file already sets the camera position; remove one of the two";
         table.reject_key(name, &message, Some(help));
     }
     Some(Camera::Orbiter { file: file?, fov, aperture, focus })

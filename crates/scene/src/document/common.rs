@@ -37,7 +37,7 @@ pub(super) fn read_opacity(table: &TableReader<'_>, textures: &DefinedNames) -> 
     OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
 }
 
-/// Warns about a key that has no effect without another key.
+/// Warns if a key has no effect because another key is missing.
 pub(super) fn warn_without(table: &TableReader<'_>, name: &'static str, other: &'static str) {
     let key = table.optional(name);
     if let Some(span) = key.key_span().filter(|_| !table.optional(other).is_present()) {
@@ -45,7 +45,7 @@ pub(super) fn warn_without(table: &TableReader<'_>, name: &'static str, other: &
     }
 }
 
-/// Reports an error for opacity keys on solid glass.
+/// Reports opacity keys on solid glass as errors.
 pub(super) fn reject_opacity_keys(table: &TableReader<'_>) {
     for name in ["opacity", "opacity_cutoff"] {
         let message = format!("solid glass cannot have `{name}`");

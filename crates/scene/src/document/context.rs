@@ -1,4 +1,4 @@
-//! Context shared by all readers of a file: source text, path and issues found.
+//! Context shared by all readers of a file: its source text, its path, and the issues found so far.
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
@@ -14,12 +14,12 @@ pub(super) struct FileContext<'a> {
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
-    /// Number of errors and of warnings.
+    /// Number of errors and number of warnings.
     counts: Cell<[usize; 2]>,
     searches: Cell<SearchCounts>,
 }
 
-/// Number of searches for similar names, and number of comparisons.
+/// How many searches for similar names were made, and how many names were compared.
 #[derive(Clone, Copy, Default)]
 struct SearchCounts {
     count: usize,
@@ -36,14 +36,14 @@ pub(super) struct Issue {
     cause: IssueCause,
 }
 
-/// Cause of an issue. Determines whether the issue is reported if there are syntax errors.
+/// Cause of an issue. If there are syntax errors, it determines whether the issue is reported.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum IssueCause {
     /// A TOML syntax error.
     Syntax,
-    /// The value at the span.
+    /// The value at the issue's span.
     Value,
-    /// A missing value, or a value elsewhere in the file. A line with a syntax error may be the cause.
+    /// A missing value, or a value elsewhere in the file. A syntax error on another line may be to blame.
     Absence,
 }
 
@@ -129,14 +129,14 @@ impl<'a> FileContext<'a> {
         self.source.text()
     }
 
-    /// The text at `span`, or an empty string if it is out of range.
+    /// Returns the text at `span`, or an empty string if `span` is out of range.
     pub(super) fn text(&self, span: &Range<usize>) -> &str {
         self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
-    /// Searches a list for a similar name with `look`, unless the file's search limit is reached. The cost of
-    /// a search is linear in the length of the list, and files with many wrong names usually repeat the same
-    /// mistake.
+    /// Calls `look` to search a list for a similar name, unless the file's search limit has been reached. The
+    /// limit exists because the cost of a search is linear in the length of the list, and files with many
+    /// wrong names usually repeat the same mistake.
     pub(super) fn search_similar_name<T>(
         &self,
         comparisons: usize,
@@ -176,8 +176,8 @@ impl<'a> FileContext<'a> {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// Returns all issues in file order. If there are syntax errors, omits the issues that they may have
-    /// caused: issues in `broken_lines`, and missing values.
+    /// Returns all issues in file order. If there are syntax errors, omits issues that they may have caused:
+    /// issues in `broken_lines` and missing values.
     pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
@@ -214,7 +214,7 @@ impl<'a> FileContext<'a> {
     }
 }
 
-/// End of the message that reports the number of unlisted issues.
+/// End of the message that reports how many issues are not listed.
 pub(crate) const MORE_LIKE_THESE: &str = "more like these";
 
 /// Maximum number of issues listed.
@@ -226,8 +226,8 @@ const MAX_SEARCHES: usize = 48;
 /// Maximum number of name comparisons per file, checked before each search.
 const MAX_COMPARISONS: usize = 200_000;
 
-/// Maximum number of collected errors, and of collected warnings. Large enough to contain the first issues in
-/// file order, except in absurdly broken files.
+/// Maximum number of errors to collect, and maximum number of warnings. Large enough to contain the first
+/// issues in file order, except in absurdly broken files.
 const MAX_COLLECTED: usize = 10_000;
 
 impl Issue {

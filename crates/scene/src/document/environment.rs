@@ -31,7 +31,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
 }
 
-/// Warns about a background hidden by the environment.
+/// Warns about a background that the environment hides.
 pub(super) fn warn_about_background(root: &TableReader<'_>, scene: &Scene) {
     let Some(span) = root.optional("environment").key_span() else { return };
     if scene.environment.is_some() && scene.render.background != Vec3::ZERO {

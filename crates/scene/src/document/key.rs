@@ -1,4 +1,4 @@
-//! Reads a key of a table as the expected type. Every method returns `None` if the key is absent or invalid.
+//! Reads a table's key as the expected type. Every method returns `None` if the key is absent or invalid.
 //! If the key is invalid, the method also reports an error.
 
 mod color;
@@ -18,7 +18,7 @@ use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
-/// A key of a table, present or absent.
+/// A table's key, which may be absent.
 pub(super) struct TableKey<'a> {
     pub(super) context: &'a FileContext<'a>,
     pub(super) name: &'static str,
@@ -61,7 +61,7 @@ impl<'a> TableKey<'a> {
         self.number(limits).map(|number| number as f32)
     }
 
-    /// Reads an integer. `N` must be able to represent the whole range.
+    /// Reads an integer. `N` must be able to represent all of `range`.
     pub(super) fn integer<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
         let TomlValue::Integer { digits, radix } = value.item() else {
@@ -88,7 +88,7 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// Reads a string. `expected` describes the string in errors.
+    /// Reads a string. `expected` describes the string in error messages.
     pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
         self.text_described_by(|| expected.to_owned())
     }
@@ -114,7 +114,7 @@ impl<'a> TableKey<'a> {
         }
         let issue = Issue::error(self.span()?, format!("`{}` must not be a number", self.name));
         self.context
-            .report(issue.help("use a name with a letter, as shapes can also be referred to by number"));
+            .report(issue.help("use a name with a letter, because shapes can also be referenced by number"));
         None
     }
 
@@ -158,8 +158,8 @@ impl<'a> TableKey<'a> {
         if self.is_present() { self.vector(limits) } else { Some(default) }
     }
 
-    /// Checks that a vector is long enough to compute with, and reports an error if not. The caller reports
-    /// vectors of length 0 with a more specific message.
+    /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
+    /// length 0, the caller reports a more specific error.
     pub(super) fn check_vector_length(&self, vector: DVec3) -> bool {
         let length = length(vector);
         let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
@@ -168,8 +168,8 @@ impl<'a> TableKey<'a> {
         false
     }
 
-    /// Checks that two points, given by `self` and `other`, are far enough apart to compute with, and reports
-    /// an error if not. The caller reports equal points with a more specific message.
+    /// Checks that the points at the keys `self` and `other` are far enough apart to compute with, and
+    /// reports an error if not. For equal points, the caller reports a more specific error.
     pub(super) fn check_distance(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = length(to - from);
         let span = other.span().or(self.span());
@@ -208,12 +208,12 @@ impl<'a> TableKey<'a> {
         self.numbers(limits, "a number, or three numbers [x, y, z]").map(DVec3::from_array)
     }
 
-    /// Reads a name and returns its index in `names`.
+    /// Reads a name and returns the name's index in `names`.
     pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
         self.find(names, self.text_described_by(|| format!("the name of a {}", names.kind))?)
     }
 
-    /// Looks up `text`, the name given as the key's value.
+    /// Looks up `text`, the name that is the key's value.
     fn find(&self, names: &DefinedNames, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {
@@ -224,7 +224,7 @@ impl<'a> TableKey<'a> {
         index
     }
 
-    /// Reads an inline table, `{ … }`.
+    /// Reads an inline table: `{ … }`.
     pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
         TableReader::from_value(self.context, self.value?, TableTitle::Key(self.name))
     }

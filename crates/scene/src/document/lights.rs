@@ -69,7 +69,7 @@ fn read_spot(table: &TableReader<'_>) -> Option<SpotLight> {
     Some(SpotLight { point, look_at, angle: angle?, blend: blend? })
 }
 
-/// Minimum apparent diameter in degrees. Directions in single precision cannot distinguish smaller diameters
+/// Minimum apparent diameter in degrees. Single-precision directions cannot distinguish smaller diameters
 /// from 0.
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
@@ -81,7 +81,7 @@ fn read_directional(table: &TableReader<'_>) -> Option<DirectionalLight> {
     if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
         let issue =
             Issue::error(key.span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
-        table.context.report(issue.help("0 means no extent; the sun has 0.53"));
+        table.context.report(issue.help("0 means no extent; use 0.53 for the sun"));
         return None;
     }
     Some(DirectionalLight { direction: direction?, irradiance, angle: angle? })

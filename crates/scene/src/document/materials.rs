@@ -106,10 +106,10 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
     }
 }
 
-/// Warning message for materials that create energy.
-pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than falls on it";
+/// Warning message for materials that violate energy conservation.
+pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";
 
-/// Warns about a material that reflects more light than falls on it.
+/// Warns about a material that reflects more light than it receives.
 fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSource, ks: &ColorSource) {
     let constant = |source: &ColorSource| match source {
         ColorSource::Constant(color) => *color,
@@ -163,12 +163,13 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
     }
 }
 
-/// The key at the path `TYPE.KEY`.
+/// Returns the key at the path `TYPE.KEY`.
 fn type_key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
-/// Reads the key at the path `TYPE.KEY` with its limits. Returns `default` if the key is missing or invalid.
+/// Reads the key at the path `TYPE.KEY` and checks its limits. Returns `default` if the key is missing or
+/// invalid.
 fn read_or<'a, T>(
     table: &TableReader<'a>,
     path: &'static str,
@@ -205,7 +206,7 @@ fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
     read_or(table, path, 1.5, TableKey::number32)
 }
 
-/// Reads a metal's reflectance, specified with exactly one of three groups of keys.
+/// Reads a metal's reflectance, which exactly one of three groups of keys must specify.
 fn read_fresnel(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
     let is_index = eta.is_present() || k.is_present();
@@ -244,7 +245,7 @@ fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Materi
     let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
     let roughness = read_number(table, textures, "glass.roughness", 0.0);
-    // If `thin` is invalid, the user probably wants a pane.
+    // If `thin` is present but invalid, the user probably wants a pane.
     if !thin.boolean().unwrap_or(thin.is_present()) {
         let tint = tint.color_f64(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });

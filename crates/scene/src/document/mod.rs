@@ -1,5 +1,5 @@
-//! Lowers TOML to a scene, with one file per group of tables. Readers return `None` for missing or invalid
-//! values and continue after an error in order to report all errors.
+//! Lowers TOML to a scene. Each group of tables is read by its own module. Readers return `None` for missing
+//! or invalid values and continue after errors so that all errors are reported.
 
 mod camera;
 mod common;
@@ -61,7 +61,7 @@ pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines), settings }
 }
 
-/// The spans of the values in `[render]` and `[photons]`.
+/// Returns the spans of all values in `[render]` and `[photons]`.
 fn settings(document: &toml::Document<'_>) -> Vec<SettingSpan> {
     let values = |table: &'static str| {
         let entries = document.root().get(table).and_then(|found| match found.value.item() {
@@ -83,7 +83,7 @@ fn settings(document: &toml::Document<'_>) -> Vec<SettingSpan> {
     ["render", "photons"].into_iter().flat_map(values).collect()
 }
 
-/// Reads only the camera of a scene. Returns `None` if there are errors.
+/// Reads only a scene's camera. Returns `None` if there are errors.
 pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     let context = FileContext::new(source.clone(), Path::new(""));
     let (document, errors) = toml::parse(source.text());
@@ -92,7 +92,7 @@ pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
-/// The files referenced by a scene, even if the scene has errors.
+/// Returns the files that a scene references, even if the scene has errors.
 pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     fn gather(table: toml::Entries<'_>, names: &mut Vec<String>) {
         for toml::KeyValue { key, value, .. } in table.iter() {
@@ -165,12 +165,12 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
     Some(scene)
 }
 
-/// Warning message for scenes without light.
+/// Warning message for unlit scenes.
 pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
 /// End of error messages about degenerate shapes.
 pub(super) const NO_AREA: &str = "has no area";
 
-/// Warns about a scene without shapes or light.
+/// Warns if a scene has no shapes or no light.
 fn warn_about_darkness(context: &FileContext<'_>, scene: &Scene) {
     if scene.objects.is_empty() {
         let help = "add one, such as a [[sphere]]; until then the image shows the background";

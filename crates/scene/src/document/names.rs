@@ -8,7 +8,7 @@ use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
 use super::context::{FileContext, Issue};
 
-/// The names of all textures or all materials in a file.
+/// The names of all textures, or of all materials, in a file.
 pub(super) struct DefinedNames {
     /// `texture` or `material`.
     pub(super) kind: &'static str,
@@ -31,7 +31,7 @@ impl DefinedNames {
         Self { kind, entries, indices }
     }
 
-    /// The span of a name, or the start of the file if the index is out of range.
+    /// Returns a name's span, or the start of the file if the index is out of range.
     pub(super) fn span(&self, index: usize) -> Range<usize> {
         self.entries.get(index).map_or(0..0, |entry| entry.span.clone())
     }
@@ -43,7 +43,7 @@ impl DefinedNames {
         Some(index)
     }
 
-    /// Extends an issue about an unknown name with the known names and the most similar name.
+    /// Adds the known names and the most similar name to an issue about an unknown name.
     pub(super) fn suggest_names(&self, context: &FileContext<'_>, issue: Issue, name: &str) -> Issue {
         const MAX_LISTED: usize = 12;
         let kind = self.kind;
@@ -79,7 +79,8 @@ mod tests {
     use super::super::super::source::SceneText;
     use super::*;
 
-    /// Number of comparisons for `count` unknown names among `count` names.
+    /// Returns the number of comparisons when `count` unknown names are looked up among `count` defined
+    /// names.
     fn comparisons(count: usize) -> usize {
         let context = FileContext::new(SceneText::file("".into()), Path::new("scene.toml"));
         let names = DefinedNames::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));

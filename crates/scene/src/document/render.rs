@@ -32,7 +32,7 @@ macro_rules! reader {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Reads all keys. Absent or invalid keys get their default values.
+        /// Reads all keys. Uses the default values of absent or invalid keys.
         fn read_settings(table: &TableReader<'_>) -> Render {
             let key = |name| table.optional(name);
             Render {
@@ -44,7 +44,7 @@ macro_rules! reader {
 
 render_keys!(reader);
 
-/// Reads the settings and the output path, if any.
+/// Reads the settings and the optional output path.
 pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
     let render = read_settings(&table);
@@ -56,7 +56,7 @@ pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) 
 
 fn read_output_path(table: &TableReader<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
-    let text = key.text("the path of an image, such as \"image.png\"")?;
+    let text = key.text("an image path, such as \"image.png\"")?;
     key.check_extension(text, IMAGES).then(|| table.context.resolve(text))
 }
 
@@ -78,7 +78,7 @@ mod tests {
     use super::super::super::description::{KeyRange, Render};
     use super::super::super::{Outcome, parse, starter};
 
-    /// Parses a scene with `line` in `[render]`. Returns its settings, or the error messages.
+    /// Parses a scene with `line` in `[render]`. Returns the settings or the error messages.
     fn read(line: &str) -> Result<Render, Vec<String>> {
         let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
         let Outcome { scene, diagnostics, .. } =

@@ -7,7 +7,7 @@ use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, set};
 use super::context::{FileContext, Issue};
 use super::shapes;
 
-/// The top-level keys of a scene that are groups and lists of tables.
+/// The top-level scene keys that are groups of named tables or lists of tables.
 const LAYOUT: TopLevelLayout = TopLevelLayout {
     groups: &["materials", "textures"],
     is_list: |name| name == "light" || shapes::is_shape_table(name),
@@ -62,8 +62,8 @@ fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
             near(issue, &names).help(format!("expected a number from 1 to {count}{by_name}"))
         }
         KeyErrorKind::Ambiguous { count } => {
-            Issue::error(span, format!("{count} [[{list}]] have the name `{part}`"))
-                .help("use its number, counted from 1")
+            Issue::error(span, format!("{count} [[{list}]] tables are named `{part}`"))
+                .help("use a number, counting from 1")
         }
         KeyErrorKind::Element => {
             Issue::error(span, format!("`{list}` is an array of values and can only be set as a whole"))

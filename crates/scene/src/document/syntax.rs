@@ -8,9 +8,9 @@ use super::super::sanitize::shortened;
 use super::super::toml::{Bracket, SyntaxError, brackets, last_open};
 use super::context::{FileContext, Issue};
 
-/// Reports the first error on each line, because it usually causes the other errors. Returns the unreliable
-/// lines in order: lines with errors, and the lines after a broken header, because their keys appear to
-/// belong to another table.
+/// Reports only the first error on each line, because it usually causes the other errors on the line. Returns
+/// the unreliable lines in order: lines with errors, and the lines after a broken header, because their keys
+/// appear to belong to another table.
 pub(super) fn report_syntax_errors(
     context: &FileContext<'_>,
     mut errors: Vec<SyntaxError>,
@@ -18,7 +18,7 @@ pub(super) fn report_syntax_errors(
     let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
-    // Opening brackets of unclosed lists, by line.
+    // The opening brackets of unclosed lists, indexed by line.
     let (mut in_open_array, mut opened) = (false, BTreeMap::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
@@ -28,7 +28,7 @@ pub(super) fn report_syntax_errors(
             continue;
         }
         match find_unclosed_bracket(context, &lists, &error) {
-            // The parser treated all lines up to this one as part of the list.
+            // The parser treated all lines from the bracket to the error as part of the list.
             Some(open) => {
                 lines.extend(context.line(open)..context.line(error.span.start));
                 opened.insert(context.line(open), open);
@@ -63,7 +63,7 @@ struct ArrayBrackets<'a> {
 }
 
 impl ArrayBrackets<'_> {
-    /// The opening bracket of the innermost list that is open at byte `end`.
+    /// Returns the opening bracket of the innermost list that is open at byte `end`.
     fn open_at(&self, end: usize) -> Option<usize> {
         let all = self.brackets.get_or_init(|| brackets(self.text));
         last_open(&all[..all.partition_point(|bracket| bracket.at < end)])
@@ -72,7 +72,8 @@ impl ArrayBrackets<'_> {
 
 const MISSING_COMMA: &str = "missing comma between array elements";
 
-/// The unclosed bracket that caused an error by extending the list into a line with a key or a header.
+/// Finds the unclosed bracket that caused an error because its list extends into a line with a key or a
+/// header.
 fn find_unclosed_bracket(
     context: &FileContext<'_>,
     lists: &ArrayBrackets<'_>,
@@ -98,7 +99,7 @@ fn is_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
-/// The opening bracket of a list that is unclosed at the end of the file. Only searches from the last key,
+/// Returns the opening bracket of a list that is still open at the end of the file. Starts at the last key,
 /// because files may be long.
 fn open_at_end(text: &str) -> Option<usize> {
     let mut start = text.len();
@@ -111,7 +112,7 @@ fn open_at_end(text: &str) -> Option<usize> {
     }
 }
 
-/// Help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
+/// Returns the help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
 fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     let end =
         context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
@@ -121,7 +122,8 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     }
 }
 
-/// Message about missing commas in a single-line list. `at` is the position of the first missing comma.
+/// Returns the message about missing commas in a single-line list. `at` is the position of the first missing
+/// comma.
 fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -136,7 +138,8 @@ fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, 
     Some(format!("{words}: write {list}"))
 }
 
-/// Issue about a list of numbers in the wrong brackets: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
+/// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0,
+/// 1, 0)`.
 fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
     let line = context.line_text(context.line(at))?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -150,7 +153,7 @@ fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
     Some(issue)
 }
 
-/// Formats separated numbers as a list, ignoring any closing bracket.
+/// Formats numbers with any separators as a list, ignoring a closing bracket.
 fn format_number_list(text: &str) -> Option<String> {
     let text = text.split('#').next().unwrap_or_default().trim();
     let values = split_values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
@@ -176,8 +179,8 @@ fn format_list(values: &[&str]) -> Option<String> {
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
 }
 
-/// The line after the lines affected by an error: the next header if `line` is a broken header, otherwise the
-/// next line.
+/// Returns the first line not affected by an error in `line`: the next header if `line` is a broken header,
+/// otherwise the next line.
 fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
     let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {
@@ -186,7 +189,7 @@ fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
     (line + 1..).find(|next| is_header(*next) != Some(false)).unwrap_or(usize::MAX)
 }
 
-/// Text of the number that contains `span`.
+/// Returns the text of the number that contains `span`.
 fn number_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);
@@ -270,7 +273,7 @@ fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: Syn
 /// Error message for a key without a value.
 pub(crate) const MISSING_VALUE: &str = "a value is missing";
 
-/// Issue about a missing value, an invalid number or an unquoted string.
+/// Returns an issue about a missing value, an invalid number or an unquoted string.
 fn invalid_value_issue(span: Range<usize>, written: &str) -> Issue {
     const VALUES: &str = "expected a number, true, false, a quoted string, or values in brackets";
     if written.trim().is_empty() {

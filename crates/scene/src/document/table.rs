@@ -14,7 +14,7 @@ use super::key::TableKey;
 use super::limits::Limits;
 use super::value::{TomlValue, Value, describe_found};
 
-/// A table's name in messages.
+/// How messages refer to a table.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TableTitle<'a> {
     /// The root table of the file.
@@ -25,7 +25,7 @@ pub(super) enum TableTitle<'a> {
     List(&'static str),
     /// A named table, such as `[materials.wall]`.
     Named(&'static str, &'a str),
-    /// An inline table, given by its key.
+    /// An inline table, identified by its key.
     Key(&'static str),
 }
 
@@ -64,7 +64,7 @@ impl<'a> TableReader<'a> {
         Self { context, span, title, entries, known, unavailable, missing }
     }
 
-    /// Creates a reader of the file's root table.
+    /// Creates a reader for the file's root table.
     pub(super) fn root(context: &'a FileContext<'a>, entries: Entries<'a>) -> Self {
         Self::new(context, entries, 0..0, TableTitle::Root)
     }
@@ -105,7 +105,7 @@ impl<'a> TableReader<'a> {
         )
     }
 
-    /// Returns the range defined for a key, given as `KEY` or `TYPE.KEY`.
+    /// Returns the range defined for the key `name`, which has the form `KEY` or `TYPE.KEY`.
     pub(super) fn limits(&self, name: &str) -> Limits {
         match self.value_kind(name) {
             Some(
@@ -139,7 +139,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Returns the type defined for a key. A test compares the definitions with the keys that are read.
+    /// Returns the type defined for a key. A test checks that the definitions match the keys that are read.
     fn value_kind(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
@@ -154,7 +154,7 @@ impl<'a> TableReader<'a> {
         info.keys_of(kind).find(|key| key.name == name).map(|key| key.kind)
     }
 
-    /// Reads a required key. `example` is a valid value for the help text.
+    /// Reads a required key. `example` is a valid value to show in the help text.
     pub(super) fn required(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
         let key = self.optional(name);
         if !key.is_present() {
@@ -225,7 +225,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Guesses which key was meant by an unknown key. Prefers keys that are not present.
+    /// Guesses which key the user meant by an unknown key. Prefers keys that are absent from the table.
     fn probably_meant_key(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();
@@ -234,7 +234,7 @@ impl<'a> TableReader<'a> {
         translate_foreign_name(key, &others).or_else(|| nearest(key, known.iter().copied()))
     }
 
-    /// Whether there is a table with a similar name, probably a misspelling of `name`.
+    /// Whether there is a table with a similar name that is probably a misspelling of `name`.
     pub(super) fn has_misspelled(&self, name: &'static str) -> bool {
         let is_table = |value: Value<'_>| matches!(value.item(), TomlValue::Table(_));
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));

@@ -57,7 +57,7 @@ fn read_image_reference(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, O
 }
 
 /// Reports textures without `encoding` that are used for both colors and numbers. Ignores uses of the alpha
-/// channel, which has no encoding.
+/// channel, because it has no encoding.
 pub(super) fn check_encodings(context: &FileContext<'_>, textures: &TextureList, materials: &[Material]) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);

@@ -5,7 +5,7 @@ pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
 
-/// Describes a value for messages such as `found the string "a"`.
+/// Describes a value for use in messages, as in `found the string "a"`.
 pub(super) fn describe_found(context: &FileContext<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
     let written = || shortened(context.text(&value.span()), LONGEST);
@@ -47,7 +47,7 @@ pub(super) fn parse_integer(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }
 
-/// Reads a number within limits. Error messages refer to the number as `name` and to its type as `expected`.
+/// Reads a number within limits. Error messages call the number `name` and its type `expected`.
 pub(super) fn number_within(
     context: &FileContext<'_>,
     name: &str,

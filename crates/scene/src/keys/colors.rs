@@ -7,7 +7,7 @@ pub fn color_names() -> impl Iterator<Item = &'static str> {
     NAMED_COLORS.keys().map(|name| name.as_str())
 }
 
-/// Parses a color string, `#rrggbb` or a case-insensitive name, to sRGB bytes.
+/// Parses a color string (`#rrggbb` or a case-insensitive name) into sRGB bytes.
 pub fn color_bytes(text: &str) -> Option<[u8; 3]> {
     rgb_bytes(text).or_else(|| named_color(text))
 }
@@ -20,7 +20,7 @@ fn rgb_bytes(text: &str) -> Option<[u8; 3]> {
     Some([red, green, blue])
 }
 
-/// The hexadecimal digits after a `#`.
+/// Returns the hexadecimal digits after a `#`.
 pub(crate) fn hex_digits(text: &str) -> Option<&str> {
     text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
 }

@@ -10,11 +10,11 @@ pub struct TableInfo {
     pub name: &'static str,
     /// Syntax of the table in scene files.
     pub form: TableSyntax,
-    /// Description, as one sentence without a period at the end.
+    /// Description: one sentence without a final period.
     pub doc: &'static str,
-    /// The keys common to all types.
+    /// The keys that all types have in common.
     pub keys: &'static [KeyInfo],
-    /// The values of the key `type`, starting with the default. Empty if the table has no such key.
+    /// The values of the key `type`, starting with the default. Empty if the table has no key `type`.
     pub types: &'static [TypeInfo],
 }
 
@@ -34,7 +34,7 @@ pub enum TableSyntax {
 pub struct TypeInfo {
     /// The value of `type`.
     pub name: &'static str,
-    /// Description, as one sentence without a period at the end.
+    /// Description: one sentence without a final period.
     pub doc: &'static str,
     /// The keys specific to this type.
     pub keys: &'static [KeyInfo],
@@ -49,9 +49,9 @@ pub struct KeyInfo {
     pub kind: ValueKind,
     /// Unit of the value, or an empty string.
     pub unit: &'static str,
-    /// Value if the key is absent.
+    /// The value used if the key is absent.
     pub default: Default,
-    /// Description, as one sentence without a period at the end.
+    /// Description: one sentence without a final period.
     pub doc: &'static str,
 }
 
@@ -68,17 +68,17 @@ pub enum ValueKind {
     Words(ChoiceValues),
     /// Any text.
     Text,
-    /// The path of a file with one of these extensions. If empty, any file is allowed.
+    /// The path of a file with one of these extensions. If the list is empty, any file is allowed.
     File(&'static [&'static str]),
     /// A color. The limits apply to each component.
     Color(Limits),
     /// A color or a texture.
     ColorOrTexture(Limits),
-    /// A color, or a texture with a scale.
+    /// A color, or a texture with a scale factor.
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// An array of numbers, with its length and the name of its type, such as `point`.
+    /// An array of numbers. Contains the array's length and the name of its type, such as `point`.
     Numbers(usize, &'static str, Limits),
     /// A number or an array of three numbers.
     Scale(Limits),
@@ -91,7 +91,7 @@ pub enum ValueKind {
 }
 
 impl ValueKind {
-    /// The table that defines the name. `None` if the value is not a name.
+    /// Returns the table in which the name is defined. `None` if the value is not a name.
     pub fn named_in(self) -> Option<&'static str> {
         match self {
             Self::Material => Some("materials"),
@@ -112,7 +112,7 @@ impl ValueKind {
     }
 }
 
-/// Function that returns the named values of a choice, in display order.
+/// A function that returns a choice's named values in display order.
 pub type ChoiceValues = fn() -> Vec<ChoiceValue>;
 
 /// A named value of a choice.
@@ -124,7 +124,7 @@ pub struct ChoiceValue {
     pub meaning: &'static str,
 }
 
-/// Returns the named values of a choice.
+/// Returns a choice's named values.
 pub fn words<C: Choice>() -> Vec<ChoiceValue> {
     C::ALL.iter().map(|one| ChoiceValue { name: one.name(), meaning: one.meaning() }).collect()
 }
@@ -157,7 +157,8 @@ pub(super) const fn key(
 }
 
 impl TableInfo {
-    /// The type called `name`, or the default type. `None` if there is no such type.
+    /// Returns the type called `name`, or the default type if `name` is `None`. `None` if the type is
+    /// unknown.
     pub fn type_of(&self, name: Option<&str>) -> Option<&'static TypeInfo> {
         match name {
             Some(name) => self.types.iter().find(|one| one.name == name),
@@ -165,7 +166,7 @@ impl TableInfo {
         }
     }
 
-    /// All keys of a table with this type, starting with type-specific keys. Excludes `type`.
+    /// Returns all keys of a table with this type, except `type`. The type-specific keys come first.
     pub fn keys_of(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
         kind.map_or(&[] as &[KeyInfo], |kind| kind.keys).iter().chain(self.keys)
     }
@@ -189,7 +190,7 @@ impl KeyInfo {
         }
     }
 
-    /// The range, such as `0 … 1`. Empty if the type implies it.
+    /// Returns the range, such as `0 … 1`. Empty if the type implies the range.
     pub fn range(&self) -> String {
         self.kind.range()
     }
@@ -199,7 +200,7 @@ impl KeyInfo {
         self.kind.words()
     }
 
-    /// The default in Markdown, as shown in the documentation.
+    /// Returns the default in Markdown, as shown in the documentation.
     pub fn default_words(&self) -> String {
         match self.default {
             Default::Required(_) => "*required*".to_owned(),

@@ -86,7 +86,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                     Number(Between(0.0, 180.0)),
                     "degrees",
                     Is("0"),
-                    "Apparent diameter, 0 or at least 0.001; the sun has 0.53. Above 0, shadows are soft and the disk is visible",
+                    "Apparent diameter, 0 or at least 0.001; use 0.53 for the sun. Above 0, shadows are soft and the disk is visible",
                 ),
             ],
         },

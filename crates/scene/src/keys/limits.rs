@@ -1,8 +1,8 @@
-//! Ranges of numbers and their descriptions.
+//! Ranges of numbers, with descriptions.
 
 use crate::math::limits::{LARGEST, is_too_short};
 
-/// Range of accepted numbers. All numbers must also be finite and at most [`LARGEST`] in magnitude.
+/// A range of accepted numbers. In addition, numbers must be finite and at most [`LARGEST`] in magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limits {
     /// Any number.
@@ -11,7 +11,7 @@ pub enum Limits {
     NotZero,
     /// At least this number.
     AtLeast(f64),
-    /// A length or size: positive, and large enough that its square does not underflow.
+    /// A length or size, which must be positive and so large that its square does not underflow.
     Length,
     /// A [`Length`](Self::Length) or 0.
     LengthOrZero,
@@ -52,7 +52,7 @@ impl Limits {
         }
     }
 
-    /// The range as shown in the documentation.
+    /// Returns the range as shown in the documentation.
     pub fn range(self) -> String {
         match self {
             Self::Any => "any".to_owned(),

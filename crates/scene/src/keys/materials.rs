@@ -118,7 +118,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     Is("[1, 1, 1]"),
                     "Transmittance per unit length (Beer's law); for a thin pane, transmittance at any angle, which may be a texture",
                 ),
-                key("thin", Flag, "", Is("false"), "Whether it is an infinitely thin pane"),
+                key("thin", Flag, "", Is("false"), "Whether the glass is an infinitely thin pane"),
             ],
         },
         TypeInfo {
@@ -137,7 +137,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     ColorOrTexture(AtLeast(0.0)),
                     "",
                     Absent,
-                    "Index of refraction for red, green and blue; uses the exact Fresnel equations",
+                    "Index of refraction for red, green and blue, used in the exact Fresnel equations",
                 ),
                 key(
                     "k",
@@ -181,7 +181,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     Is("[1, 1, 1]"),
                     "Scale factor for the coat's reflectance",
                 ),
-                key("ior", Number(Between(1.0, 10.0)), "", Is("1.5"), "Index of refraction of the coat"),
+                key("ior", Number(Between(1.0, 10.0)), "", Is("1.5"), "The coat's index of refraction"),
                 key(
                     "roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
@@ -200,7 +200,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     ColorOrTexture(Between(0.0, 1.0)),
                     "reflectance",
                     Is("[0.8, 0.8, 0.8]"),
-                    "Diffuse reflectance of the dielectric part, reflectance of the metal at normal incidence",
+                    "Diffuse reflectance of the dielectric part, and the metal's reflectance at normal incidence",
                 ),
                 key("metallic", NumberOrTexture(Between(0.0, 1.0)), "", Is("0.0"), "Weight of the metal"),
                 key(
@@ -208,7 +208,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.5"),
-                    "Square root of the GGX α of the specular lobe",
+                    "Square root of the specular lobe's GGX α",
                 ),
                 key(
                     "ior",
@@ -236,7 +236,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.0"),
-                    "Fraction of light transmitted straight through, like through a thin sheet, instead of scattered",
+                    "Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered",
                 ),
                 key(
                     "clearcoat",
@@ -250,7 +250,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.0"),
-                    "Square root of the GGX α of the clear coat",
+                    "Square root of the clear coat's GGX α",
                 ),
             ],
         },

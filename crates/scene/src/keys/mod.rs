@@ -22,7 +22,7 @@ pub use key::{
     ChoiceValue, ChoiceValues, Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind, words,
 };
 
-/// All tables, in the order of the documentation.
+/// Returns all tables, in the same order as in the documentation.
 pub fn tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
         let before = [render::table(), singles::CAMERA, singles::PHOTONS];
@@ -52,7 +52,7 @@ pub fn paths() -> Vec<(String, &'static str)> {
     all
 }
 
-/// The table with this name.
+/// Returns the table with this name.
 pub fn table(name: &str) -> Option<&'static TableInfo> {
     tables().iter().find(|table| table.name == name)
 }
@@ -63,7 +63,7 @@ mod tests {
     use crate::diagnostic::Severity;
     use crate::parse;
 
-    /// Keys and values that a table needs in addition to `key`.
+    /// Returns the keys and values that a table needs in addition to `key`.
     fn other_keys(table: &str, kind: &str, key: &str) -> Vec<(String, String)> {
         let fixed: &[(&str, &str)] = match (table, kind, key) {
             ("materials", "metal", "color" | "element") => &[],
@@ -88,7 +88,7 @@ mod tests {
         fixed.into_iter().filter(|(name, _)| name != key).chain(required).collect()
     }
 
-    /// A scene with a key set to its example value.
+    /// Returns a scene in which a key is set to its example value.
     fn with_example(info: &TableInfo, kind: Option<&TypeInfo>, key: &KeyInfo) -> String {
         let mut text = String::new();
         for (table, body) in [

@@ -21,7 +21,7 @@ macro_rules! shapes {
 
 const NAME: KeyInfo = key("name", Text, "", Absent, "Name used in messages, for clicks and by `--set`");
 
-/// The key `material`. Optional for meshes, because their files may contain materials.
+/// Defines the key `material`. It is optional for meshes, because their files may contain materials.
 const fn material_key(shape: &str) -> KeyInfo {
     // String comparison is not const, so match bytes.
     let default = match shape.as_bytes() {
@@ -61,13 +61,13 @@ shapes! {
         key("radius", Number(Length), "length", Is("0.5"), "The radius"),
     ];
     "cylinder", "A cylinder": [
-        key("a", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "The middle of one end"),
-        key("b", Numbers(3, "point", Any), "length", Is("[0, 1, 0]"), "The middle of the other end"),
+        key("a", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "Center of one end"),
+        key("b", Numbers(3, "point", Any), "length", Is("[0, 1, 0]"), "Center of the other end"),
         key("radius", Number(Length), "length", Is("0.5"), "The radius"),
         key("caps", Flag, "", Is("true"), "Whether the ends are closed"),
     ];
     "cone", "A cone": [
-        key("base", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "The middle of the base"),
+        key("base", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "Center of the base"),
         key("tip", Numbers(3, "point", Any), "length", Is("[0, 1, 0]"), "The tip"),
         key("radius", Number(Length), "length", Is("0.5"), "The radius of the base"),
         key("cap", Flag, "", Is("true"), "Whether the base is closed"),
@@ -79,7 +79,7 @@ shapes! {
         key("tube", Number(Length), "length", By("a quarter of `radius`"), "The radius of the tube, less than `radius`"),
     ];
     "mesh", "A triangle mesh from a file": [
-        key("file", File(MESHES), "", Required("\"mesh.obj\""), "OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf), determined by the extension"),
+        key("file", File(MESHES), "", Required("\"mesh.obj\""), "An OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf) file; the extension determines the format"),
         key("part", Whole(0, MOST_WHOLE), "", Absent, "Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is the file's whole scene"),
         key("scale", Scale(NotZero), "", Is("1.0"), "Scale, applied first"),
         key("rotate", Numbers(3, "three numbers", Any), "degrees", Is("[0, 0, 0]"), "Rotation about x, then y, then z"),

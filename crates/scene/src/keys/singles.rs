@@ -89,7 +89,7 @@ pub(super) const ENVIRONMENT: TableInfo = single_table(
             File(MAPS),
             "",
             Absent,
-            "An equirectangular map. Its center is seen towards −z, its right quarter towards +x, its top row at +y",
+            "An equirectangular map. Its center is seen towards −z, its right quarter towards +x, and its top row at +y",
         ),
         key(
             "rotate",

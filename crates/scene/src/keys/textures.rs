@@ -25,7 +25,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Words(words::<TextureFilter>),
             "",
             Is("\"bilinear\""),
-            "Interpolation; `\"mipmap\"` also avoids flicker in the distance by choosing the level from the pixel footprint",
+            "Interpolation; `\"mipmap\"` also avoids flicker in the distance by choosing the mip level from the pixel footprint",
         ),
         key("wrap", Words(words::<Wrap>), "", Is("\"repeat\""), "Addressing outside of [0, 1]"),
         key(
@@ -40,7 +40,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Number(Any),
             "degrees",
             Is("0.0"),
-            "Rotates the repeated coordinates about (0, 0), from u to v; the image turns the other way",
+            "Rotates the repeated coordinates about (0, 0), from u to v; the image rotates the other way",
         ),
         key(
             "offset",
@@ -54,14 +54,14 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Color(AtLeast(0.0)),
             "",
             Is("[1, 1, 1]"),
-            "Scale factor for linear colors; numbers use the red component, normal maps and heights ignore the factor",
+            "Scale factor for linear colors; numbers use the red component, and normal maps and heights ignore the factor",
         ),
         key(
             "uv",
             Whole(0, 1),
             "",
             Is("0"),
-            "Texture coordinate set: 1 is the second set of a mesh, `TEXCOORD_1` in glTF, `u1` and `v1` in PLY",
+            "Texture coordinate set: 1 is a mesh's second set, `TEXCOORD_1` in glTF, `u1` and `v1` in PLY",
         ),
         key(
             "encoding",

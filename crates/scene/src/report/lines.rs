@@ -43,7 +43,7 @@ pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     render_with(diagnostics, width, &renderer).lines().map(pieces).collect()
 }
 
-/// Splits a line at color escape sequences. They are all from the renderer, because text from files is
+/// Splits a line at color escape sequences, all of which come from the renderer because text from files is
 /// sanitized.
 fn pieces(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
@@ -63,7 +63,7 @@ fn pieces(line: &str) -> ReportLine {
     pieces
 }
 
-/// The role for a color code used in [`lines`].
+/// Returns the role that a color code stands for in [`lines`].
 fn role_of(codes: &str) -> SpanRole {
     match codes {
         "31" => SpanRole::Error,

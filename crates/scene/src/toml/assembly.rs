@@ -1,4 +1,4 @@
-//! Builds tables from headers, keys and values. Enforces TOML's rules for extending tables and for duplicate
+//! Builds tables from headers, keys and values. Enforces TOML's rules on extending tables and on duplicate
 //! definitions.
 
 use std::borrow::Cow;
@@ -25,8 +25,8 @@ pub(super) struct DocumentBuilder<'s> {
     pub(super) document: Document<'s>,
     /// The current table.
     table: TableId,
-    /// The header of `table`. `None` if `table` is the root. The table is inserted when the next header
-    /// begins.
+    /// The header that starts `table`. `None` if `table` is the root. The table is inserted when the next
+    /// header begins.
     header: Option<TableHeader<'s>>,
     /// An unclosed header, which a later expression may close.
     pub(super) open: Option<TableHeader<'s>>,
@@ -34,11 +34,11 @@ pub(super) struct DocumentBuilder<'s> {
     pub(super) is_lost: bool,
     pub(super) syntax: BoundedErrors,
     pub(super) meaning: BoundedErrors,
-    /// Stack of elements of the arrays being read.
+    /// Stack of the elements of all arrays being read.
     pub(super) elements: Vec<ValueNode>,
 }
 
-/// Collects parser errors for the part of the text starting at byte `base`.
+/// Collects parser errors in the part of the text that starts at byte `base`.
 pub(super) struct ErrorCollector<'a> {
     pub(super) errors: &'a mut BoundedErrors,
     pub(super) base: usize,
@@ -55,7 +55,7 @@ impl<'s> DocumentBuilder<'s> {
         Self::from_document(Document::new(source))
     }
 
-    /// Extends a document with a new, detached table.
+    /// Adds a new, detached table to a document.
     pub(super) fn with_detached_table(mut document: Document<'s>) -> (Self, TableId) {
         let table = document.add_table(TableOrigin::default());
         (Self { table, ..Self::from_document(document) }, table)
@@ -137,8 +137,8 @@ impl<'s> DocumentBuilder<'s> {
         }
     }
 
-    /// Starts the table of a header. If longer headers have created the table implicitly, defines it. If the
-    /// table is already defined, reports an error and continues it.
+    /// Starts the table that a header names. If longer headers have created the table implicitly, defines it.
+    /// If it is already defined, reports an error and adds keys to it anyway.
     pub(super) fn start_table(&mut self, header: TableHeader<'s>) {
         self.table = self
             .take_existing_table(&header)
@@ -148,7 +148,7 @@ impl<'s> DocumentBuilder<'s> {
         self.header = Some(header);
     }
 
-    /// Removes and returns the existing table of a header, if any.
+    /// Removes and returns the existing table that a header names. `None` if there is none.
     fn take_existing_table(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
         if header.is_list {
             return None;
@@ -187,7 +187,7 @@ impl<'s> DocumentBuilder<'s> {
         }
     }
 
-    /// Returns the table at `path`, and creates missing tables.
+    /// Returns the table at `path`. Creates missing tables.
     fn descend(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
@@ -205,7 +205,7 @@ impl<'s> DocumentBuilder<'s> {
         })
     }
 
-    /// Returns the table if a header or dotted key may add to it.
+    /// Returns the table if a header or dotted key may add keys to it.
     fn extendable_table(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
         let origin = self.document.origin(table);
         if origin.is_inline {
@@ -222,7 +222,7 @@ impl<'s> DocumentBuilder<'s> {
         Some(table)
     }
 
-    /// Like [`Self::descend`], within an inline table.
+    /// Like [`Self::descend`], but within an inline table.
     fn descend_inline(&mut self, from: TableId, path: &[Name<'s>]) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {

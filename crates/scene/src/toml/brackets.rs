@@ -1,4 +1,4 @@
-//! Finds the square brackets of arrays. The text may have syntax errors.
+//! Finds the square brackets that enclose arrays. The text may have syntax errors.
 
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
@@ -12,7 +12,7 @@ pub(crate) struct Bracket {
     pub(crate) opens: bool,
 }
 
-/// Returns the array brackets in `text`, which must begin with an expression.
+/// Returns the array brackets in `text`, which must start at the start of an expression.
 pub(crate) fn brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
@@ -46,7 +46,7 @@ pub(crate) fn brackets(text: &str) -> Vec<Bracket> {
     brackets
 }
 
-/// The offset of the innermost bracket that is still open at the end.
+/// Returns the offset of the innermost bracket that is still open at the end of the text.
 pub(crate) fn last_open(brackets: &[Bracket]) -> Option<usize> {
     let mut closed = 0_usize;
     for bracket in brackets.iter().rev() {

@@ -1,4 +1,4 @@
-//! TOML syntax errors and a bounded list of them.
+//! TOML syntax errors, and a list of limited length that collects them.
 
 use std::ops::Range;
 
@@ -11,12 +11,12 @@ pub(crate) struct SyntaxError {
     pub(crate) span: Range<usize>,
     /// Short description of the error.
     pub(crate) what: String,
-    /// Expected tokens: a list, or `nothing`.
+    /// The expected tokens, as a list or as `nothing`.
     pub(crate) expected: Option<String>,
 }
 
 impl SyntaxError {
-    /// Converts a parser error for the part of the text starting at byte `base`.
+    /// Converts a parser error in the part of the text that starts at byte `base`.
     pub(super) fn new(error: &ParseError, base: usize) -> Self {
         let span = error.unexpected().map_or(0..0, |span| base + span.start()..base + span.end());
         Self {
@@ -53,7 +53,7 @@ fn format_expected(expected: &Expected) -> String {
     }
 }
 
-/// A bounded list of errors.
+/// A list of errors with a limited length.
 #[derive(Debug, Default)]
 pub(super) struct BoundedErrors(Vec<SyntaxError>);
 

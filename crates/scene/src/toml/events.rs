@@ -1,7 +1,7 @@
 //! Converts `toml_parser` events to headers, keys and values.
 //!
 //! If the text has errors, events may be inconsistent: a close without an open, or a key instead of a value.
-//! The resulting values are the same as in the `toml` crate.
+//! The resulting values are the same as with the `toml` crate.
 
 use std::borrow::Cow;
 
@@ -17,7 +17,7 @@ use super::tree::{Name, NodeKind, Radix, Span, TableOrigin, ValueNode};
 /// The events of one expression.
 pub(super) struct ExpressionEvents<'e, 's> {
     pub(super) events: &'e [Event],
-    /// The text that the events index into. `base` is the text's offset in the document.
+    /// The text into which the events index. `base` is the text's offset in the document.
     pub(super) source: Source<'s>,
     pub(super) base: usize,
     pub(super) assembly: &'e mut DocumentBuilder<'s>,
@@ -39,7 +39,7 @@ impl<'s> ExpressionEvents<'_, 's> {
                     self.read_header();
                 }
                 EventKind::SimpleKey => self.read_key_value(event),
-                // Whitespace, and the rest of incomplete expressions.
+                // Skip whitespace and the rest of incomplete expressions.
                 _ => {}
             }
         }
@@ -60,7 +60,7 @@ impl<'s> ExpressionEvents<'_, 's> {
         Span::new(self.base + event.span().start(), self.base + event.span().end())
     }
 
-    /// Reads the rest of the open header. An unclosed header ends at the next header and takes its key.
+    /// Reads the rest of the open header. An unclosed header ends at the next header and takes over its key.
     fn read_header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next() {
@@ -90,14 +90,15 @@ impl<'s> ExpressionEvents<'_, 's> {
         self.assembly.add_key_value(&path, key, value);
     }
 
-    /// Placeholder for a missing value.
+    /// Returns a placeholder for a missing value.
     fn missing_value(&mut self) -> ValueNode {
         let span = Span::default();
         let text = self.assembly.store_string(span, Cow::Borrowed("0"));
         ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
     }
 
-    /// Reads a dotted key. Returns the path and the last part, which is `None` if there are too many parts.
+    /// Reads a dotted key. Returns the path and the last part of the key. The last part is `None` if there
+    /// are too many parts.
     fn read_key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
         let mut path = Vec::new();
         let mut last = event;
@@ -174,7 +175,7 @@ impl<'s> ExpressionEvents<'_, 's> {
         ValueNode { span, kind }
     }
 
-    /// Reads an array up to the end or the first unexpected event.
+    /// Reads an array up to its end or the first unexpected event.
     fn read_array(&mut self, open: Event) -> ValueNode {
         let first = self.assembly.elements.len();
         let mut span = self.span(open);
@@ -204,7 +205,7 @@ impl<'s> ExpressionEvents<'_, 's> {
         ValueNode { span, kind: self.assembly.end_array(first) }
     }
 
-    /// Reads an inline table up to the end or the first unexpected event.
+    /// Reads an inline table up to its end or the first unexpected event.
     fn read_inline_table(&mut self, open: Event) -> ValueNode {
         let origin = TableOrigin { is_inline: true, ..TableOrigin::default() };
         let table = self.assembly.document.add_table(origin);

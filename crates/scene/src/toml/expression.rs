@@ -1,7 +1,7 @@
-//! Parses one expression: a header or a key and its value, up to the end of the line.
+//! Parses one expression: a header, or a key and its value, together with the rest of the line.
 //!
-//! `toml_parser` takes a list of tokens of 24 bytes each. To limit memory, the document is split at points
-//! where the parser has certainly finished an expression.
+//! `toml_parser` takes a list of tokens, which are 24 bytes each. To limit memory, the document is split at
+//! points where the parser is certain to have finished an expression.
 
 use toml_parser::lexer::{Token, TokenKind};
 use toml_parser::parser::{Event, RecursionGuard, ValidateWhitespace, parse_document};
@@ -19,8 +19,8 @@ pub(super) struct ExpressionParser {
 }
 
 impl ExpressionParser {
-    /// Reads the expression that starts at byte `at`, the start of a line. Returns the offset after the
-    /// expression.
+    /// Reads the expression that starts at byte `at`, which must be the start of a line. Returns the offset
+    /// after the expression.
     pub(super) fn read<'s>(
         &mut self,
         source: &'s str,
@@ -59,9 +59,9 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
 
 /// Finds the end of a TOML expression.
 ///
-/// `open` is a supersequence of the parser's open brackets, because a bracket is only closed by its own kind.
-/// With mismatched brackets, the parser may finish earlier, but it is never inside a value while `open` is
-/// empty.
+/// `open` is a supersequence of the parser's open brackets, because here only a bracket of the same kind
+/// closes a bracket. With mismatched brackets, the parser may finish earlier, but it is never inside a value
+/// while `open` is empty.
 #[derive(Default)]
 struct ExpressionScanner {
     phase: ExpressionPhase,

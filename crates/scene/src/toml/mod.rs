@@ -44,14 +44,14 @@ const MAX_DEPTH: u32 = 80;
 /// The byte order mark that may precede a text.
 const MARK: &str = "\u{feff}";
 
-/// Whether a text consists of a single dotted key and its value.
+/// Whether a text consists of exactly one dotted key and its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
-/// Sets a key of the document as specified by the `KEY = VALUE` at byte `at` of `source`, which starts with
-/// the document's text.
+/// Applies a `KEY = VALUE` assignment to the document. The assignment is at byte `at` of `source`, and
+/// `source` starts with the document's text.
 ///
 /// # Errors
 /// Returns the part of the key that cannot be resolved.

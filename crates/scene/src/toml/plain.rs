@@ -2,7 +2,7 @@
 //! bare key and a decimal number, a Boolean, a string without escapes, or a flat single-line array of such
 //! values.
 //!
-//! Large scenes consist of such lines, and this parser takes a tenth of the time of [`super::expression`],
+//! Large scenes consist of such lines, and this parser is ten times as fast as [`super::expression`],
 //! which handles all other lines, including lines with errors. Tests check that both parsers return the same
 //! results.
 
@@ -11,7 +11,8 @@ use std::borrow::Cow;
 use super::assembly::{DocumentBuilder, TableHeader};
 use super::tree::{Name, NodeKind, Radix, Span, StringRef, ValueNode};
 
-/// Reads the line that starts at byte `at` and returns the offset after it. `None` if the line is not simple.
+/// Reads the line that starts at byte `at`. Returns the offset after the line. `None` if the line is not
+/// simple.
 pub(super) fn read_plain_line<'s>(
     source: &'s str,
     at: usize,
@@ -51,7 +52,7 @@ pub(super) fn read_plain_line<'s>(
     Some(line.at)
 }
 
-/// A scanned value. It is an array if `kind` is `None`.
+/// A scanned value, which is an array if `kind` is `None`.
 struct ScannedValue {
     span: Span,
     kind: Option<NodeKind>,
@@ -89,7 +90,7 @@ impl<'s> LineScanner<'s> {
         self.skip_while(|byte| byte == b' ' || byte == b'\t');
     }
 
-    /// Reads whitespace, a comment and the end of the line or the text.
+    /// Reads optional whitespace, an optional comment, and the end of the line or text.
     fn read_line_end(&mut self) -> Option<()> {
         self.skip_whitespace();
         if self.peek() == b'#' {

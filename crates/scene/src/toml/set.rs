@@ -9,7 +9,7 @@ use super::tree::{Document, Name, NodeKind, TableId, TableOrigin, ValueNode};
 pub(crate) struct KeyError {
     /// Byte range of `part`.
     pub(crate) span: Range<usize>,
-    /// The parts of the key before `part`.
+    /// The parts of the key that precede `part`.
     pub(crate) above: Vec<String>,
     /// The part of the key that cannot be resolved.
     pub(crate) part: String,
@@ -41,12 +41,12 @@ pub(crate) enum KeyErrorKind {
     Element,
 }
 
-/// The groups and lists at the top level of a document.
+/// The groups and lists of tables at the top level of a document.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TopLevelLayout {
     /// Top-level tables that contain named tables. Named tables are never created.
     pub(crate) groups: &'static [&'static str],
-    /// Whether a top-level name is a list of tables.
+    /// Whether a top-level name denotes a list of tables.
     pub(crate) is_list: fn(&str) -> bool,
 }
 
@@ -132,7 +132,7 @@ impl<'s> Document<'s> {
         Ok(())
     }
 
-    /// Sets the value of a key to a new, empty table.
+    /// Sets a key to a new, empty table.
     fn create_table(&mut self, parent: TableId, name: &Name<'s>) -> TableId {
         let table = self.add_table(TableOrigin::default());
         self.set_value(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
@@ -158,7 +158,7 @@ impl<'s> Document<'s> {
     }
 }
 
-/// Target of one part of a key.
+/// What one part of a key refers to.
 enum KeyTarget {
     /// A table.
     Table(TableId),

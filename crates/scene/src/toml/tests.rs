@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Formats errors like the `toml` crate.
+/// Formats errors as the `toml` crate does.
 fn errors(errors: &[SyntaxError]) -> Vec<(std::ops::Range<usize>, String)> {
     let message = |error: &SyntaxError| match &error.expected {
         Some(expected) => format!("{}, expected {expected}", error.what),
@@ -198,7 +198,7 @@ const KEYS: [&str; 14] = [
     "a.\"b.c\"",
 ];
 
-/// Random lines, which may conflict with each other.
+/// Generates random lines, which may conflict with each other.
 fn line() -> impl Strategy<Value = String> {
     let value = prop::sample::select(&VALUES[..]);
     let key = prop::sample::select(&KEYS[..]);
@@ -245,7 +245,7 @@ fn single_lines_and_pairs_match_the_crate() {
 
 #[test]
 fn brackets_in_any_order_match_the_crate() {
-    // Insert every sequence of six of these parts into an expression that other expressions follow.
+    // Insert every sequence of six of these parts into an expression. Other expressions follow it.
     let parts = ["[", "]", "{", "}", ",", "\n", "b=", "1 "];
     for number in 0..parts.len().pow(6) {
         let mut rest = number;
@@ -287,7 +287,7 @@ fn large_tables_match_the_crate() {
 }
 
 #[test]
-fn too_long_keys_are_reported_with_their_span() {
+fn overlong_keys_are_reported_with_their_span() {
     let text = |parts: usize| format!("\n[x]\n{}a = 1\n", "a.".repeat(parts - 1));
     assert!(assert_same(&text(80)));
     let long = text(81);

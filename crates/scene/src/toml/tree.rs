@@ -1,4 +1,4 @@
-//! The document tree: 16-byte nodes in a few vectors, with strings as spans into the source.
+//! The document tree: 16-byte nodes in a few vectors, and strings that are spans of the source.
 //!
 //! A sphere with a center, a radius and a material takes about 180 bytes.
 
@@ -56,9 +56,9 @@ pub(super) enum NodeKind {
     Float(StringRef),
     Boolean(bool),
     Datetime,
-    /// `[…]`, as an index into the arrays.
+    /// `[…]`: an index into the arrays.
     Array(u32),
-    /// All `[[name]]` tables with the same name, as an index into the lists.
+    /// All `[[name]]` tables with the same name: an index into the lists.
     List(u32),
     Table(TableId),
 }
@@ -77,7 +77,7 @@ pub(super) struct ValueNode {
     pub(super) kind: NodeKind,
 }
 
-/// A key and its value, in the linked list of a table.
+/// A key and its value: an entry in a table's linked list.
 #[derive(Clone, Copy, Debug)]
 struct TableEntry {
     key: Span,
@@ -91,7 +91,7 @@ struct TableEntry {
 /// End of a linked list.
 const NONE: u32 = u32::MAX;
 
-/// Origin of a table, which determines whether keys may be added.
+/// How a table was created, which determines whether keys may be added to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TableOrigin {
     /// Whether the table was created by a longer header or key.
@@ -114,7 +114,7 @@ struct TableRecord {
 /// Maximum number of entries in tables that do not use the hash index.
 const MAX_LINEAR: u32 = 16;
 
-/// A key that is not yet in a table.
+/// A key that has not been added to a table yet.
 #[derive(Clone, Debug)]
 pub(super) struct Name<'s> {
     pub(super) span: Span,
@@ -133,7 +133,7 @@ pub(crate) struct Document<'s> {
     arrays: Vec<Span>,
     elements: Vec<ValueNode>,
     lists: Vec<Vec<ValueNode>>,
-    /// Hash index of the entries of tables with more than [`MAX_LINEAR`] entries.
+    /// Hash index over the entries of tables that have more than [`MAX_LINEAR`] entries.
     index: HashMap<(TableId, Cow<'s, str>), u32>,
 }
 
@@ -156,7 +156,7 @@ impl<'s> Document<'s> {
         document
     }
 
-    /// Replaces the source with a text that starts with the same text.
+    /// Replaces the source with a longer text that starts with the current source.
     pub(super) fn with_source(self, source: &'s str) -> Self {
         Self { source, ..self }
     }
@@ -219,7 +219,7 @@ impl<'s> Document<'s> {
         }
     }
 
-    /// Appends an entry to a table that does not have the key.
+    /// Appends an entry to a table that does not contain its key.
     pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
         let entry = index(self.entries.len());
         let text = self.add_text(name.span, name.text.clone());
@@ -283,8 +283,8 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// The only value in a table, with its dotted key. `None` if there are several values or if the value has
-    /// a header.
+    /// Returns the only value in a table and its dotted key. `None` if there are several values or if the
+    /// value has a header.
     pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
@@ -302,7 +302,7 @@ impl<'s> Document<'s> {
             .map(|node| (keys, node))
     }
 
-    /// The keys of a table.
+    /// Returns a table's keys.
     pub(super) fn keys(&self, table: TableId) -> Vec<String> {
         Entries { document: self, table }.iter().map(|entry| entry.key.to_owned()).collect()
     }
@@ -313,7 +313,7 @@ impl<'s> Document<'s> {
         if let NodeKind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
     }
 
-    /// The elements of an array or list. Empty for other values.
+    /// Returns the elements of an array or list. Empty for other values.
     pub(super) fn elements_of(&self, kind: NodeKind) -> Vec<ValueNode> {
         let value = Value { document: self, node: ValueNode { span: Span::default(), kind } };
         value.array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
@@ -367,7 +367,7 @@ fn index(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
 
-/// Reference to a value in a document.
+/// A reference to a value in a document.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Value<'d> {
     document: &'d Document<'d>,
@@ -377,9 +377,9 @@ pub(crate) struct Value<'d> {
 /// A decoded value.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum TomlValue<'d> {
-    /// A string without quotes and escapes.
+    /// A decoded string, without quotes or escapes.
     String(&'d str),
-    /// Digits with a sign, without underscores or radix prefix.
+    /// Digits with a sign, but without underscores or a radix prefix.
     Integer { digits: &'d str, radix: u32 },
     /// Text accepted by `f64::from_str`.
     Float(&'d str),
@@ -394,7 +394,7 @@ pub(crate) enum TomlValue<'d> {
 }
 
 impl<'d> Value<'d> {
-    /// Byte range in the source. For a table, the range of the header or the braces.
+    /// Returns the byte range in the source. For a table, this is the range of its header or braces.
     pub(crate) fn span(&self) -> Range<usize> {
         self.node.span.range()
     }
@@ -471,7 +471,7 @@ pub(crate) struct KeyValue<'d> {
 }
 
 impl<'d> Entries<'d> {
-    /// Finds the entry with the given key.
+    /// Finds the entry with this key.
     pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
         self.document.find_entry(self.table, name).map(|entry| self.entry(entry))
     }

@@ -10,7 +10,8 @@ use crate::geometry::SurfacePoint;
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec2, Vec3};
 
-/// Writes the AOV `quantity` at the first hit of each camera ray in the queue, or black if there is no hit.
+/// Evaluates `quantity` at the first hit of each camera ray in the queue and writes the result, or black if
+/// there is no hit.
 pub fn shade_aov(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     quantity: FirstHit,

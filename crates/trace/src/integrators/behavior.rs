@@ -23,7 +23,7 @@ pub struct PathBehavior {
 }
 
 impl PathBehavior {
-    /// Derives the path behavior from the settings and from whether there are photon maps.
+    /// Derives the path behavior from the settings and the presence of photon maps.
     pub fn of(settings: &RenderSettings, has_photons: bool) -> Self {
         let Method { splits, scatters, gathers, .. } = settings.render.integrator.method();
         let gathers = gathers && has_photons;
@@ -45,7 +45,7 @@ impl PathBehavior {
     }
 }
 
-/// Returns how lights are sampled, given the settings and whether photons are gathered.
+/// Determines how lights are sampled, based on the settings and on whether photons are gathered.
 pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
     PathBehavior::of(settings, are_gathered).receivers
 }

@@ -11,7 +11,7 @@ use crate::world::{RayInterval, TreeNode};
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
 
-/// Boxes smaller than this many pixels on screen are not drawn.
+/// Minimum size of a drawn box on screen, in pixels.
 const MIN_BOX_SIZE: f32 = 40.0;
 
 /// Opacity of lines behind surfaces.
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edge_distance_is_the_line_distance() {
+    fn edge_distance_equals_the_distance_between_lines() {
         let cube = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);

@@ -42,11 +42,11 @@ use crate::world::{Hit, PACKET_SIZE};
 /// random.
 const MIN_SPLIT: f32 = 0.01;
 
-/// Number of rays between checks of the cancel token.
+/// Number of rays traced between checks of the cancel token.
 const POLL_INTERVAL: usize = 256;
 
-/// Traces the camera paths of the given slots and adds their radiance to the accumulator. `negative` receives
-/// the first slot of each packet and the mask of samples with a negative filter weight.
+/// Traces the camera paths for a range of slots and adds their radiance to the accumulator. `negative`
+/// receives the first slot of each packet and the mask of samples with a negative filter weight.
 pub fn trace_camera_paths(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     slots: Range<u32>,
@@ -82,7 +82,7 @@ pub fn trace_camera_paths(
             wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
-    // Compute direct lighting at their vertices, and add it to the accumulator.
+    // Compute direct lighting at the vertices, and add it to the accumulator.
     wavefront.add_direct_light()?;
     wavefront.direct.flush_consecutive(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
@@ -245,7 +245,7 @@ impl CameraWavefront<'_, '_> {
         self.begin_bounce();
     }
 
-    /// Shades the hit of one ray in a packet. The path is moved only here because it is large.
+    /// Shades the hit of one ray in a packet. The path is large, so it is moved only here.
     #[inline(never)]
     fn shade(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
         let (tile, bit) = (self.tile, 1 << lane);
@@ -451,7 +451,7 @@ impl CameraWavefront<'_, '_> {
         self.queue_rough(path, vertex, &bsdf, far);
     }
 
-    /// Queues the vertices on a non-specular surface for direct lighting. `far` is the medium behind the
+    /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
     fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &InteriorList) {

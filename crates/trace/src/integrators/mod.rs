@@ -1,4 +1,4 @@
-//! Integrators: render a world's samples for one tile. Rays are processed in batches, as in a wavefront
+//! Integrators, which render a world's samples for one tile. Rays are processed in batches, as in a wavefront
 //! renderer: first a queue of camera rays, then the shadow rays from their hits, then the queue of the next
 //! bounce.
 //!
@@ -6,15 +6,15 @@
 //! table.
 //!
 //! ```text
-//! view, counters      AOVs; counters of rays
+//! view, counters      AOVs; ray counters
 //! settings            render settings
-//! behavior            what paths do at surfaces, from the integrator, the view and photon mapping
-//! transport           rays, hits, packets of vertices; depends on the world, not on integrators or photons
+//! behavior            how paths continue at surfaces, from the integrator, the view and photon mapping
+//! transport           rays, hits, vertex packets; depends on the world, not on integrators or photons
 //! direct              next-event estimation: light samples, shadow rays, MIS weights
 //! photons             photon emission, photon maps, density estimation
-//! memory              buffers that a thread reuses
+//! memory              reused per-thread buffers
 //! camera_paths        paths from the camera, bounce by bounce, for whitted and path
-//! aov, bounds         first-hit AOVs; overlay of bounding boxes
+//! aov, bounds         first-hit AOVs; bounding-box overlay
 //! ```
 
 mod aov;
@@ -48,8 +48,8 @@ pub use view::{AovSource, Components, FirstHit, LightAov, View};
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
 
-/// Renders sample indices `samples` for every pixel in `pixels`. The result depends only on the arguments, so
-/// it does not matter how an image is divided into tiles or its samples into ranges.
+/// Renders the samples with indices `samples` for every pixel in `pixels`. The result depends only on the
+/// arguments, so it does not matter how an image is divided into tiles or its samples into ranges.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled. The token is checked every few hundred rays.
@@ -63,7 +63,7 @@ pub fn render_tile(
     render_tile_with_photons(None, world, settings, pixels, samples, token)
 }
 
-/// Like [`render_tile`], but also gathers photons from the samples' photon maps, if there are any.
+/// Like [`render_tile`], but also gathers photons if the samples have photon maps.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.

@@ -9,7 +9,7 @@ use crate::world::TextureNeeds;
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// The scene's `[render]` settings with this run's overrides.
+    /// The scene's `[render]` settings after this run's overrides.
     pub render: Render,
     /// Whether the lens has an aperture. False for a pinhole camera.
     pub dof: bool,
@@ -24,7 +24,7 @@ pub struct RenderSettings {
 pub struct PhotonSettings {
     /// Photons emitted per pass.
     pub count: u32,
-    /// Kernel radius of the first pass, or 0 to derive it from the photon density.
+    /// First-pass kernel radius, or 0 to derive it from the photon density.
     pub radius: f32,
     /// Maximum number of bounces per photon.
     pub bounces: u32,

@@ -119,7 +119,7 @@ impl AovSource {
     }
 }
 
-/// Quantity that a sample's paths accumulate.
+/// Quantity accumulated along a sample's paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightAov {
     /// Radiance of these components.

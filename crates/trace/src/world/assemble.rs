@@ -66,7 +66,7 @@ fn find_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
     GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
-/// Whether each object's vertex colors are used. `None` if they are not used for any object.
+/// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
 fn uses_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);

@@ -33,8 +33,8 @@ pub struct CompoundSolid {
 }
 
 impl World {
-    /// Glass around a point on the lens: closed shapes that contain the point, and other solids that contain
-    /// the camera. Each has its material.
+    /// Glass around a point on the lens, with its materials: closed shapes that contain the point, and other
+    /// solids that contain the camera.
     pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -49,7 +49,7 @@ impl World {
         self.lens_glass.is_empty() && self.camera_solids.is_empty()
     }
 
-    /// Closed glass shapes whose bounding boxes overlap the lens, and the materials of these shapes.
+    /// Closed glass shapes whose bounding boxes overlap the lens, with their materials.
     pub(super) fn find_lens_glass(&self) -> Vec<(u32, u32)> {
         let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
         let lens = Aabb { min: eye, max: eye }.expanded(lens + eye.abs() * f32::EPSILON);
@@ -62,7 +62,7 @@ impl World {
         near.collect()
     }
 
-    /// Other glass solids that contain the camera, and the material of each at the camera.
+    /// Other glass solids that contain the camera, each with its material at the camera.
     pub(super) fn find_camera_solids(&self) -> Vec<(u32, u32)> {
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };

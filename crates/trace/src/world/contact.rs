@@ -14,11 +14,11 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
 
-/// Maximum number of recorded solids around a ray. The last solids in file order are recorded.
+/// Maximum number of recorded solids around a ray. Only the last solids in file order are recorded.
 pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
-/// the same point have no effect at this point.
+/// the same point have no effect there.
 pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on each side of coincident surfaces.
@@ -80,7 +80,7 @@ pub struct CoincidenceQuery<'a> {
     pub lead: f32,
 }
 
-/// The offset points, and the point in front of the surfaces without the `lead` distance.
+/// The offset points, and the near point without the added `lead` distance.
 #[derive(Clone, Copy)]
 struct CoincidenceProbe {
     sides: OffsetPoints,

@@ -1,7 +1,7 @@
 //! Handles lights that are coplanar with other surfaces.
 //!
-//! For two surfaces in one plane, rounding determines which surface a ray hits first. Path rays might hit a
-//! coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of the
+//! If two surfaces are in one plane, rounding determines which surface a ray hits first. Path rays might hit
+//! a coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of the
 //! light's contribution would disagree. Coplanar lights are therefore moved off the plane by a tiny distance,
 //! toward the side to which they emit.
 
@@ -21,10 +21,10 @@ const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
 /// Lift relative to the size of the light and its surroundings: well above `f32` rounding errors, but too
 /// small to be visible.
 pub(super) const LIFT: f64 = 1.0 / (1 << 16) as f64;
-/// Error of the plane of a mesh face, relative to its coordinates: several times the `f32` rounding error of
+/// Error in the plane of a mesh face, relative to its coordinates: several times the `f32` rounding error of
 /// the corners.
 pub(super) const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
-/// Maximum deviation of the cosine between lifts in the same direction from 1.
+/// Two lifts have the same direction if the cosine between them differs from 1 by at most this value.
 const SAME_DIRECTION: f64 = 1e-5;
 /// Maximum size of a light's surroundings, relative to the light's size.
 pub(super) const SURROUNDINGS: f64 = 16.0;
@@ -38,8 +38,8 @@ pub struct CoplanarLight {
     pub light: usize,
     /// The overlapped object, equal to `light` if both faces belong to one mesh.
     pub surface: usize,
-    /// Translation that moves the light off the surface. `None` if the surface emits toward the same side:
-    /// the overlap stays, and both emit there.
+    /// Translation that moves the light off the surface. `None` if the surface emits toward the same side.
+    /// The overlap then remains, and both surfaces emit.
     pub lift: Option<DVec3>,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct FlatFace {
     /// Unit normal on the front side.
     pub(super) normal: DVec3,
     emits: Option<EmissionSides>,
-    /// Bound on the distance of the traced face from its plane.
+    /// Upper bound on the distance between the traced face and its plane.
     pub(super) rounding: f64,
 }
 
@@ -75,8 +75,8 @@ impl FlatFace {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
     }
 
-    /// Whether two faces are one face, or repeated in a mesh. Repeated faces emit once; see
-    /// [`with_distinct_lights`](super::with_distinct_lights).
+    /// Whether two faces are identical, or are duplicates within one mesh. Duplicate faces emit only once;
+    /// see [`with_distinct_lights`](super::with_distinct_lights).
     fn is_same(&self, other: &Self) -> bool {
         self.object == other.object
             && self.corners.iter().all(|corner| other.corners.contains(corner))
@@ -175,7 +175,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
             }
             for light in lights.near(face, &mut pairs) {
                 let is_lifted = must_lift(light, face);
-                // Report lights that are counted twice only once.
+                // Report each overlap of two lights only once.
                 let is_reported = is_lifted
                     || face.object <= light.object && !must_lift(face, light) && !light.is_same(face);
                 if is_reported && are_coplanar_and_overlap(light, face) {
@@ -187,12 +187,12 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     found.into_values().flatten().collect()
 }
 
-/// Whether two boxes, given as minimum and maximum corners, are disjoint.
+/// Whether two boxes are disjoint. Boxes are pairs of minimum and maximum corners.
 fn are_boxes_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
-/// Translation of each object, which moves lights off coplanar surfaces. Empty if no lights need to be moved.
+/// Translations that move lights off coplanar surfaces, one per object. Empty if no lights need to be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
     let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
     let found = coplanar_lights(scene, &loaded, origin).into_iter();
@@ -215,8 +215,8 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     lifts
 }
 
-/// Adds a light and the surface that it overlaps. If the pair exists, updates its lift in this direction to
-/// the maximum over all faces. The lift is above the rounding error of both faces.
+/// Adds a light and the surface that it overlaps. If the pair already exists, updates its lift in this
+/// direction to the maximum over all faces. The lift is above the rounding error of both faces.
 fn add_coplanar_pair(
     found: &mut BTreeMap<(usize, usize), Vec<CoplanarLight>>,
     (light, face): (&FlatFace, &FlatFace),

@@ -39,12 +39,12 @@ fn loaded() -> LoadedMesh {
     LoadedMesh { mesh: square(), ..LoadedMesh::default() }
 }
 
-/// Lights that are lifted off a surface, and the surface.
+/// Each light that is lifted off a surface, paired with the surface.
 fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
     found(scene, true)
 }
 
-/// Lights that overlap another light, and the other light.
+/// Each light that overlaps another light, paired with the other light.
 fn doubled(scene: &Scene) -> Vec<(usize, usize)> {
     found(scene, false)
 }
@@ -155,7 +155,7 @@ fn overlapping_faces_of_one_light_are_reported() {
             .collect::<Vec<_>>()
     };
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3]]), []);
-    // The other diagonal, and one more triangle.
+    // Add both triangles of a split along the other diagonal, and then only one of them.
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]]), [(0, 0)]);
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3]]), [(0, 0)]);
     // Repeated faces emit once, and reversed faces are moved apart.
@@ -164,7 +164,7 @@ fn overlapping_faces_of_one_light_are_reported() {
 }
 
 #[test]
-fn repeated_faces_are_hit_as_the_first() {
+fn rays_hit_the_first_of_repeated_faces() {
     let mut next = random(13);
     for triangles in
         [vec![[0, 1, 2], [0, 2, 3], [1, 2, 0], [3, 0, 2]], vec![[0, 1, 2], [0, 2, 3], [6, 4, 5], [6, 7, 4]]]
@@ -189,9 +189,9 @@ fn repeated_faces_are_hit_as_the_first() {
 }
 
 #[test]
-fn faces_of_both_directions_are_hit_from_their_front() {
+fn opposite_faces_are_hit_from_their_fronts() {
     let mut next = random(14);
-    // Reversed triangles, and reversed triangles with the other diagonal.
+    // Reversed triangles with the same diagonal, and reversed triangles with the other diagonal.
     for reversed in [[[2, 1, 0], [3, 2, 0]], [[3, 2, 1], [3, 1, 0]]] {
         for _ in 0..100 {
             let mut vector = || DVec3::new(next().into(), next().into(), next().into());
@@ -234,7 +234,7 @@ fn lights_far_from_the_origin_are_lifted() {
                 let [u, v] =
                     [i % (cells + 1), i / (cells + 1)].map(|i| f64::from(i) / f64::from(cells) * 2.0 - 1.0);
                 let place = at + x * (shift[0] + u * half) + y * (shift[1] + v * half);
-                // Files usually have few decimals.
+                // Coordinates in files usually have few decimals.
                 (place * 1e6).round() * 1e-6
             };
             let corners: Vec<DVec3> = (0..(cells + 1) * (cells + 1)).map(corner).collect();

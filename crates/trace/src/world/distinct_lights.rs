@@ -26,8 +26,9 @@ pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
     emissive
 }
 
-/// Returns a copy of the mesh in which rays hit, see and sample coincident emissive triangles alike. `None` if
-/// there are no such triangles. If `all_emit` is false, the file's materials determine the emissive triangles.
+/// Returns a copy of the mesh in which camera rays, shadow rays and light samples agree on which coincident
+/// emissive triangle they reach. `None` if there are no such triangles. If `all_emit` is false, the file's
+/// materials determine the emissive triangles.
 pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
     if !all_emit && !loaded.materials.iter().any(FileMaterial::emits) {
         return None;
@@ -52,8 +53,8 @@ pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<Loade
     }
 }
 
-/// Emissive triangles with the same corners and orientation as an earlier one, and the rotation that gives
-/// their corners the same order.
+/// Emissive triangles with the same corners and orientation as an earlier triangle, and the rotation that
+/// gives their corners the same order.
 pub(super) fn repeated_triangles(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
@@ -70,7 +71,8 @@ pub(super) fn repeated_triangles(
     })
 }
 
-/// Emissive triangles to move off the plane of other faces, with their normals, and the distance.
+/// Finds the emissive triangles that must be moved off the plane of other faces. Returns their normals and
+/// the distance to move them.
 fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeMap<usize, DVec3>, f64) {
     let reach =
         |face: &FlatFace| face.corners.iter().fold(0.0, |most: f64, at| most.max(at.abs().max_element()));
@@ -90,7 +92,7 @@ fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeM
         for light in lights.near(&other, &mut pairs) {
             if (!is_light || light.faces_against(&other)) && are_coplanar_and_overlap(light, &other) {
                 found.insert(light.object, light.normal);
-                // A light that consists of two sheets is seen from far away, relative to its size.
+                // A light that consists of two sheets may be seen from a distance much greater than its size.
                 sizes = if is_light { SURROUNDINGS } else { sizes };
             }
         }
@@ -99,7 +101,7 @@ fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeM
     (found, LIFT * greatest)
 }
 
-/// Moves triangles along the given directions. Gives them separate vertices.
+/// Moves triangles along these directions. The moved triangles get separate vertices.
 fn lift(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
     let mut known = HashMap::new();
     for (triangle, normal) in lifts {

@@ -146,7 +146,7 @@ impl EmissiveMaterial {
         }
     }
 
-    /// Scales light bounds by the mean of the emission and opacity textures.
+    /// Scales light bounds by the means of the emission and opacity textures.
     fn scaled_by_mean(&self, bounds: LightBounds) -> LightBounds {
         let texture = self.emission.texture.as_ref();
         let bounds = texture.map_or(bounds, |texture| bounds.scaled_by(texture.mean()));
@@ -204,7 +204,7 @@ fn mesh_lights(
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
-    // A repeated face emits only once, like the first, which rays hit.
+    // Rays always hit the first of several repeated faces, so only the first face emits.
     let emits = |id: u32| {
         let own = |index: &u32| all.get(*index as usize).is_some_and(|(_, own)| !own.sides().is_empty());
         if emissive.is_some() { true } else { loaded.mesh.materials.get(id as usize).is_some_and(own) }

@@ -39,7 +39,7 @@ pub struct Geometry {
     mesh_rounding: f32,
     /// Cache of isolated surface regions.
     isolated: IsolationCache,
-    /// Translation of each object. Empty if no objects are moved.
+    /// One translation per object. Empty if no objects are moved.
     lifts: Vec<DVec3>,
     instructions: InstructionSet,
 }
@@ -85,7 +85,7 @@ impl Geometry {
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
-    /// Translation of each object; see [`super::coplanar_lights`]. Empty if no objects are moved.
+    /// One translation per object; see [`super::coplanar_lights`]. Empty if no objects are moved.
     pub fn lifts(&self) -> &[DVec3] {
         &self.lifts
     }
@@ -149,8 +149,8 @@ impl Geometry {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// Returns the merged meshes if `id`, an id from [`Geometry::traced_tree`], represents them. `None` if
-    /// `id` is an object.
+    /// Returns the merged meshes if they are represented by `id`, which is an id from
+    /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -338,14 +338,14 @@ impl Geometry {
         self.objects[hit.object as usize].mesh()?.second_parameterization(&hit.shape)
     }
 
-    /// Memory use of the objects and the trees over them in bytes, excluding per-mesh trees.
+    /// Memory used by the objects and the trees over them, in bytes. Excludes per-mesh trees.
     pub fn own_memory_bytes(&self) -> usize {
         let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }
 
-    /// Memory use of all trees in bytes. Each mesh tree is counted once.
+    /// Memory used by all trees, in bytes. Each mesh tree is counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());
@@ -359,7 +359,7 @@ impl Geometry {
     }
 }
 
-/// Shell of an object with this bounding box.
+/// Shell around an object with this bounding box.
 fn shell(object: &Object, bounds: &Aabb) -> Shell {
     match object {
         Object::Shape(Shape::Sphere(sphere)) => Shell::sphere(sphere.center, sphere.radius),
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn ignoring_the_start_triangle_keeps_hits() {
+    fn ignoring_the_start_triangle_preserves_hits() {
         let geometry = geometry();
         let mut next = random(5);
         let (mut started, mut hits) = (0, [0; 5]);

@@ -2,8 +2,8 @@
 //! search for coincident surfaces.
 //!
 //! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached
-//! in one byte. The state depends only on the geometry, not on the order of rays. With the cache,
-//! [`World::find_coincident_surfaces`](super::World::find_coincident_surfaces) returns the same result as with a search.
+//! in one byte. The state depends only on the geometry, not on the order of rays. The cache does not change
+//! the results of [`World::find_coincident_surfaces`](super::World::find_coincident_surfaces).
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -23,7 +23,7 @@ const NEVER: u8 = u8::MAX;
 /// STATE_STEPS` are isolated.
 const STATE_STEPS: f32 = 256.0;
 
-/// Largest state that is tested for a triangle.
+/// Largest state tried for a triangle.
 const MAX_STATE: f64 = 64.0;
 
 /// Distance from a triangle's edges to its isolated part, in margins. At this distance, neighbors at angles
@@ -194,7 +194,7 @@ impl Geometry {
         NEVER
     }
 
-    /// Whether no other objects are near a region. Objects near the region must overlap `around`.
+    /// Whether no other objects are near a region. Every object near the region must overlap `around`.
     fn has_no_neighbors(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_is_near(shape, around, region),

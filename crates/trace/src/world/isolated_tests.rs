@@ -295,7 +295,7 @@ fn isolated_regions_match_the_full_search() {
 #[test]
 fn nested_sphere_search_takes_log_squared_time() {
     for count in [100_u32, 400, 1600, 6400] {
-        // The file order differs from the order of radii. Some spheres are matte.
+        // The file order differs from the radius order. Some spheres are matte.
         let radius = |i: u32| 1.0 + f64::from(i * 37 % count) / f64::from(count);
         let globe = |i: u32| Shape::Sphere { center: v(0.1, 0.2, 0.3), radius: radius(i) };
         let material = |i: u32| [1, 2, 1, 2, 0][i as usize % 5];

@@ -346,8 +346,8 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
     }))
 }
 
-/// Returns a loaded image, or a placeholder if the image was not loaded. Only materials without objects,
-/// which are never looked up, refer to such images.
+/// Returns a loaded image, or a placeholder if the image was not loaded. Such images are used only by
+/// materials without objects, which are never looked up.
 fn loaded_image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

@@ -1,4 +1,4 @@
-//! Small meshes merged into one tree, so that a ray that passes many of them traverses only one tree. If
+//! Small meshes merged into one tree, so that a ray that crosses many of them traverses only one tree. If
 //! there are few triangles in total, packets test them using a [`TriangleList`] without a tree.
 //!
 //! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
@@ -255,7 +255,7 @@ impl MergedMeshes {
         self.tree.any_packet(&rays, ends, &own)
     }
 
-    /// Memory use of the tree and its tables in bytes.
+    /// Memory used by the tree and its tables, in bytes.
     pub fn memory_bytes(&self) -> usize {
         let facets = self.facets.as_ref().map_or(0, TriangleList::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
@@ -281,8 +281,8 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
     simd.movemask(&differs) & met == 0
 }
 
-/// Coherence threshold: maximum difference of ray origins relative to the size of all triangles, and of
-/// directions relative to their length.
+/// Coherence threshold: maximum difference between ray origins relative to the size of all triangles, and
+/// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
 /// Calls [`TriangleList::closest`] for incoherent rays. Returns the lanes that need an exact test, or `None`
@@ -505,7 +505,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn rays_leaving_merged_meshes_do_not_hit_again() {
+    fn rays_do_not_hit_their_starting_triangle() {
         let tree = fans();
         let turned = |degrees: DVec3, at: DVec3| {
             Transform::scale_rotate_translate(DVec3::new(1.0, 3.0, 0.7), degrees, at)

@@ -124,7 +124,7 @@ impl MeshInstance {
         corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
-    /// Vertex UVs in the given set. Falls back to the first set if there is no second set.
+    /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
     pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
@@ -326,7 +326,7 @@ mod tests {
     use crate::scene::description::Accel;
 
     #[test]
-    fn transformed_points_are_within_their_error() {
+    fn transformed_points_are_within_their_error_bounds() {
         let mut next = random(23);
         let mut vector = || DVec3::from_array(std::array::from_fn(|_| f64::from(next())));
         let mesh = TriangleMesh {

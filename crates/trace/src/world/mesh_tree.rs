@@ -21,7 +21,7 @@ pub struct MeshTree {
 }
 
 impl MeshTree {
-    /// Builds a tree of the given type.
+    /// Builds a tree of this type over the mesh.
     pub fn build(loaded: Arc<LoadedMesh>, accel: Accel, token: &CancelToken) -> Result<Self, Cancelled> {
         let mesh = &loaded.mesh;
         let (count, corners) = (mesh.triangles.len() as u32, |id| mesh.corners(id));
@@ -39,7 +39,7 @@ impl MeshTree {
         &self.tree
     }
 
-    /// Type of the tree.
+    /// Tree type.
     pub fn accel(&self) -> Accel {
         self.accel
     }
@@ -49,8 +49,8 @@ impl MeshTree {
         self.tree.bounds()
     }
 
-    /// Vertex normals from the file, or computed normals. Returns immediately after
-    /// [`MeshTree::prepare_normals`].
+    /// Vertex normals from the file, or computed normals. Returns immediately if
+    /// [`MeshTree::prepare_normals`] has already been called.
     pub fn normals(&self) -> &[Vec3] {
         if !self.loaded.mesh.normals.is_empty() {
             return &self.loaded.mesh.normals;
@@ -69,7 +69,7 @@ impl MeshTree {
         Ok(())
     }
 
-    /// Memory use of the tree in bytes, including its copy of the triangles.
+    /// Memory used by the tree, in bytes, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         self.tree.memory_bytes()
     }

@@ -63,7 +63,7 @@ use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint
 use crate::math::Vec3;
 use crate::scene::description;
 
-/// Decoded images of a scene, indexed by source.
+/// A scene's decoded images, indexed by source.
 pub type Images = HashMap<TextureSource, Image>;
 
 /// A decoded image.
@@ -119,17 +119,17 @@ pub struct World {
     has_rough_glass: bool,
     /// Whether each object represents a closed glass solid that contains no light. Empty without rough glass.
     unlit_glass: Box<[bool]>,
-    /// Closed glass shapes that may contain points on the lens, and the materials of these shapes.
+    /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
     enclosing_glass: Box<[contact::EnclosingGlass]>,
-    /// Other glass solids that contain the camera, and the materials of these solids.
+    /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
-    /// Whether each object's vertex colors are used. `None` if they are not used for any object.
+    /// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
     colored: Option<Box<[bool]>>,
     /// Objects that light may pass through without changing direction. `None` if there are none.
     see_through: Option<Box<null_interaction::SeeThroughObjects>>,
@@ -144,7 +144,7 @@ enum ObjectMaterial {
     OfFile {
         /// Index of the file's first material in [`World::materials`].
         first: u32,
-        /// Material of triangles without a material in the file.
+        /// Material for triangles without a material in the file.
         fallback: u32,
     },
 }
@@ -287,7 +287,7 @@ impl World {
         self.geometry.objects().len() as u64
     }
 
-    /// Memory use of all acceleration structures in bytes. Shared structures are counted once.
+    /// Memory used by all acceleration structures, in bytes. Shared structures are counted once.
     pub fn accel_memory_bytes(&self) -> usize {
         self.geometry.memory_bytes()
     }

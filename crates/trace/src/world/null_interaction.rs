@@ -78,8 +78,8 @@ impl World {
         self.see_through.is_some()
     }
 
-    /// Transmittance along each shadow ray in a packet. `sources` contains the light of each ray, and
-    /// `traced` is the mask of rays to trace.
+    /// Transmittance along each shadow ray in a packet. `sources` contains each ray's light, and `traced` is
+    /// the mask of rays to trace.
     #[cold]
     #[inline(never)]
     pub fn transmittance_packet(
@@ -110,7 +110,7 @@ impl World {
         self.see_through_transmittance(see_through, ray, source, lookups)
     }
 
-    /// Transmittance of the surface at a hit, and the ray continued beyond it.
+    /// Transmittance of the surface at a hit, and the ray's continuation beyond the surface.
     pub fn continue_past(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];

@@ -1,4 +1,4 @@
-//! Traces packets of up to 16 rays. Each ray has the same hit as without a packet.
+//! Traces packets of up to 16 rays. Each ray has the same hit as if it were traced alone.
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
@@ -215,7 +215,7 @@ pub(super) struct Occluders<'a, F> {
 }
 
 impl<'a, F: Simd> Occluders<'a, F> {
-    /// Creates the test for a packet of shadow rays, given the light of each ray.
+    /// Creates the test for a packet of shadow rays to these lights.
     #[inline(always)]
     pub(super) fn new(
         geometry: &'a Geometry,

@@ -58,7 +58,7 @@ impl HostileRandom {
     }
 }
 
-/// Shapes of the given size: one axis-aligned and one tilted shape of each kind.
+/// One axis-aligned and one tilted shape of each kind, all of this size.
 fn shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
@@ -127,7 +127,7 @@ fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; P
         hits = 0;
         for lane in 0..PACKET_SIZE {
             let alone = alone(lane);
-            let what = || format!("{instructions:?}, {lane} of {rays:?} at {object:?}");
+            let what = || format!("{instructions:?}: lane {lane} of {rays:?} at {object:?}");
             assert_eq!(found.get(lane).map(bits), alone.map(bits), "{}", what());
             assert_eq!(any_part & 1 << lane != 0, alone.is_some(), "{}", what());
             let own = if except.0 & 1 << lane == 0 { None } else { Some(except.1[lane]) };
@@ -164,7 +164,10 @@ fn packet_and_single_hits_are_bit_identical() {
                 assert_packet(&object, &rays, met, except);
                 rays_in_all += rays.len();
             }
-            assert!(hits > rays_in_all / 100 && hits < rays_in_all, "{hits} of {rays_in_all}: {object:?}");
+            assert!(
+                hits > rays_in_all / 100 && hits < rays_in_all,
+                "{hits} hits for {rays_in_all} rays: {object:?}"
+            );
         }
     }
 }

@@ -9,8 +9,8 @@ pub trait MeshPlacement: Copy {
     /// Transforms a point to world coordinates.
     fn point(self, local: DVec3) -> DVec3;
 
-    /// Bounds the absolute components of a transformed direction, given bounds on its components in mesh
-    /// coordinates.
+    /// Bounds the absolute components of a direction in world coordinates. `local` contains bounds on its
+    /// components in mesh coordinates.
     fn abs_bound(self, local: DVec3) -> DVec3;
 
     /// Transforms a normal. The result is not normalized.

@@ -28,8 +28,8 @@ impl Geometry {
         }
     }
 
-    /// Traversal cost of a ray: the number of boxes intersected, plus the numbers of shapes in the
-    /// intersected leaves and of infinite objects.
+    /// Traversal cost of a ray: the number of intersected boxes, plus the number of shapes in intersected
+    /// leaves, plus the number of infinite objects.
     pub fn traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
         self.visit_nodes(ray, |_, cell, _| {

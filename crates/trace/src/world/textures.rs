@@ -15,7 +15,7 @@ use crate::scene::description::{
 /// An image file and its encoding.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TextureSource {
-    /// Path of the file.
+    /// File path.
     pub path: PathBuf,
     /// Index of the image in a glTF file. `None` for image files.
     pub image: Option<u32>,
@@ -30,7 +30,8 @@ pub struct TextureSource {
 pub struct CutoffBits(u32);
 
 impl CutoffBits {
-    /// Converts a cutoff for opacity to a cutoff for pixel values, given the image's factor.
+    /// Converts a cutoff for opacity to a cutoff for pixel values. `factor` is the factor applied to the
+    /// image.
     pub fn new(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
     }
@@ -54,7 +55,7 @@ pub struct NeededTexture {
     pub mesh_file: Option<usize>,
     /// Name of the mesh file's material that refers to the image. `None` for other textures.
     pub material: Option<String>,
-    /// Line of the MTL file that refers to the image. `None` for other textures.
+    /// Line in the MTL file that refers to the image. `None` for other textures.
     pub statement: Option<FileLine>,
     /// Name of a material that uses the image as a normal map. `None` if there is no such material.
     pub normals_of: Option<String>,
@@ -65,7 +66,7 @@ pub struct NeededTexture {
 }
 
 impl NeededTexture {
-    /// Image of an environment map.
+    /// The image used as the environment map.
     pub fn of_environment(file: &Path) -> Self {
         Self {
             source: environment_map(file),
@@ -239,7 +240,7 @@ fn materials_in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
-/// Image file and encoding of a scene material's texture in this role.
+/// Image file and encoding for a scene material's texture in this role.
 pub fn material_source(
     scene: &Scene,
     material: &Material,
@@ -296,7 +297,7 @@ fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
         .any(|(other, role)| role.texture_use() == TextureUse::Color && image(other) == image(texture))
 }
 
-/// Whether two textures are the same image with the same texture coordinates.
+/// Whether two textures use the same image with the same texture coordinates.
 fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
     let [a, b] = [a, b].map(|texture| &scene.textures[texture]);
     let at = |texture: &crate::scene::description::Texture| {
@@ -305,7 +306,7 @@ fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
     a.file.value == b.file.value && at(a) == at(b)
 }
 
-/// Image file and encoding of a scene texture for this use.
+/// Image file and encoding for a scene texture with this use.
 pub fn scene_texture_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
@@ -325,7 +326,7 @@ pub fn scene_texture_source(scene: &Scene, texture: usize, used: TextureUse) -> 
     TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
 }
 
-/// Image file and encoding of a mesh file's texture for this use.
+/// Image file and encoding for a mesh file's texture with this use.
 pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
@@ -339,7 +340,7 @@ pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
 /// How textures from mesh files are used as scalar parameters.
 pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelValue::Luminance);
 
-/// How a color texture of a mesh file material is used.
+/// How a mesh file material's color texture is used.
 pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
         None | Some(PixelValue::Opacity | PixelValue::Channel(Channel::Alpha)) => true,
@@ -350,7 +351,7 @@ pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
 }
 
-/// How the opacity texture of a mesh file material is used.
+/// How a mesh file material's opacity texture is used.
 pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
@@ -398,7 +399,7 @@ mod tests {
 
     use super::*;
 
-    /// Texture uses of a material, in role order.
+    /// How a material uses its textures, in role order.
     fn uses(material: &str) -> Vec<TextureUse> {
         let text = format!(
             "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n\

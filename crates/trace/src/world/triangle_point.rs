@@ -13,7 +13,7 @@ pub(super) struct TrianglePoint {
     local: DVec3,
     /// The point in world coordinates.
     pub(super) point: Vec3,
-    /// Error bound of the point; see [`SurfacePoint::error`](crate::geometry::SurfacePoint::error).
+    /// Error bound for the point; see [`SurfacePoint::error`](crate::geometry::SurfacePoint::error).
     pub(super) error: Vec3,
     /// Geometric normal; see [`SurfacePoint::normal`](crate::geometry::SurfacePoint::normal).
     pub(super) normal: Vec3,

@@ -17,7 +17,7 @@ pub enum TriangleTree {
 }
 
 impl TriangleTree {
-    /// Builds a tree of the given type over `count` triangles.
+    /// Builds a tree of this type over `count` triangles.
     pub fn build(
         accel: Accel,
         count: u32,
@@ -39,7 +39,7 @@ impl TriangleTree {
         }
     }
 
-    /// Memory use of the tree in bytes, including its copy of the triangles.
+    /// Memory used by the tree, in bytes, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         match self {
             Self::Boxes(tree) => tree.memory_bytes(),
@@ -89,7 +89,8 @@ impl TriangleTree {
         }
     }
 
-    /// Finds the nearest hits of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays within their ends.
+    /// Finds the nearest hits of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays. Each ray ends at
+    /// its entry in `ends`.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         match self {
             Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
@@ -103,7 +104,7 @@ impl TriangleTree {
     }
 
     /// Returns the mask of rays, up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE), that hit a triangle before
-    /// their ends. Each ray ignores its triangle in `except`, which may be empty.
+    /// they end. Each ray ignores its triangle in `except`, which may be empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         match self {
             Self::Boxes(tree) => tree.any_packet(rays, ends, except),

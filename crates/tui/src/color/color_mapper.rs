@@ -11,18 +11,18 @@ use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
 use ratatui::style::Color;
 
-/// How strongly dithering favors inks near the wanted color on 256-color and 16-color terminals.
+/// How strongly dithering favors inks close to the target color on 256-color and 16-color terminals.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// How strongly dithering favors inks near the wanted color in cells whose two halves are drawn separately.
+/// How strongly dithering favors inks close to the target color in cells whose halves are drawn separately.
 const CALM_EDGES: f32 = 200.0;
-/// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, their mean
-/// color is mixed using shade characters.
+/// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, a shade
+/// character approximates their mean color.
 const EDGE: f32 = 0.01;
 /// Fraction of the cell that each shade character fills with the foreground color.
 const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 
-/// A cell to draw: a tile and the colors of its two parts.
+/// A tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MappedCell {
     pub(crate) tile: Tile,
@@ -72,7 +72,7 @@ impl ColorMapper {
         shades
     }
 
-    /// The terminal color that approximates a color at this pixel position.
+    /// Returns the terminal color to draw for an sRGB color at this pixel position.
     pub(crate) fn map_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
         let index = || self.plain.borrow_mut().ink_index(rgb, threshold(x, y));
         match self.depth {
@@ -83,7 +83,7 @@ impl ColorMapper {
         }
     }
 
-    /// The cell to draw at this column and row of the preview.
+    /// Returns the cell to draw at this column and row of the preview.
     pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> MappedCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
@@ -110,7 +110,7 @@ impl ColorMapper {
     }
 }
 
-/// All single colors, followed by all pairs of colors combined with each shade character.
+/// Returns all single colors, followed by every pair of colors mixed with each shade character.
 fn color_pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn gray_between_ansi_colors_is_mixed_from_grays() {
+    fn intermediate_gray_is_mixed_from_ansi_grays() {
         let shades = ColorMapper::new(ColorDepth::Ansi16, &XTERM);
         for place in 0..64 {
             let MappedCell { pair, .. } = cell(&shades, [70; 3], place % 8, place / 8);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_use_halves_and_reported_ansi_colors() {
+    fn edges_are_drawn_as_halves_in_reported_colors() {
         let mut ansi = XTERM;
         ansi[1] = [150, 75, 50];
         let shades = ColorMapper::new(ColorDepth::Ansi16, &ansi);

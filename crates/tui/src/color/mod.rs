@@ -1,4 +1,4 @@
-//! Terminal colors, and how they approximate sRGB colors.
+//! Terminal colors and their use in approximating sRGB colors.
 
 mod bayer;
 mod color_mapper;
@@ -47,7 +47,7 @@ pub enum ColorDepth {
     None,
 }
 
-/// Resolves the user's choice, using environment variables for `Auto`.
+/// Resolves the user's choice, consulting environment variables for `Auto`.
 pub(super) fn resolve_depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     match choice {
         ColorChoice::TrueColor => ColorDepth::TrueColor,
@@ -92,7 +92,7 @@ fn is_true_color(term: &str, program: &str) -> bool {
         || TerminalBrand::from_program(program).is_some_and(TerminalBrand::supports_true_color_and_rep)
 }
 
-/// Whether `COLORFGBG` (set by rxvt and some others) indicates a light background.
+/// Whether `COLORFGBG` (set by rxvt and some other terminals) indicates a light background.
 pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) -> bool {
     let last = variable("COLORFGBG").and_then(|colors| colors.rsplit(';').next()?.parse::<u8>().ok());
     last.is_some_and(|index| index == 7 || (9..16).contains(&index))

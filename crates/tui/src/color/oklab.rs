@@ -9,7 +9,8 @@ const CONES: [Vec3; 3] = [
     Vec3::new(0.211_903_5, 0.680_699_5, 0.107_396_96),
     Vec3::new(0.088_302_46, 0.281_718_85, 0.629_978_7),
 ];
-/// Matrix from the cube roots of the cone responses to lightness, green–red and blue–yellow.
+/// Matrix from the cube roots of the cone responses to Oklab's lightness, green–red and blue–yellow
+/// coordinates.
 const LAB: [Vec3; 3] = [
     Vec3::new(0.210_454_26, 0.793_617_8, -0.004_072_047),
     Vec3::new(1.977_998_5, -2.428_592_2, 0.450_593_7),
@@ -26,12 +27,12 @@ pub(crate) fn oklab(linear: Vec3) -> Vec3 {
     multiply_matrix(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
-/// Derivative of Oklab with respect to linear light, bounded artificially near black, where it diverges.
+/// Derivative of Oklab with respect to linear light, artificially bounded near black, where it would diverge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OklabDerivative(Vec3);
 
 impl OklabDerivative {
-    /// The derivative at a linear color.
+    /// Computes the derivative at a linear color.
     pub(super) fn at(linear: Vec3) -> Self {
         const DARK: f32 = 0.01;
         let cones = multiply_matrix(CONES, linear.max(Vec3::ZERO));
@@ -41,7 +42,7 @@ impl OklabDerivative {
         })))
     }
 
-    /// Change in Oklab for a small change in linear light.
+    /// Returns the change in Oklab caused by a small change in linear light.
     pub(super) fn change(self, linear: Vec3) -> Vec3 {
         multiply_matrix(LAB, self.0 * multiply_matrix(CONES, linear))
     }

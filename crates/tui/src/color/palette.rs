@@ -1,4 +1,4 @@
-//! Terminal palettes: the 16 ANSI colors, and xterm's cube and grays.
+//! Terminal palettes: the 16 ANSI colors, plus xterm's color cube and grays.
 
 use ratatui::style::Color;
 
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn nearest_256_is_close_to_optimal() {
+    fn nearest_palette_color_is_close_to_optimal() {
         let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed_color).collect();
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {

@@ -3,8 +3,8 @@
 use super::bayer::threshold;
 use super::recipes::{Ink, PatternDither};
 
-/// How strongly dithering favors palette colors near the wanted color if the palette is computed from the
-/// image.
+/// How strongly dithering favors palette colors close to the target color. Applies to palettes computed from
+/// an image.
 const CALM: f32 = 1.0;
 
 /// A ditherer for one palette.
@@ -17,7 +17,7 @@ impl PaletteDither {
         Self(PatternDither::new(colors.iter().copied().map(Ink::solid).collect(), CALM))
     }
 
-    /// Index of the palette color to use for `rgb` at this pixel.
+    /// Returns the index of the palette color to use for `rgb` at this pixel.
     pub(crate) fn index_at(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
         self.0.ink_index(rgb, threshold(x, y))
     }

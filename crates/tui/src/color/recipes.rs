@@ -1,9 +1,9 @@
 //! Dithering recipes, which approximate a color by mixing palette colors ("inks").
 //!
-//! A recipe is a list of [`PARTS`] inks whose mean in linear light approximates the color. Inks close to the
-//! color are preferred. The error of each ink is carried over to the next in Oklab, linearized at the color
-//! (after J. Yliluoma and T. Knoll, "pattern dithering"). The list is sorted by lightness and the dither
-//! threshold selects an entry, so the result depends only on the color and the pixel position.
+//! A recipe is a list of [`PARTS`] inks whose mean in linear light approximates the color. Inks close to that
+//! color are preferred. Each ink's error is carried over to the next ink, in an Oklab space linearized at the
+//! color (after J. Yliluoma and T. Knoll, "pattern dithering"). The list is sorted by lightness and the
+//! dither threshold selects an entry, so the result depends only on the color and the pixel position.
 
 use std::collections::HashMap;
 
@@ -23,7 +23,7 @@ const MAX_RECIPES: usize = 1 << 16;
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// Mean squared distance of a pattern's two colors from their mean. Zero for solid colors.
+    /// Mean squared distance from a pattern's two colors to their mean. Zero for solid colors.
     texture: f32,
 }
 
@@ -34,9 +34,11 @@ impl Ink {
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
-    /// Creates an ink from a fine pattern in which `front` covers a fraction `share` of `back`.
+    /// Creates an ink from a fine pattern of `front` over `back`. `share` is the fraction of the area covered
+    /// by `front`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
-        /// Texture weight of a pattern within a cell, which is less visible than a pattern of whole cells.
+        /// Texture weight for patterns inside a cell, which are less visible than patterns made of whole
+        /// cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
         let lab = oklab(linear);
@@ -50,7 +52,7 @@ impl Ink {
 #[derive(Debug, Default)]
 pub(super) struct PatternDither {
     inks: Vec<Ink>,
-    /// Weight of an ink's distance from the color, relative to the error of the recipe's mean.
+    /// Weight given to an ink's distance from the color, relative to the error in the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
@@ -62,7 +64,7 @@ impl PatternDither {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
-    /// Index of the ink to use for a color, depending on a dither threshold in (0, 1).
+    /// Returns the index of the ink that a color and a dither threshold in (0, 1) select.
     pub(super) fn ink_index(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {

@@ -7,7 +7,7 @@ pub(super) const RATE: f64 = 100_000.0;
 /// Capacity in bytes: about 100 ms at 1 Mbit/s.
 const FULL: f64 = 12_000.0;
 
-/// A token bucket; one token is one byte.
+/// A token bucket in which each token is one byte.
 #[derive(Debug)]
 pub(super) struct TokenBucket {
     tokens: f64,
@@ -28,7 +28,7 @@ impl TokenBucket {
         (self.tokens, self.at) = (self.tokens_at(now) - bytes as f64, now);
     }
 
-    /// Time at which there are enough tokens to send `bytes`.
+    /// Returns the time at which there will be enough tokens to send `bytes`.
     pub(super) fn available_at(&self, bytes: usize, now: Instant) -> Instant {
         if self.tokens(now) >= bytes {
             return now;

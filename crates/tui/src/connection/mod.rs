@@ -39,7 +39,8 @@ const SILENCE_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
-/// Length of a period. The minimum round-trip time is taken over the last one or two periods.
+/// Length of the periods over which the minimum round-trip time is tracked. The last one or two periods
+/// count.
 const ROUND_TRIP_AGE: Duration = Duration::from_secs(15);
 /// Maximum and minimum slice size in bytes.
 const MAX_SLICE: usize = 8_000;
@@ -84,13 +85,13 @@ pub(super) struct Connection {
     in_flight: usize,
     /// Maximum number of bytes in flight.
     window: f64,
-    /// Time at which the window last shrank. Slices sent earlier do not shrink it again.
+    /// Time at which the window last shrank. Slices sent before that do not shrink it again.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Round-trip times of the last slices. Small slices are included because only small slices are sent
-    /// after a slowdown, and their replies must be able to show that the connection is fast again.
+    /// Round-trip times of the last slices. Small slices count too: after a slowdown, only small slices are
+    /// sent, so only their replies can show that the connection has recovered.
     recent: VecDeque<Duration>,
-    /// Time of the last reply or, if later, when the oldest pending query was sent.
+    /// Time when the last reply arrived or the oldest pending query was sent, whichever is later.
     heard: Instant,
     bucket: TokenBucket,
     /// Bytes that the operating system has not accepted yet.
@@ -116,7 +117,7 @@ impl Connection {
         }
     }
 
-    /// Maximum size of the next slice, not counting its query. 0 if sending has to wait.
+    /// Returns the maximum size of the next slice, excluding its query, or 0 if sending has to wait.
     pub(super) fn max_slice(&mut self, now: Instant) -> usize {
         self.check_timeouts(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
@@ -167,7 +168,7 @@ impl Connection {
         let passed: Vec<SentSlice> = self.flight.drain(..=place).collect();
         for slice in passed {
             self.in_flight -= slice.bytes;
-            // A slice larger than the maximum window was a single image, so its round-trip time is mostly
+            // A slice that exceeds the maximum window holds an entire image, so its round-trip time is mostly
             // transmission time.
             if slice.question == question && slice.bytes <= MAX_WINDOW {
                 let round_trip = now.saturating_duration_since(slice.sent);
@@ -178,7 +179,7 @@ impl Connection {
         }
     }
 
-    /// Earliest time at which more may be sent if no reply arrives.
+    /// Returns the earliest time at which more may be sent if no reply arrives.
     pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
@@ -198,7 +199,7 @@ impl Connection {
         !self.flight.is_empty()
     }
 
-    /// Round-trip time without queueing. `None` if the terminal does not reply.
+    /// Round-trip time excluding queueing. `None` if the terminal does not reply.
     pub(super) fn round_trip(&self) -> Option<Duration> {
         self.round_trips.minimum().filter(|_| self.replies == ReplyState::Answering)
     }
@@ -252,7 +253,7 @@ impl Connection {
         }
     }
 
-    /// Time after which missing replies are considered lost.
+    /// How long to wait before considering missing replies lost.
     fn lost_reply_timeout(&self) -> Duration {
         SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
     }

@@ -77,14 +77,14 @@ impl SimulatedTerminal {
         }
     }
 
-    /// Fraction of the bandwidth that the last run used.
+    /// Fraction of the bandwidth used by the last run.
     fn bandwidth_share(&self, milliseconds: u64) -> f64 {
         self.carried as f64 / (self.bytes_a_second * milliseconds as f64 / 1e3)
     }
 }
 
 #[test]
-fn full_bandwidth_with_short_queues() {
+fn bandwidth_is_used_without_long_queues() {
     for (bytes_a_second, milliseconds) in
         [(125e3, 150), (125e3, 20), (1.25e6, 150), (16e3, 150), (16e3, 600), (1e8, 1), (6e3, 300)]
     {
@@ -108,7 +108,7 @@ fn full_bandwidth_with_short_queues() {
 }
 
 #[test]
-fn silent_terminals_are_paced_by_time() {
+fn output_is_paced_by_time_without_replies() {
     let mut terminal = SimulatedTerminal::new(125e3, 150, false, false);
     terminal.run(900);
     assert!(terminal.most_in_flight <= MAX_WINDOW && terminal.connection.awaits_reply());
@@ -132,7 +132,7 @@ fn late_replies_are_accepted() {
 }
 
 #[test]
-fn multiplexed_terminals_are_paced_by_time() {
+fn output_to_multiplexers_is_paced_by_time() {
     let mut terminal = SimulatedTerminal::new(125e3, 150, true, true);
     terminal.run(10_000);
     assert!(terminal.longest <= Duration::from_millis(140), "{:?}", terminal.longest);
@@ -199,7 +199,7 @@ fn unsolicited_replies_are_ignored() {
 }
 
 #[test]
-fn small_slices_can_make_terminal_fast_again() {
+fn replies_to_small_slices_reveal_a_fast_terminal() {
     let mut connection = Connection::new(false, Instant::now());
     let mut now = Instant::now();
     let mut answer = |connection: &mut Connection, bytes: usize, milliseconds: u64| {

@@ -6,13 +6,13 @@ use super::base64::encoded;
 use super::png::encode_png;
 use crate::film::Picture;
 
-/// IDs of the two alternating images, chosen to be unlikely in other programs.
+/// IDs of the two alternating images, chosen to be unlikely to clash with other programs.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
 /// Maximum length of a chunk of base64 data.
 const CHUNK: usize = 4096;
 
-/// The commands that draw an image at the cursor, scaled to cover these cells, and then delete the previous
-/// image.
+/// Returns the commands that draw an image at the cursor, scaled to cover these cells, and then delete the
+/// previous image.
 pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
     let data = encoded(&encode_png(picture));

@@ -1,8 +1,7 @@
 //! Previews drawn as pixels, for terminals with an image protocol.
 //!
-//! Each image is a single large update. The next image is encoded only after the previous one has been sent,
-//! so the newest one is always used. Images are sent in pieces that are subject to flow control, and other
-//! output may be sent between pieces.
+//! Each image is a single large update. Once an image has been sent, the newest one is encoded next. Images
+//! are sent in pieces that are subject to flow control, and other output may be sent between pieces.
 
 pub(super) mod base64;
 mod iterm;
@@ -49,11 +48,11 @@ impl PartialEq for PixelPlacement {
     }
 }
 
-/// Approximate encoded bytes per pixel. Noise is hardly compressible.
+/// Approximate encoded bytes per pixel. Noise hardly compresses.
 const PIXEL_BYTES: f64 = 2.0;
 /// Maximum image size in bytes. tmux does not pass on images of a megabyte or more.
 const MAX_BYTES: f64 = 600_000.0;
-/// Maximum time in seconds for sending an intermediate image, and for sending a final image.
+/// Maximum time for sending an intermediate or a final image, in seconds.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 
@@ -64,14 +63,14 @@ pub(super) struct Images {
     /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
     wanted: Option<PixelPlacement>,
-    /// The image shown once all pieces have arrived.
+    /// The image that is shown once all pieces have arrived.
     shown: Option<PixelPlacement>,
     is_still: bool,
     /// Whether the displayed image was downscaled to save bytes.
     is_coarse: bool,
     pieces: VecDeque<Vec<u8>>,
-    /// Whether kitty's second image is shown. The two images alternate so that the old one is deleted only
-    /// when the new one is visible.
+    /// Whether kitty's second image is shown. Two images alternate so that the old one can be deleted after
+    /// the new one has appeared.
     turn: bool,
     /// Palette of the last Sixel image.
     palette: Option<Palette>,
@@ -95,8 +94,8 @@ impl Images {
         }
     }
 
-    /// Sets the image to show. `is_still` if it is final. Returns the cells that are no longer covered by an
-    /// image and must be redrawn.
+    /// Sets the image to show. `is_still` marks a final image. Returns cells that no image covers any more,
+    /// which must be redrawn.
     pub(super) fn set_target(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
@@ -122,8 +121,8 @@ impl Images {
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// The next bytes to send, at most `most` of them unless a single piece is longer. `None` if everything
-    /// has been sent. `rate` is the bandwidth in bytes per second, if known.
+    /// Returns the next bytes to send, at most `most` of them unless a single piece is longer. `None` if
+    /// everything has been sent. `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode(rate);
@@ -188,7 +187,7 @@ impl Images {
     }
 }
 
-/// Wraps an escape sequence so that tmux passes it on, provided that `allow-passthrough` is on.
+/// Wraps an escape sequence so that tmux passes it on. This requires `allow-passthrough`.
 pub(super) fn tmux_passthrough(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x1bPtmux;".to_vec();
     for &byte in body {

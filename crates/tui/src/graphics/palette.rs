@@ -12,9 +12,9 @@ use crate::film::Picture;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
 const MAX: usize = 240;
-/// Bits per channel of the histogram.
+/// Histogram bits per channel.
 const BITS: u32 = 6;
-/// The palette is reused while its RMS error does not exceed the error of a new palette times `WORSE`, plus
+/// An existing palette is reused while its RMS error is at most `WORSE` times a new palette's error, plus
 /// `ALLOWED` code values.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
@@ -41,7 +41,7 @@ impl Palette {
         &self.colors
     }
 
-    /// The palette index of each pixel.
+    /// Returns each pixel's palette index.
     pub(super) fn indices(&mut self, picture: &Picture) -> Vec<u8> {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
@@ -84,7 +84,7 @@ fn histogram(picture: &Picture) -> Vec<Bin> {
 struct ColorBox {
     bins: Range<usize>,
     mean: [f64; 3],
-    /// Axis with the largest squared error, and its error.
+    /// The axis with the largest squared error, and that error.
     axis: usize,
     error: f64,
 }
@@ -186,15 +186,15 @@ mod tests {
         let wanted =
             picture.pixels.chunks(8).map(|run| run.iter().map(|rgb| f64::from(rgb[2])).sum::<f64>() / 8.0);
         let most = means.zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(most < 8.0, "{most}: error of eight-pixel means");
+        assert!(most < 8.0, "eight-pixel means differ by {most}");
     }
 
     #[test]
-    fn palette_is_kept_while_it_fits() {
+    fn palette_is_reused_while_it_fits() {
         let first = Palette::for_picture(&ramp(255.0), None);
         let colors = first.colors().to_vec();
         let same = Palette::for_picture(&ramp(253.0), Some(first));
-        assert_eq!(same.colors(), colors, "palette reused for a nearly identical image");
+        assert_eq!(same.colors(), colors, "the palette should be reused for a nearly identical image");
         let mut other = ramp(255.0);
         other.pixels.iter_mut().for_each(|rgb| rgb.swap(0, 2));
         assert_ne!(Palette::for_picture(&other, Some(same)).colors(), colors);

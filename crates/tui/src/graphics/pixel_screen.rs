@@ -121,7 +121,7 @@ fn decode_sixel(string: &[u8]) -> Option<Picture> {
     Some(Picture { width: width as u32, height: height as u32, pixels })
 }
 
-/// Parses and removes leading numbers separated by semicolons.
+/// Removes and parses leading semicolon-separated numbers.
 fn take_numbers(rest: &mut &[u8]) -> Vec<usize> {
     let end = rest.iter().position(|byte| !matches!(byte, b'0'..=b'9' | b';')).unwrap_or(rest.len());
     let (text, after) = rest.split_at(end);

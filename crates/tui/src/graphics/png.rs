@@ -1,4 +1,4 @@
-//! PNG encoding for the image protocols that use it.
+//! PNG encoding for the kitty and iTerm2 protocols.
 
 use crate::film::Picture;
 

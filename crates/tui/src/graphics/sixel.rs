@@ -1,5 +1,5 @@
-//! Sixel encoding (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one
-//! color at a time.
+//! Sixel encoding (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): six-pixel columns, one color
+//! at a time.
 
 use ratatui::layout::Rect;
 
@@ -13,8 +13,8 @@ const FIRST: u8 = 16;
 const REGISTERS: usize = 256;
 
 /// Encodes an image to be drawn at the cursor, scaled to cover these cells. `cell` is the size of a cell in
-/// pixels. The palette is reused if it still fits the image and recomputed otherwise. Images smaller than the
-/// covered area are enlarged after quantization, so time and memory depend only on the image's own size.
+/// pixels. The palette is reused if it still fits the image and recomputed otherwise. Small images are
+/// enlarged only after quantization, which saves time and memory.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -52,7 +52,7 @@ pub(super) fn encode(
     bytes
 }
 
-/// Six pixel rows, with a separate set of sixels for each color.
+/// A band of six pixel rows, with a separate set of sixels for each color.
 struct SixelBand {
     width: usize,
     /// Sixels of all registers, concatenated.
@@ -65,7 +65,7 @@ impl SixelBand {
         Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
 
-    /// Sets one of the band's six pixel rows.
+    /// Sets one of the band's pixel rows.
     fn set_row(&mut self, y: u32, registers: impl Iterator<Item = u8>) {
         for (x, register) in registers.enumerate() {
             self.is_used[usize::from(register)] = true;

@@ -29,7 +29,7 @@ fn newest_image_replaces_pending_ones() {
     images.set_target(Some(third.clone()), true);
     let rest = all(&mut images);
     assert_eq!(rest.matches("a=T").count(), 1);
-    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "each image is shown by its last chunk");
+    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "each image should appear with its last chunk");
     assert!(images.is_complete());
     images.set_target(Some(third), true);
     assert_eq!(all(&mut images), "");
@@ -56,7 +56,7 @@ fn moving_an_image_uncovers_its_old_cells() {
         let mut images = Images::new(protocol, false);
         assert_eq!(images.set_target(Some(placement(1, 2)), true), None);
         all(&mut images);
-        assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "the position is unchanged");
+        assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "no cells should be uncovered");
         all(&mut images);
         assert_eq!(images.set_target(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
         all(&mut images);
@@ -74,14 +74,14 @@ fn slow_connections_get_coarser_images() {
     let coarse = images.next_slice(5000, Some(1000.0)).expect("a picture").len();
     assert!(images.is_complete());
     images.set_target(Some(picture), true);
-    assert!(!images.is_complete(), "sending a final image may take longer");
+    assert!(!images.is_complete(), "a final image should keep more detail");
     let fine = images.next_slice(5000, Some(10_000.0)).expect("a picture").len();
     assert!(coarse * 4 < fine, "{coarse} {fine}");
     assert!(images.is_complete());
 }
 
 #[test]
-fn tmux_sequences_are_wrapped() {
+fn sequences_are_wrapped_inside_tmux() {
     assert_eq!(tmux_passthrough(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
     let mut images = Images::new(ImageProtocol::Iterm, true);
     images.set_target(Some(placement(1, 2)), true);
@@ -104,7 +104,7 @@ fn sixel_size_and_colors_match_the_image() {
     assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
     assert!(bytes.contains("#16!32~$#17!32?!32~$-"), "{bytes}");
     assert!(bytes.ends_with("-\x1b\\\x1b8"));
-    assert_eq!(bytes.matches('-').count(), 8, "48 rows make 8 bands");
+    assert_eq!(bytes.matches('-').count(), 8, "48 rows should form 8 bands");
 }
 
 #[test]

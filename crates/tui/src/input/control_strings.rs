@@ -1,4 +1,4 @@
-//! Terminal replies sent as control strings: name, colors and capabilities.
+//! Parsers for terminal replies sent as control strings: name, colors and capabilities.
 
 use crate::graphics::ImageProtocol;
 use crate::pixel_request::QUERY_ID;

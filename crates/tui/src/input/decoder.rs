@@ -16,7 +16,7 @@ const ESCAPE: u8 = 0x1b;
 /// Bytes that can follow the escape character in a terminal sequence: CSI, OSC, SS3, DCS, SOS, PM, APC, and
 /// the string terminator.
 const INTRODUCERS: &[u8] = b"[]OPX^_\\";
-/// Silence after which an escape character is treated as a key press.
+/// How long after an escape character silence makes it a key press.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
@@ -24,10 +24,10 @@ const SEQUENCE: Duration = Duration::from_secs(1);
 /// like the start of a sequence, would block all further input.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
-/// Maximum time between an escape character that was treated as a key press and a `[` that still belongs to
-/// its sequence.
+/// Maximum delay of a `[` after its escape character. The escape character has already been treated as a key
+/// press.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
-/// How long to wait for the next byte after a late `[`, and the maximum number of bytes held back.
+/// Maximum time to wait for the next byte after a late `[`, and maximum number of bytes to hold back.
 const DOUBT_TIMEOUT: Duration = Duration::from_millis(300);
 const MAX_DOUBTFUL_BYTES: usize = 32;
 
@@ -41,7 +41,7 @@ pub(crate) struct Decoder {
     last: Option<Instant>,
     /// Time when an escape character was treated as a key press.
     escaped: Option<Instant>,
-    /// Text of the current application program command (APC). The parser ignores these commands.
+    /// Text of the current application program command (APC). The VTE parser ignores such commands.
     command: Vec<u8>,
 }
 
@@ -67,7 +67,7 @@ enum PendingSequence {
 }
 
 impl Decoder {
-    /// Decodes the next bytes of the input.
+    /// Decodes the next input bytes.
     pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<DecodedInput> {
         // An escape character or doubtful bytes do not expire here, because the bytes that follow have
         // arrived, even if late. A paste does not expire either, because its text may have been waiting for a
@@ -95,7 +95,7 @@ impl Decoder {
         }
     }
 
-    /// Handles a sequence that has not continued before its [`Decoder::deadline`].
+    /// Handles a sequence that has not been continued by its [`Decoder::deadline`].
     pub(super) fn expire(&mut self, now: Instant) -> Vec<DecodedInput> {
         self.expire_pending(now);
         std::mem::take(&mut self.meaning.found)
@@ -245,8 +245,8 @@ impl Decoder {
     }
 }
 
-/// Whether `byte` cannot follow an escape character and `introducer` in any terminal sequence, so that all
-/// three are key presses.
+/// Whether `byte` cannot follow an escape character and `introducer` in any terminal sequence, in which case
+/// all three are key presses.
 fn are_three_key_presses(introducer: u8, byte: u8) -> bool {
     match introducer {
         // rxvt uses `a` to `d` for shifted arrows, and reports end with `n` or `t`.

@@ -22,7 +22,7 @@ pub(super) struct InputPerformer {
     report: ControlString,
 }
 
-/// How to interpret the next character.
+/// How to interpret the next input character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum NextCharacter {
     #[default]
@@ -51,8 +51,8 @@ impl InputPerformer {
         self.push_reply(control_strings::parse_apc(text));
     }
 
-    /// Handles a mouse report in SGR format (mode 1006). It contains the button with modifier bits, and the
-    /// cell, counted from 1.
+    /// Handles a mouse report in SGR format (mode 1006). The report contains the button, its modifier bits
+    /// and the cell, counted from 1.
     fn push_mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {

@@ -24,7 +24,7 @@ pub(super) use self::decoder::Decoder;
 use super::event::{Event, EventSource};
 use crate::system::threads::spawn;
 
-/// Starts a thread that reads standard input. When the input ends, it reports the loss of
+/// Starts a thread that reads standard input. At the end of input, it reports the loss of
 /// [`EventSource::Keys`].
 ///
 /// # Errors
@@ -46,7 +46,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether another program is reading the input.
+/// Whether another program is currently reading the input.
 static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
 /// Lets another program read the input, or resumes reading it.
@@ -55,7 +55,7 @@ pub(super) fn set_input_paused(is_held: bool) {
     HELD.1.notify_all();
 }
 
-/// Waits while another program is reading the input. Returns whether it had to wait.
+/// Waits while another program is reading the input. Returns true if it had to wait.
 fn wait_while_held() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;

@@ -9,7 +9,7 @@
 use std::time::{Duration, Instant};
 
 const SILENCE: Duration = Duration::from_secs(1);
-/// Silence that ends an unusually long paste.
+/// Length of the silence that ends an unusually long paste.
 const SHORT_SILENCE: Duration = Duration::from_millis(200);
 const LONG: Duration = Duration::from_secs(10);
 const MANY_BYTES: usize = 1 << 20;
@@ -61,7 +61,7 @@ impl Paste {
         (self.last + SILENCE).min(long_at.max(self.last + SHORT_SILENCE))
     }
 
-    /// Processes one byte. Returns whether it completed the end marker.
+    /// Processes one byte. Returns true if it completes the end marker.
     pub(super) fn push(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.after(byte);
         if sequence.is_none() {

@@ -153,7 +153,7 @@ fn left_button_and_wheel_are_decoded() {
 }
 
 #[test]
-fn original_mouse_reports_are_not_keys() {
+fn original_mouse_reports_produce_no_keys() {
     assert_eq!(read(b"\x1b[M q!q"), [plain('q')]);
 }
 
@@ -223,7 +223,7 @@ fn escape_and_immediate_key_are_two_keys() {
 }
 
 #[test]
-fn late_bytes_continue_an_escape_sequence() {
+fn late_bytes_still_continue_a_sequence() {
     for (rest, input) in [
         (&b"[0n"[..], READY),
         (b"[A", special(KeyCode::Up)),
@@ -391,7 +391,7 @@ proptest! {
         prop_assert_eq!(split, whole);
     }
 
-    /// After arbitrary bytes and a pause, a key press is recognized.
+    /// A key press is recognized after any bytes followed by a pause.
     #[test]
     fn no_input_blocks_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
         let mut bench = DecoderBench::new();

@@ -9,7 +9,7 @@ use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
     pub(crate) tile: Tile,
-    /// Colors of the first and second part.
+    /// Colors of the first and second parts.
     pub(crate) pair: [[u8; 3]; 2],
 }
 
@@ -17,7 +17,7 @@ pub(crate) struct FittedCell {
 /// much. Smaller improvements are invisible, flicker with the noise and take more bytes.
 const WORTH: f32 = 1e-4;
 
-/// The cell with the smallest squared Oklab distance from its pixels. `pixels` are sRGB colors in row order.
+/// Fits a cell to its pixels, minimizing the squared Oklab distance. `pixels` are sRGB colors in row order.
 /// The chosen division minimizes the variance within the two parts.
 pub(crate) fn fit_cell(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], Grid::Halves) = (pixels, grid) {

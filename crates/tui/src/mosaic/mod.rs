@@ -1,4 +1,4 @@
-//! Two-color cells: block characters, and how they are fitted to pixels.
+//! Two-color cells: block characters and their fitting to pixels.
 
 mod fit;
 mod tile;

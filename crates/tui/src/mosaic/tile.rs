@@ -1,4 +1,4 @@
-//! Block characters that fill part of a cell with the foreground color: blocks, quadrants, sextants, octants
+//! Characters that fill part of a cell with the foreground color: half blocks, quadrants, sextants, octants
 //! and shades.
 
 use std::collections::HashMap;
@@ -38,7 +38,8 @@ impl Tile {
     /// A fine pattern with equal amounts of both colors.
     pub(crate) const MEDIUM: Self = Self { first: CHECKS, symbols: ['▒', '▒'] };
 
-    /// The characters that draw this tile, with the first or the second part in the foreground color.
+    /// Returns the two characters that draw this tile: one for the first part in the foreground color, one
+    /// for the second.
     pub(crate) fn symbols(self) -> [char; 2] {
         self.symbols
     }
@@ -49,17 +50,17 @@ impl Tile {
         [first, PLACES - first]
     }
 
-    /// Number of grid squares shared by each part of this tile with each part of the other.
+    /// Counts the grid squares in which each part of this tile overlaps each part of `other`.
     pub(crate) fn shared_squares(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
 }
 
-/// The tile drawn by a character, and whether its foreground is the second part. `None` if it is not a block
-/// character.
+/// Returns the tile that a character draws, and true if the foreground is its second part. `None` if it is
+/// not a block character.
 pub(crate) fn from_symbol(symbol: char) -> Option<(Tile, bool)> {
-    // The code points of letters, digits and punctuation are smaller than those of block characters.
+    // Letters, digits and punctuation have smaller code points than block characters.
     if symbol < '▀' {
         return None;
     }
@@ -78,7 +79,7 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     Some(std::array::from_fn(|place| mask >> place & 1 == 1))
 }
 
-/// The tile that has this mask as its first part, or as its second part if the mask excludes the top left
+/// Returns the tile with this mask as its first part, or as its second part if the mask excludes the top left
 /// corner.
 fn from_mask(mask: u32) -> Option<(Tile, bool)> {
     let is_second = mask & 1 == 0;
@@ -134,7 +135,8 @@ static TABLE: LazyLock<BlockPatternTable> = LazyLock::new(|| {
 /// Mask of a checkerboard pattern.
 const CHECKS: u32 = 0x99_99_99;
 
-/// Characters indexed by the mask of quadrants they fill, lowest bit first (Unicode, "Block Elements").
+/// Characters indexed by a mask of the quadrants that they fill, lowest bit first (Unicode, "Block
+/// Elements").
 const QUADRANTS: [char; 16] =
     [' ', '▘', '▝', '▀', '▖', '▌', '▞', '▛', '▗', '▚', '▐', '▜', '▄', '▙', '▟', '█'];
 /// First sextant (Unicode 13, "Symbols for Legacy Computing"). Sextants are ordered by mask, omitting the
@@ -142,7 +144,7 @@ const QUADRANTS: [char; 16] =
 const SEXTANTS: u32 = 0x1_FB00;
 const SEXTANTS_ELSEWHERE: [u32; 2] = [0b01_01_01, 0b10_10_10];
 /// First octant (Unicode 16, "Symbols for Legacy Computing Supplement"). Octants are ordered by mask,
-/// omitting characters that were already in Unicode.
+/// omitting shapes that Unicode already contained.
 const OCTANTS: u32 = 0x1_CD00;
 const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
     (0b00_00_00_01, '\u{1CEA8}'),
@@ -208,8 +210,8 @@ impl Grid {
         }
     }
 
-    /// All divisions of a two-column cell, starting with halves. Successive divisions usually differ in only
-    /// one part of the grid.
+    /// Lists all divisions of a two-column cell, starting with halves. Successive divisions usually differ in
+    /// only one part of the grid.
     pub(super) fn divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
@@ -223,8 +225,8 @@ impl Grid {
     }
 }
 
-/// All divisions along two-column grids, for a cell with `pixel_rows` rows of pixels. `part_rows` lists the
-/// number of rows in each grid.
+/// Lists all divisions along two-column grids for a cell with `pixel_rows` rows of pixels. `part_rows` lists
+/// the number of rows in each grid.
 fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
     for rows in part_rows {

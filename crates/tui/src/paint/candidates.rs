@@ -5,7 +5,7 @@ use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digits};
 use crate::color::nearest_256;
 
-/// Maximum number of candidates for each part, and for both parts together.
+/// Maximum number of candidates for each part. Also applies to filling both parts with one color.
 const MAX: usize = 6;
 /// Maximum number of cells that a candidate may cover.
 const LONGEST: usize = 8;
@@ -22,7 +22,8 @@ pub(super) struct CandidateColors {
     pub(super) both: Vec<TerminalColor>,
 }
 
-/// Candidates for the first of `cells`. Each candidate also fits as many of the following cells as possible.
+/// Returns candidates for the first of `cells`, each of which also fits as many of the following cells as
+/// possible.
 pub(super) fn candidates(cells: &[Option<Mosaic>], model: RateDistortion) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
@@ -68,7 +69,8 @@ struct CommonColors {
     count: u32,
 }
 
-/// Intersects the ranges within `span` of the wanted colors, for as many leading colors as possible.
+/// Intersects the ranges of colors within `span` of each wanted color, stopping before the intersection
+/// becomes empty.
 fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
     let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
@@ -92,7 +94,7 @@ impl CommonColors {
         std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
     }
 
-    /// The color with the fewest decimal digits. If there are several, the one closest to the mean.
+    /// Returns the color with the fewest decimal digits, preferring the one closest to the mean.
     fn shortest(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {

@@ -14,7 +14,7 @@ use crate::mosaic::{PLACES, Tile, from_symbol};
 pub(super) enum CellContent {
     /// The content of the cell is unknown.
     Unknown,
-    /// A tile with two colors. A blank has two halves of the same color.
+    /// A tile with two colors. A blank consists of two halves in the same color.
     Mosaic(Mosaic),
     /// A character.
     Text(TextCell),
@@ -26,7 +26,7 @@ pub(super) enum CellContent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mosaic {
     pub(super) tile: Tile,
-    /// Colors of the first and second part.
+    /// Colors of the first and second parts.
     pub(super) pair: [TerminalColor; 2],
 }
 
@@ -56,8 +56,8 @@ impl Mosaic {
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// Pairs of colors that overlap when this cell is laid over `other`. The weight of each pair is twice the
-    /// fraction of the cell where the two colors overlap.
+    /// Lists pairs of colors that overlap when this cell is laid over `other`. The weight of each pair is
+    /// twice the fraction of the cell where the two colors overlap.
     pub(super) fn overlapping_colors(
         self,
         other: Self,
@@ -81,7 +81,7 @@ pub(super) struct TextCell {
 }
 
 impl TextCell {
-    /// Whether the character is a single code point that is one column wide.
+    /// Whether the character is a single code point and one column wide.
     pub(super) fn is_plain(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
     }
@@ -116,7 +116,7 @@ impl CellFill {
         }
     }
 
-    /// The layers that fill the first and second part.
+    /// The layers that fill the first and second parts.
     pub(super) fn layers(self) -> [ColorLayer; 2] {
         match self {
             Self::Blank => [ColorLayer::Background; 2],
@@ -126,7 +126,7 @@ impl CellFill {
         }
     }
 
-    /// Requirements on the pen. Colors that the glyph does not show are unconstrained.
+    /// Returns the glyph's pen requirements. Colors that it does not show are unconstrained.
     pub(super) fn requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
@@ -183,7 +183,7 @@ impl CellContent {
     }
 }
 
-/// A cell's symbol and its width. A blank if the symbol would move the cursor or print nothing.
+/// Returns a cell's symbol and its width, or a blank if the symbol would move the cursor or print nothing.
 fn printable_symbol(symbol: &str) -> (&str, u16) {
     let columns = symbol.width();
     if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {

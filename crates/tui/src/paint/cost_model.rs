@@ -10,8 +10,8 @@ pub(super) struct RateDistortion {
     pub(super) byte: f32,
     /// Maximum color difference per channel.
     pub(super) most: u8,
-    /// Half-widths of the ranges within which neighboring colors may be merged. Candidate colors are tried
-    /// for each range.
+    /// Half-widths of the ranges within which neighboring colors may be merged. Each range gets its own
+    /// candidate colors.
     pub(super) spans: &'static [u8],
 }
 
@@ -26,8 +26,7 @@ impl RateDistortion {
     /// as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// Returns the model with a different cost per byte, which is at least the cost in
-    /// [`RateDistortion::MOVING`].
+    /// Returns the model with a different cost per byte, but at least the cost in [`RateDistortion::MOVING`].
     pub(super) fn with_byte_cost(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -39,7 +38,7 @@ impl RateDistortion {
         Self { byte, spans, ..self }
     }
 
-    /// Error caused by showing one color instead of another. Infinite if the replacement is not allowed.
+    /// Returns the error from showing one color instead of another. Infinite if this is not allowed.
     pub(super) fn error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Cursor movement using as few bytes as possible.
+//! Moves the cursor using as few bytes as possible.
 
 use super::terminal_color::push_number;
 

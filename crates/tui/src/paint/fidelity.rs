@@ -3,9 +3,9 @@
 /// Precision with which the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
-    /// The first preview of a request, to be refined soon. Uses at most 12 bytes per cell.
+    /// A request's first preview, which will be refined soon. Uses at most 12 bytes per cell.
     First,
-    /// A later preview that is still to be refined.
+    /// A later preview that will still be refined.
     Moving,
     /// Like `Moving`, but with exact colors. For terminals fast enough to follow the render.
     Following,

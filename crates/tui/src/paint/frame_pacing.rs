@@ -45,10 +45,10 @@ const MOVING_BYTES: f64 = 6.0;
 const MORE_SAMPLES: f64 = 2.0;
 /// Minimum ratio between sample counts while the previous preview is still being sent.
 const MANY_MORE_SAMPLES: f64 = 4.0;
-/// During the first sample per pixel, the preview is redrawn each time this fraction of a sample has been
+/// During the first pass, the preview is redrawn each time this fraction of a sample per pixel has been
 /// added.
 const FIRST_PASS: f64 = 0.25;
-/// Minimum time between previews, except for the first and last.
+/// Minimum time between previews, except before the first and last.
 const SHORTEST: Duration = Duration::from_millis(100);
 /// Minimum time between previews drawn as pixels, which take longer to encode and decode.
 const SHORTEST_IN_PIXELS: Duration = Duration::from_millis(180);
@@ -97,7 +97,7 @@ impl FrameTiming {
         (self.is_fast && self.is_shown).then(|| aimed + self.min_interval())
     }
 
-    /// Time needed to send an intermediate preview.
+    /// Returns the time needed to send an intermediate preview.
     fn frame_send_time(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {

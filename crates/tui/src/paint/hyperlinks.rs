@@ -7,7 +7,7 @@ pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
 /// Maximum number of hyperlinks per screen.
 const MAX: usize = 1000;
 
-/// Adjacent cells in a row and the URL they link to.
+/// Adjacent cells in a row, and the URL that they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hyperlink {
     /// The linked cells.
@@ -23,7 +23,7 @@ pub(super) struct Hyperlinks {
 }
 
 impl Hyperlinks {
-    /// The number of a URL. 0 if the URL is invalid or there are too many.
+    /// Returns a URL's number, or 0 if the URL is invalid or there are too many URLs.
     pub(super) fn url_number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;

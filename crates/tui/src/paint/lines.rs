@@ -6,8 +6,8 @@ use ratatui::style::Color;
 use super::pen::Pen;
 use super::terminal_color::{ColorLayer, TerminalColor};
 
-/// A buffer's rows as lines without trailing blanks. Each line starts and ends with the terminal's default
-/// colors. Without colors, the output contains no escape sequences.
+/// Converts a buffer's rows to lines without trailing blanks. Each line starts and ends with the terminal's
+/// default colors. Without colors, the output contains no escape sequences.
 pub fn as_text_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {

@@ -64,7 +64,7 @@ pub struct Painter {
     /// The drawing step in progress.
     part: Option<DrawStep>,
     strokes: vec::IntoIter<Stroke>,
-    /// Progress of drawing the preview, for each row.
+    /// Drawing progress for each row of the preview.
     rows: Vec<RowProgress>,
     aim: u64,
 }
@@ -76,7 +76,7 @@ enum DrawStep {
     Words(u16),
     /// Draw a row of the preview.
     Picture(u16),
-    /// Draw a row's text that is delayed until after the preview.
+    /// Draw text in a row that was delayed until after the preview.
     Later(u16),
 }
 
@@ -89,7 +89,7 @@ pub struct FrameExtras {
     pub links: Vec<Hyperlink>,
 }
 
-/// Progress of drawing the preview in one row.
+/// Drawing progress for one row of the preview.
 #[derive(Clone, Copy, Debug, Default)]
 struct RowProgress {
     /// Number of the last target for which the row was drawn.
@@ -177,9 +177,9 @@ impl Painter {
         self.budget = ByteBudget::default();
     }
 
-    /// The next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the screen
-    /// matches the target. The caller must write the bytes because later slices build on them. No other
-    /// output may move the cursor or change colors between slices.
+    /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the
+    /// screen matches the target. The caller must write the bytes because later slices build on them. No
+    /// other output may move the cursor or change colors between slices.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
         self.slice_until(most_bytes, || false)
     }

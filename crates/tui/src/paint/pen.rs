@@ -10,7 +10,7 @@ pub(super) struct Pen {
     pub(super) fg: TerminalColor,
     pub(super) bg: TerminalColor,
     pub(super) modifier: Modifier,
-    /// Number of the hyperlink the character belongs to. 0 if there is none.
+    /// Number of the character's hyperlink. 0 if there is none.
     pub(super) link: u16,
 }
 
@@ -62,8 +62,8 @@ impl Pen {
         }
     }
 
-    /// If the pen does not meet the requirements, appends the shortest SGR sequence that makes it meet them.
-    /// Hyperlinks are handled by the screen model.
+    /// Makes this pen meet the requirements, appending the shortest SGR sequence that does so. The screen
+    /// model handles hyperlinks.
     pub(super) fn switch_to(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.push_changes(requirements, &mut list);
@@ -79,7 +79,7 @@ impl Pen {
         *self = if is_shorter { reset } else { changed };
     }
 
-    /// Appends SGR parameters that make this pen meet the requirements, and returns the new pen.
+    /// Appends SGR parameters that make this pen meet the requirements. Returns the new pen.
     fn push_changes(mut self, requirements: &PenRequirements, list: &mut Vec<u8>) -> Self {
         let surplus = (self.modifier - requirements.modifier) & requirements.matters;
         for (modifier, _, off) in MODIFIERS {

@@ -11,9 +11,10 @@ use super::target_screen::TargetScreen;
 
 /// Average number of bytes per cell available for a first preview.
 const FIRST_BYTES: u32 = 12;
-/// Bytes at the start of a row that the search does not count. They reset modifiers left over from text.
+/// Bytes reserved at the start of each row for resetting modifiers left over from text. The search does not
+/// count them.
 const ROW_BYTES: u32 = 4;
-/// Ratio between the costs per byte of successive attempts.
+/// Factor by which the cost per byte changes between attempts.
 const STEP: f32 = 1.6;
 /// Cost per byte above which no further bytes can be saved.
 const DEAREST: f32 = 4000.0;
@@ -32,8 +33,8 @@ impl Default for ByteBudget {
 }
 
 impl ByteBudget {
-    /// Plans a row with the smallest error that fits into the budget. If more bytes than one row's share are
-    /// left over, the cost per byte is lowered again.
+    /// Plans a row with the smallest error that fits into the budget. If the unused bytes exceed one row's
+    /// share, first lowers the cost per byte.
     fn plan_row_in_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;

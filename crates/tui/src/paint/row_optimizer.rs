@@ -12,8 +12,8 @@ use crate::mosaic::{PLACES, Tile};
 
 /// Number of paths kept per cell.
 const BEAM: usize = 5;
-/// Upper bound on the bytes needed to change from any pen and cursor position to any other. A path cannot win
-/// if its cost exceeds that of the best path by more than the cost of these bytes.
+/// Upper bound on the bytes needed to reach any pen and cursor position from any other. A path that costs
+/// this much more than the best path cannot win.
 const MAX_BYTES: f32 = 46.0;
 
 /// A cell in the row, with its target and its current content.
@@ -21,7 +21,7 @@ const MAX_BYTES: f32 = 46.0;
 pub(super) struct TargetCell {
     /// Target content. `None` if the cell is not part of the preview.
     pub(super) wanted: Option<Mosaic>,
-    /// Content on the screen. `None` if it is unknown, so that the cell must be drawn.
+    /// Content on the screen. `None` if unknown, in which case the cell must be drawn.
     pub(super) shown: Option<Mosaic>,
 }
 
@@ -91,7 +91,7 @@ impl CursorGap {
     }
 }
 
-/// The operations that draw a row.
+/// A row's drawing operations.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedRow {
     pub(super) ops: Vec<DrawOp>,
@@ -179,7 +179,7 @@ impl Beam {
         }
     }
 
-    /// The cost above which a path cannot enter the beam.
+    /// Returns the cost above which a path cannot enter the beam.
     fn cost_bound(&self) -> f32 {
         let (mut best, mut worst) = (f32::INFINITY, 0.0_f32);
         for path in &self.paths {
@@ -195,7 +195,7 @@ struct ColorChange {
     shade: TerminalColor,
     /// Number of bytes in the SGR parameters.
     bytes: u32,
-    /// Area-weighted errors in the first and second part.
+    /// Area-weighted errors in the first and second parts.
     errors: [f32; 2],
 }
 
@@ -223,7 +223,7 @@ impl ColorChanges {
         changes
     }
 
-    /// Area-weighted errors of a color in both parts.
+    /// Returns the area-weighted error that a color causes in each part.
     fn errors(&self, shade: TerminalColor) -> [f32; 2] {
         let sizes = self.mosaic.tile.part_sizes();
         std::array::from_fn(|part| {
@@ -232,7 +232,7 @@ impl ColorChanges {
         })
     }
 
-    /// Extends a path by drawing with the current pen, and with each single color change. A color chosen for
+    /// Extends a path by drawing with the current pen or after changing one of its colors. A color chosen for
     /// one part is used only there.
     fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
         let mut ends = PathExtension::new(self, parent, path, beam);
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn layer_specific_colors_use_their_layer() {
+    fn default_colors_are_drawn_in_their_layers() {
         for halves in [
             [RED, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultBackground, RED],

@@ -23,8 +23,8 @@ pub(super) enum Stroke {
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
     Mosaic { at: CellPosition, glyph: CellFill, mosaic: Mosaic, count: u16 },
-    /// `count` blanks with the terminal's default background. If `count` is `None`, erases to the end of the
-    /// row.
+    /// `count` blanks with the terminal's default background, or a sequence that erases to the end of the row
+    /// if `count` is `None`.
     Erase { at: CellPosition, count: Option<u16> },
 }
 
@@ -74,12 +74,12 @@ pub(super) struct ScreenModel {
     pub(super) rows: u16,
     contents: Vec<CellContent>,
     pub(super) pen: Pen,
-    /// Position of the cursor. `None` if unknown.
+    /// Cursor position. `None` if unknown.
     pub(super) cursor: Option<CellPosition>,
 }
 
 impl ScreenModel {
-    /// The screen after [`ScreenModel::clear`].
+    /// The state of the screen after [`ScreenModel::clear`].
     pub(super) fn cleared(columns: u16, rows: u16) -> Self {
         Self {
             columns,
@@ -189,8 +189,8 @@ impl ScreenModel {
         }
     }
 
-    /// The cursor position `columns` further right. `None` past the last column, where terminals behave
-    /// differently.
+    /// Returns the cursor position `columns` to the right. `None` past the last column, where terminals
+    /// differ.
     fn position_after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }

@@ -27,8 +27,8 @@ pub(super) struct StableCells {
     firsts: Vec<Option<Mosaic>>,
     /// The first preview of the current request. Empty if there was none.
     newest: Vec<Option<Mosaic>>,
-    /// For each cell, whether the current request's first preview matches the first preview of the request on
-    /// the screen.
+    /// For each cell, whether it looks the same in the first previews of the current request and of the
+    /// request on the screen.
     steady: Vec<bool>,
     /// Noise threshold: larger differences between a stable cell and its target cause a redraw.
     noise: u8,
@@ -64,7 +64,7 @@ impl StableCells {
         }
     }
 
-    /// Compares the first preview of a new request with the previous one.
+    /// Compares a new request's first preview with the previous request's.
     fn begin_request(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
         self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();

@@ -58,7 +58,7 @@ impl TargetScreen {
         &self.contents[usize::from(y) * columns..][..columns]
     }
 
-    /// Whether a row drawn for this target also satisfies `other`.
+    /// Whether a row drawn for this target would also satisfy `other`.
     pub(super) fn row_satisfies(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)

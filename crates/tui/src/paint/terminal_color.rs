@@ -25,7 +25,7 @@ pub(super) enum ColorLayer {
 }
 
 impl TerminalColor {
-    /// Converts a ratatui color in this layer to a terminal color.
+    /// Converts a ratatui color to a terminal color for this layer.
     pub(super) fn from_ratatui(color: Color, layer: ColorLayer) -> Self {
         match color {
             Color::Reset => match layer {
@@ -81,7 +81,7 @@ impl TerminalColor {
         }
     }
 
-    /// Appends the SGR parameters that set the color, which must fit the layer.
+    /// Appends the SGR parameters that set the color, which must be allowed in the layer.
     pub(super) fn push(self, layer: ColorLayer, out: &mut Vec<u8>) {
         let base = match layer {
             ColorLayer::Foreground => 30,

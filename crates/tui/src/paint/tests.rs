@@ -47,8 +47,8 @@ impl TestTerminal {
         self.sent - before
     }
 
-    /// The largest channel difference between the screen and a buffer. Panics if anything other than preview
-    /// colors differs.
+    /// The largest channel difference between the screen and a buffer. Panics if anything but preview colors
+    /// differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
         let contents = buffer_contents(wanted, depth);

@@ -1,4 +1,4 @@
-//! Terminal state: the window, colors, and how previews are drawn.
+//! Terminal state: window, colors and preview drawing.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::Capabilities;
 
-/// The window, the terminal's capabilities, and how the preview is drawn.
+/// Window size, terminal capabilities and preview settings.
 pub(crate) struct DisplayState {
     pub window: Window,
     pub kind: PreviewKind,
@@ -24,7 +24,7 @@ pub(crate) struct DisplayState {
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text.
     pub capabilities: Capabilities,
-    /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
+    /// How long a render must run before its end triggers a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Whether the window is focused, according to the terminal.
     pub has_focus: bool,
@@ -32,9 +32,9 @@ pub(crate) struct DisplayState {
     pub is_light: bool,
     /// The user's request to draw pixels, while the terminal has not confirmed it.
     pub pixels: Option<ImageProtocolRequest>,
-    /// Time at which the missing confirmation is reported to the user.
+    /// Time at which the user will be told that confirmation is missing.
     pub pixels_until: Option<Instant>,
-    /// Cost of sending the last preview.
+    /// Bytes and round-trip time for sending the last preview.
     pub frame: Option<FrameReport>,
 }
 
@@ -60,7 +60,7 @@ impl DisplayState {
 
     /// Preview pixels per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// Maximum preview pixels across a cell. A higher resolution is not worth the bytes.
+        /// Maximum horizontal preview pixels per cell. A higher resolution is not worth the bytes.
         const MAX: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
         /// about 45 bytes of memory per pixel.

@@ -36,13 +36,13 @@ pub(super) struct InitialState {
     pub depth: ColorDepth,
     /// Whether the environment indicates a light background.
     pub is_light: bool,
-    /// The terminal's 16 ANSI colors, as assumed until it reports them.
+    /// The 16 ANSI colors assumed until the terminal reports its own.
     pub ansi: AnsiColors,
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text, according to environment variables.
     pub capabilities: Capabilities,
-    /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
+    /// How long a render must run before its end triggers a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }
 
@@ -60,8 +60,8 @@ pub(super) struct State {
     pub now: Instant,
     /// Whether the screen is outdated.
     pub dirty: bool,
-    /// Whether the next frame shows a request's first preview or the response to a key, and so must be drawn
-    /// without delay.
+    /// Whether the next frame must be drawn without delay, because it shows a request's first preview or the
+    /// response to a key.
     pub urgent: bool,
 }
 
@@ -97,14 +97,14 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Whether `w` can replace the output files, as far as is known.
+    /// Whether `w` can replace the output files, as far as glimt knows.
     pub(super) fn can_write(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
         let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
         !self.overlays.warnings.iter().any(is_conflict) && !self.saving.written.iter().any(is_kept)
     }
 
-    /// Diagnostics of a valid scene, and why its image could not be written.
+    /// Returns a valid scene's diagnostics, plus the reason if its image could not be written.
     pub(super) fn reported_diagnostics(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();

@@ -35,7 +35,7 @@ pub(crate) struct Pane {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub words: String,
-    /// Time when the message disappears. `None` for errors and prompts, which remain until a key is pressed.
+    /// Time when the message disappears. `None` for errors and prompts, which stay until a key is pressed.
     pub until: Option<Instant>,
 }
 

@@ -26,8 +26,8 @@ pub(crate) struct KeyOverrides {
 }
 
 impl KeyOverrides {
-    /// The settings formatted as command-line options. A camera position replaces the scene's orbiter camera,
-    /// so the field of view and focus of `orbiter` are also listed in that case.
+    /// Formats the settings as command-line options. A camera position replaces the scene's orbiter camera,
+    /// so the options then also include the field of view and focus of `orbiter`.
     pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -57,8 +57,8 @@ impl KeyOverrides {
         options
     }
 
-    /// Describes settings that differ from `before`. A reset camera is omitted if `is_camera_written`,
-    /// because the scene now contains that camera.
+    /// Describes settings that differ from `before`. If `is_camera_written`, a camera reset is omitted
+    /// because it only reflects the camera's move into the scene.
     pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.has_changes().then(|| "moved".to_owned());
@@ -89,7 +89,7 @@ fn join_names(names: &[&str]) -> String {
     }
 }
 
-/// The scene and settings used to render an image.
+/// The scene and settings from which an image was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageOrigin {
     /// Settings changed with keys.
@@ -98,7 +98,7 @@ pub(crate) struct ImageOrigin {
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
-    /// Whether the image's render has not finished.
+    /// Whether the render is unfinished.
     pub is_unfinished: bool,
 }
 
@@ -108,8 +108,9 @@ impl ImageOrigin {
         Self { toggles: KeyOverrides { exposure: None, ..self.toggles }, ..self }
     }
 
-    /// Origin of an image that a later request reproduced. Normally returns `self`, because the later changes
-    /// had no effect. Returns `later` if a camera moved with keys has since been written to the scene.
+    /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
+    /// later changes had no effect, but returns `later` if a camera moved with keys has since been written to
+    /// the scene.
     pub(crate) fn merged_with_later(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
@@ -172,7 +173,7 @@ pub(crate) struct RequestState {
     pub camera_step: CameraStep,
     /// The first request whose camera was moved with keys.
     pub moved_since: Option<u64>,
-    /// Original values of the moved camera parts, from the scene before the first move.
+    /// Values that the moved camera parts had in the scene before the first move.
     pub moved_from: CameraChange,
 
     /// Text of the scene file for the newest valid request.
@@ -213,14 +214,14 @@ impl RequestState {
         }
     }
 
-    /// Records the newest request's input files. Excludes a scene file, because its text is compared
-    /// separately, but includes a model.
+    /// Records the newest request's input files. Includes a model but not a scene file, whose text is
+    /// compared separately.
     pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
 
-    /// Origin of the newest request's image.
+    /// Returns the origin of the newest request's image.
     pub(crate) fn origin(&self, is_unfinished: bool) -> ImageOrigin {
         ImageOrigin {
             toggles: self.sent_toggles,
@@ -243,12 +244,12 @@ impl RequestState {
         overrides
     }
 
-    /// Overrides for the scene's own image, if keys have changed the displayed image.
+    /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
     pub(crate) fn own_image_overrides(&self) -> Option<Box<Overrides>> {
         (!self.is_own_image()).then(|| Box::new(self.command_line.clone()))
     }
 
-    /// Drops changes made with keys that have been saved to the scene.
+    /// Drops key changes that have been saved to the scene.
     pub(crate) fn drop_saved_changes(&mut self) {
         let (shadows, integrator, photons) =
             (self.base_shadows(), self.base_integrator(), self.base_photons());
@@ -279,14 +280,14 @@ impl RequestState {
         };
     }
 
-    /// Treats the scene's current camera as the starting point of the user's camera movement.
+    /// Makes the scene's current camera the starting point for camera movement.
     pub(crate) fn rebase_moves_on_scene(&mut self) {
         self.moved_from = CameraChange::default();
         self.record_moved_parts();
     }
 
-    /// Camera settings that changed in the scene file after the camera was moved with keys, formatted with
-    /// their current values.
+    /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
+    /// current values.
     pub(crate) fn conflicting_camera_saves(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
@@ -299,7 +300,7 @@ impl RequestState {
             let is_saved = before.is_some_and(|before| before != now) && now != moved;
             is_saved.then(|| format!("camera.{key} = {now}"))
         };
-        // A focal plane through `look_at` moves with the camera.
+        // A focal plane that passes through `look_at` follows the camera.
         let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
         let all = [
             of_pose("position", |pose| pose.position),

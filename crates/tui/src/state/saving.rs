@@ -1,4 +1,4 @@
-//! State of files saved by the user (scenes) or written by glimt (images and cameras).
+//! State of files that the user saves (scenes) or glimt writes (images and cameras).
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ pub(crate) struct WrittenFile {
     pub generation: u64,
     /// Description of the written image. Empty if not known yet.
     pub made: String,
-    /// Changes made with keys and included in the file. `None` for the scene's own image.
+    /// Changes made with keys that the file includes. `None` for the scene's own image.
     pub shows: Option<KeyOverrides>,
     /// Whether the image was written before its render finished.
     pub is_unfinished: bool,
@@ -50,7 +50,7 @@ impl WrittenFile {
         visible(&self.path.to_string_lossy()).into_owned()
     }
 
-    /// Describes how another program changed the file, and how to write the image anyway.
+    /// Describes how another program changed the file and how to write the image anyway.
     pub(crate) fn loss(&self) -> Option<String> {
         let describe = |lost: ExternalChange| {
             if lost.is_kept() { messages::output_kept } else { messages::output_changed }
@@ -79,8 +79,7 @@ pub(crate) struct SavingState {
     pub change: Option<PendingChange>,
     /// Time when the editor last exited.
     pub editor_closed: Option<Instant>,
-    /// Time from the last save until its first changed cell appeared on the screen, excluding time spent in
-    /// the editor.
+    /// Time from the last save to the first changed cell on the screen, excluding time spent in the editor.
     pub first_change: Option<Duration>,
     /// Time when glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
@@ -97,9 +96,9 @@ pub(crate) struct SavingState {
 
     /// Whether the next image to be written was requested with a key.
     pub is_write_requested: bool,
-    /// Changes made with keys that were in effect when a write was last requested.
+    /// Key changes that were in effect when a write was last requested.
     pub write_shows: KeyOverrides,
-    /// Why the current image was not written, if it should have been.
+    /// Why the current image was not written even though it should have been.
     pub unwritten: Option<String>,
     /// The last write failure, until a later image is written.
     pub write_failed: Option<WriteFailure>,
@@ -107,8 +106,8 @@ pub(crate) struct SavingState {
 }
 
 impl SavingState {
-    /// The file in which the user wrote an image with changes made with keys, if any. The scene's own image
-    /// does not replace it until the scene is saved or the user writes another image.
+    /// The file, if any, to which the user wrote an image that includes changes made with keys. The scene's
+    /// own image does not replace it until the scene is saved or the user writes another image.
     pub(crate) fn image_by_hand(&self) -> Option<&WrittenFile> {
         let is_there = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
         let is_newer = |written: &&WrittenFile| written.generation >= self.saved_at;

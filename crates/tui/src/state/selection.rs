@@ -1,4 +1,4 @@
-//! The mouse, the crosshair, and the inspected object.
+//! State of the mouse, the crosshair and the inspected object.
 
 use crate::event::FilePosition;
 use crate::pipeline::protocol::ImagePosition;
@@ -23,7 +23,7 @@ pub(crate) enum PickPurpose {
     Focus,
 }
 
-/// The mouse, the crosshair, and the inspected object.
+/// State of the mouse, the crosshair and the inspected object.
 pub(crate) struct SelectionState {
     pub is_mouse_on: bool,
     pub press: Option<MousePress>,
@@ -37,7 +37,7 @@ pub(crate) struct SelectionState {
     pub purpose: PickPurpose,
     /// Information about the inspected object, until a key is pressed.
     pub facts: Option<Vec<String>>,
-    /// One-line text with the values inspected by the last click.
+    /// Values inspected by the last click, on one line.
     pub clicked: Option<String>,
     /// Where the inspected object is defined in the scene file.
     pub picked: Option<FilePosition>,

@@ -29,11 +29,11 @@ pub(crate) enum RenderState {
     Stopped,
 }
 
-/// Progress bar of a loading asset.
+/// Progress bar for an asset that is being loaded.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AssetBar {
     pub progress: AssetProgress,
-    /// Time when the bar became full. It remains visible for a moment at 100%.
+    /// Time when the bar became full. It stays at 100% for a moment.
     pub finished: Option<Instant>,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct WorkState {
     /// Time when the request was paused.
     pub paused_at: Option<Instant>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
-    /// Duration of each stage's most recent run before this request.
+    /// How long each stage's last run before this request took.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
@@ -70,7 +70,7 @@ pub(crate) struct WorkState {
     pub unchanged: bool,
     /// Number of finished renders, not counting exposure changes.
     pub renders: u64,
-    /// Whether the newest render, at any exposure, was counted.
+    /// Whether the newest render has been counted, at this or another exposure.
     pub is_counted: bool,
 }
 

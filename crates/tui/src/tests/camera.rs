@@ -1,4 +1,4 @@
-//! Tests of the requests and messages triggered by camera keys.
+//! Tests for requests and messages triggered by camera keys.
 
 use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
@@ -37,7 +37,7 @@ fn moved_camera_is_shown_but_not_written() {
     show(&mut ui);
     let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
-    assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset the camera");
+    assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving should not reset the camera");
     assert_eq!(edited.write, WriteMode::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");
@@ -55,7 +55,7 @@ fn newest_camera_step_waits_for_a_preview() {
         assert!(ui.press(key).is_empty(), "steps should wait for the first step's preview");
     }
     let effects = show(&mut ui);
-    let newest = request(&effects).expect("the newest step is requested").overrides.camera;
+    let newest = request(&effects).expect("the newest step should be requested").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
@@ -78,7 +78,7 @@ fn missing_previews_do_not_block_steps() {
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_none(), "the last valid scene is still being rendered");
+    assert!(request(&effects).is_none(), "the last valid scene should still be rendering");
     assert!(request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
     ui.press('l');
     let generation = ui.state.request.generation;
@@ -202,13 +202,13 @@ fn model_scene_is_written_once() {
     let generation = ui.state.request.generation;
     ui.worker_event(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(!ui.text().contains("c keep"), "a scene file already exists: {}", ui.text());
+    assert!(!ui.text().contains("c keep"), "c should not be offered again: {}", ui.text());
     assert_eq!(crate::exit_summary::unsaved_as_options(&ui.state), None);
     ui.press('l');
     ui.finish_render([200, 30, 30]);
     assert!(
         crate::exit_summary::unsaved_as_options(&ui.state).is_some(),
-        "the camera moved again after saving"
+        "the camera has moved since it was saved"
     );
 }
 
@@ -242,7 +242,7 @@ fn viewpoint_at(position: [f64; 3]) -> Viewpoint {
 }
 
 #[test]
-fn conflicting_saves_are_listed_on_first_c() {
+fn first_c_lists_conflicting_saves() {
     let wide = |fov| Viewpoint { fov, ..camera() };
     let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
     let both = Viewpoint { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
@@ -269,7 +269,7 @@ fn conflicting_saves_are_listed_on_first_c() {
 }
 
 #[test]
-fn later_saves_are_listed_again() {
+fn later_conflicting_saves_are_also_listed() {
     let mut ui = TestUi::with(state(160, 40));
     ui.finish_render(RED);
     ui.press('h');
@@ -286,7 +286,7 @@ fn later_saves_are_listed_again() {
 }
 
 #[test]
-fn unmoved_camera_settings_keep_saved_values() {
+fn saving_keeps_camera_settings_that_did_not_move() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
     let mut ui = TestUi::with(state(160, 40));
     ui.finish_render(RED);

@@ -6,7 +6,7 @@ use std::fs;
 use crate::event::KeyPress;
 use crate::keymap::{KEYMAP, OVERLAY, action_for, overlay_action_for};
 
-/// The keys listed in the first column of the documentation's key tables.
+/// Returns the keys in the first column of the documentation's key tables.
 fn documented() -> BTreeSet<String> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/terminal.md");
     let page = fs::read_to_string(path).expect("the page");

@@ -1,4 +1,4 @@
-//! Tests of edits and typos: history, numbering and render times.
+//! Tests for edits and typos: history, render numbers and render times.
 
 use super::{BLUE, RED, cells_of};
 use crate::Changed;
@@ -28,8 +28,7 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
 }
 
-/// Finishes a request whose render stage took `seconds`. Rendering the image took `of_image` seconds in
-/// total.
+/// Finishes a request whose render stage took `seconds`. The image took `of_image` seconds in total.
 fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
     let generation = ui.state.request.generation;
     let mut event = done_event(generation, Vec::new(), unchanged);
@@ -104,7 +103,7 @@ fn editing_the_output_path_adds_no_entry() {
     }
     ui.worker_event(event);
     let text = ui.text();
-    // The image was written by another render but is the result of the same edit.
+    // Another render wrote the image, but it results from the same edit.
     assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
     assert!(!text.contains("render.output"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 2);
@@ -154,7 +153,7 @@ fn last_good(ui: &mut TestUi, end: LastValidSceneOutcome) {
 
 const FINISHED: LastValidSceneOutcome = LastValidSceneOutcome::Finished { unchanged: false };
 
-/// A finished render, followed by an edit and by a typo while the edit is being rendered.
+/// Finishes a render, makes an edit, and saves a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     ui.save_scene("shininess = 60");
@@ -243,7 +242,7 @@ fn complete_image_is_not_listed_as_stopped() {
     ui.finish_render(RED);
     ui.press('s');
     ui.read_scene();
-    // All samples are rendered, but a key is pressed before the request is done.
+    // All samples have been rendered, but a key is pressed before the request is done.
     show_preview(&mut ui, "hard", GREEN, true);
     ui.press('s');
     ui.finish_render(BLUE);
@@ -293,7 +292,7 @@ fn entries_are_numbered_by_render() {
 }
 
 #[test]
-fn age_is_measured_from_last_improvement() {
+fn age_counts_from_the_last_improvement() {
     let mut ui = TestUi::with(state(120, 40));
     ui.save_scene("shininess = 60");
     ui.read_scene();

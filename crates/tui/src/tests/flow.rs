@@ -1,4 +1,4 @@
-//! Tests of requests, generations, timing and signals.
+//! Tests for requests, generations, timing and signals.
 
 use std::time::Duration;
 
@@ -44,7 +44,7 @@ fn images_of_older_requests_are_dropped() {
 }
 
 #[test]
-fn first_change_is_measured_from_the_save() {
+fn first_change_is_timed_from_the_save() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let noticed = ui.now;
@@ -208,7 +208,7 @@ fn cancelled_render_is_reported() {
 }
 
 #[test]
-fn pending_writes_are_known_at_exit() {
+fn unanswered_writes_are_still_pending_at_exit() {
     let generation = 1;
     let written = |generation| protocol::Event::WriteDone { generation, paths: vec!["a.png".into()] };
     let failed = protocol::Event::WriteFailed { generation, path: None, message: "full".to_owned() };

@@ -1,4 +1,4 @@
-//! Simulates the screen contents during a render, with a fast terminal and with a slow connection.
+//! Simulates the screen during a render, on a fast terminal and over a slow connection.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -50,11 +50,10 @@ struct SimulatedTerminal {
     answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
     pixels: TestImageTerminal,
-    /// Bytes that have arrived, and the number of bytes sent.
+    /// The bytes that have arrived and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
-    /// Reply time and size of each unacknowledged slice, and the maximum number of unacknowledged bytes so
-    /// far.
+    /// Each unacknowledged slice's reply time and size, and the peak number of unacknowledged bytes.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
 }
@@ -105,7 +104,7 @@ impl SimulatedTerminal {
         arriving.into_iter().chain(self.answers.front().map(|(when, _)| *when)).min()
     }
 
-    /// The colors of all cell parts, or of the pixels if an image is shown.
+    /// Returns the colors of all cell parts, or of all pixels if an image is shown.
     fn visible_colors(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -144,7 +143,7 @@ struct WatchedRender {
     slot: PreviewSlot,
     begin: Instant,
     size: (u32, u32),
-    /// Times of the next progress report and the next preview.
+    /// Times at which the next progress report and preview are due.
     next: [Instant; 2],
     /// Number of previews drawn.
     shown: usize,
@@ -189,7 +188,7 @@ impl WatchedRender {
         }
     }
 
-    /// Runs until `fraction` of the render is done.
+    /// Runs the simulation until `fraction` of the render is done.
     fn until(&mut self, fraction: f64) {
         let end = self.begin + Duration::from_secs_f64(SECONDS * fraction);
         self.advance(end, true);
@@ -223,7 +222,7 @@ impl WatchedRender {
         }
     }
 
-    /// Draws the final preview completely.
+    /// Finishes drawing the final preview.
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
         self.put_picture(SAMPLES);
@@ -387,7 +386,7 @@ fn slow_connection_gets_few_previews() {
 }
 
 #[test]
-fn held_key_uses_most_of_a_slow_connection() {
+fn held_key_uses_most_of_the_bandwidth() {
     let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(0.2);
     watch.orbit(Duration::from_secs(2));

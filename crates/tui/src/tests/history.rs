@@ -1,4 +1,4 @@
-//! Tests of the screen while an older render is being viewed.
+//! Tests for the screen while an older render is being viewed.
 
 use crossterm::event::KeyCode;
 
@@ -44,12 +44,12 @@ fn older_render_cannot_be_inspected() {
     ui.handle_event(mouse(MouseEventKind::Press));
     assert!(!asks(&ui.handle_event(mouse(MouseEventKind::Release))));
     assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
-    // A reply that arrives late is not shown for the older render.
+    // A late reply is not shown for the older render.
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
     ui.worker_event(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.text().contains("pixel 3, 4"), "{}", ui.text());
     ui.press('b');
-    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render can be inspected");
+    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render should be inspectable");
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn older_render_hides_newest_settings() {
     ui.press('i');
     ui.finish_render(RED);
     ui.press('n');
-    assert!(line(&mut ui, 0).contains("view normal"), "expected the view of this entry: {}", ui.text());
+    assert!(line(&mut ui, 0).contains("view normal"), "expected this entry's view: {}", ui.text());
     assert!(line(&mut ui, 39).contains("n N older, newer"), "{}", ui.text());
 }
 
@@ -78,7 +78,7 @@ fn w_writes_the_newest_image() {
 
 #[test]
 fn c_saves_the_newest_camera() {
-    // The file change is often detected before the reply arrives, which returns to the newest render.
+    // Detecting the file change, often before the reply arrives, returns to the newest render.
     for (is_own, is_noticed) in [(true, false), (false, false), (true, true)] {
         let mut ui = older();
         ui.press('b');
@@ -154,7 +154,7 @@ fn save_time_is_cleared_by_the_next_render() {
     assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.text());
 }
 
-/// Kinds with and without a preview.
+/// Preview kinds: one that draws a preview, and one that does not.
 const KINDS: [PreviewKind; 2] = [PreviewKind::HalfBlock, PreviewKind::None];
 
 fn ui_with(kind: PreviewKind) -> TestUi {
@@ -166,7 +166,8 @@ fn interrupted_render_is_counted_once() {
     for kind in KINDS {
         let mut ui = ui_with(kind);
         ui.read_scene();
-        // A key interrupts the first render, later ones find it finished. The next render is interrupted, too.
+        // A key interrupts the first render. Later keys find it finished. The next render is also
+        // interrupted.
         for (keys, number) in [("]", 1), ("]", 1), ("s]", 2), ("]", 2), ("s", 3)] {
             keys.chars().for_each(|key| drop(ui.press(key)));
             ui.finish_render(RED);

@@ -1,4 +1,4 @@
-//! Tests of the keys' effects and their help texts.
+//! Tests for key effects and help texts.
 
 use super::{BLUE, RED, cells_of};
 use crate::action::Action;
@@ -16,7 +16,7 @@ use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::{Changed, ExitStatus};
 
-/// Checks that each key has the effect described in its table row. `check` covers every action.
+/// Checks that each key does what its table row says. `check` covers every action.
 #[test]
 fn every_key_has_its_effect() {
     for binding in KEYMAP {
@@ -296,7 +296,7 @@ fn message_is_shown_until_a_key_is_pressed() {
     ui.press('?');
     ui.press('?');
     assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
-    // If there is no separate line for messages, they replace the keys or the name in the header.
+    // If there is no separate line for messages, they replace the key line or the scene name in the header.
     for rows in [12, 5] {
         ui.handle_event(Event::Resize(window(60, rows)));
         ui.press('0');
@@ -446,7 +446,7 @@ fn reverted_toggle_is_not_a_change() {
             requests.extend(request(&ui.press(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
-        // Toggling starts over, whether or not the reply has arrived.
+        // Toggling starts again from the scene's value, whether or not the reply has arrived.
         let first = request(&ui.press(keys.chars().next().expect("a key"))).cloned().expect("a request");
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
     }

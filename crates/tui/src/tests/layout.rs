@@ -16,14 +16,14 @@ use crate::view::layout::Layout;
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
-/// Preview size for an image of this size, limited to the requested size.
+/// Returns the preview size for an image, limited to the requested size.
 fn fitted_preview_size(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
 }
 
-/// Reports the settings of a scene with this size and shows its preview.
+/// Reports settings with this image size and shows the scene's preview.
 fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
@@ -52,7 +52,7 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
     });
 }
 
-/// Number of cells covered by the largest image that fits into a window next to one line of text.
+/// Returns the number of cells that an image can cover in a window with one line of text.
 fn max_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
     let shape = f64::from(width) / f64::from(height) * 2.0;
     let room = (f64::from(columns), f64::from(rows - 1));
@@ -164,7 +164,7 @@ fn small_windows_are_usable() {
             generation: 1,
             progress: render_progress(0.5, Some(4567.0)),
         });
-        assert!(ui.text().contains("50 %"), "progress takes precedence over ETA: {}", ui.text());
+        assert!(ui.text().contains("50 %"), "progress should take precedence over the ETA: {}", ui.text());
         rendered(&mut ui, (640, 480));
         let share = cells_of(&mut ui, RED) as f64 / max_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
@@ -268,7 +268,7 @@ fn status_line_lists_only_current_files() {
     );
     ui.press('l');
     finish(&mut ui);
-    // Pressing a key without any other effect clears the message about the camera.
+    // A key press that has no other effect clears the message about the camera.
     ui.press('?');
     ui.press('?');
     let text = ui.text();

@@ -1,4 +1,4 @@
-//! Tests of how noise is displayed.
+//! Tests for the display of noise.
 
 use super::RED;
 use crate::event::Event;
@@ -28,7 +28,7 @@ fn noise_is_shown_during_a_render() {
 }
 
 #[test]
-fn noise_target_has_no_fixed_sample_count() {
+fn sample_count_is_approximate_with_noise_target() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Started { generation: 1 });
     let settings =
@@ -47,8 +47,7 @@ fn noise_target_has_no_fixed_sample_count() {
     assert!(ui.text().contains("about 32 samples"), "{}", ui.text());
 }
 
-/// The screen after a render with the target `error` or a time limit. `complete` and `samples` describe the
-/// result.
+/// Returns the screen after a render with a target `error` or a time limit.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
@@ -61,7 +60,7 @@ fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) ->
 }
 
 #[test]
-fn reason_for_stopping_is_shown() {
+fn limit_that_ended_the_render_is_shown() {
     for (error, time, complete, samples, words) in [
         (0.02, None, true, 40, "target ✓ 2 % per tile"),
         (0.02, None, true, 64, "stopped at max samples"),

@@ -41,7 +41,7 @@ fn notice_expires_after_four_seconds() {
         ui.advance_clock(100);
         assert!(ui.state.dirty);
         let rows = ui.text();
-        // The key line also contains this text, as the setting that `0` resets.
+        // The key line also contains this text, as a setting that `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
         assert_eq!(ui.state.next_tick(), None);

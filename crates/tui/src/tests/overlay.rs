@@ -1,4 +1,4 @@
-//! Tests of the overlays: help, view list and diagnostics.
+//! Tests for the overlays: help, view list and diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -109,7 +109,7 @@ fn scroll_keys_are_shown_only_when_needed() {
 }
 
 #[test]
-fn help_leaves_no_partial_words_next_to_it() {
+fn no_partial_words_remain_next_to_the_help() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish_render(RED);
     ui.press('?');
@@ -211,7 +211,7 @@ fn views_are_found_by_name() {
 }
 
 #[test]
-fn view_list_leaves_no_partial_lines_below() {
+fn no_partial_lines_remain_below_the_view_list() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish_render(RED);
     let settings = Box::new(EffectiveSettings { width: 480, height: 480, ..effective_settings() });
@@ -253,7 +253,7 @@ fn view_list_closes_automatically() {
 }
 
 #[test]
-fn partly_visible_view_list_is_marked() {
+fn view_list_marks_hidden_views() {
     for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish_render(RED);

@@ -1,4 +1,4 @@
-//! Tests of the mouse: requests, inspected values, and positions opened in the editor.
+//! Tests for the mouse: requests, inspected values, and positions opened in the editor.
 
 use crossterm::event::KeyCode;
 
@@ -313,7 +313,7 @@ fn small_windows_show_all_inspected_values() {
         ui.press('y');
         ui.press('?');
         ui.press('?');
-        assert!(!ui.text().contains("crystal"), "shown only until the next key press: {}", ui.text());
+        assert!(!ui.text().contains("crystal"), "a key press should hide the values: {}", ui.text());
     }
 }
 
@@ -328,7 +328,7 @@ fn small_windows_show_how_to_copy() {
         let text = ui.text();
         assert!(
             text.lines().next().is_some_and(|line| line.contains("✓ done")),
-            "the state should be visible: {text}"
+            "the render state should be visible: {text}"
         );
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(words.contains(&format!("{} sphere \"ball\"", messages::SELECT_TO_COPY)), "{text}");
@@ -399,10 +399,10 @@ fn header_marks_an_older_render() {
     // A key that has no effect clears the message.
     ui.press('y');
     let text = ui.text();
-    assert!(text.contains("b newest") && text.contains("N newer"), "expected the keys: {text}");
+    assert!(text.contains("b newest") && text.contains("N newer"), "expected history keys: {text}");
     assert!(
         !text.contains("samples") && !text.contains("render  "),
-        "expected no values of the newest render: {text}"
+        "values from the newest render should be hidden: {text}"
     );
     ui.handle_event(Event::Resize(window(30, 8)));
     assert!(first(&mut ui).contains("1 of 2"), "{}", ui.text());
@@ -412,7 +412,7 @@ fn header_marks_an_older_render() {
 }
 
 #[test]
-fn before_and_after_differ_for_a_saved_camera() {
+fn saved_camera_can_be_compared_with_the_old_one() {
     let mut ui = ui();
     ui.press('l');
     ui.finish_render(BLUE);
@@ -464,7 +464,7 @@ fn cancelled_region_drag_has_no_effect() {
             mouse(&mut ui, MouseEventKind::Drag, 30, 16).is_empty(),
             "{key:?}: the camera should not move"
         );
-        assert!(mouse(&mut ui, MouseEventKind::Release, 30, 16).is_empty(), "{key:?}: not a click");
+        assert!(mouse(&mut ui, MouseEventKind::Release, 30, 16).is_empty(), "{key:?}: expected no click");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Tests of the whole screen.
+//! Tests for the whole screen.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ fn half_blocks_show_two_pixels() {
 }
 
 #[test]
-fn preview_without_colors_is_a_character_ramp() {
+fn preview_without_colors_uses_characters() {
     let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::with(state);
     ui.finish_render([255; 3]);
@@ -67,7 +67,7 @@ fn preview_without_colors_is_a_character_ramp() {
 }
 
 #[test]
-fn value_range_is_shown_with_the_view() {
+fn value_range_is_shown_after_the_view_name() {
     let base = Overrides { view: Some(View::Depth), ..Overrides::default() };
     let state = state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::with(state);
@@ -91,7 +91,7 @@ fn value_range_is_shown_with_the_view() {
 }
 
 #[test]
-fn image_with_the_wrong_size_is_not_shown() {
+fn wrongly_sized_image_is_not_shown() {
     let mut ui = TestUi::new();
     let mut picture = (*uniform_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
@@ -631,7 +631,7 @@ fn preview_without_photons_is_marked() {
     ui.handle_event(picture(true));
     assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
     ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.1, None) });
-    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "marked as long as that preview is shown");
+    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "the mark should last as long as that preview");
     ui.handle_event(picture(false));
     assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
 }

@@ -1,4 +1,4 @@
-//! Tests of the noise curve and history in a wide window, and of notifications.
+//! Tests for notifications, and for the noise curve and history in a wide window.
 
 use ratatui::layout::Rect;
 
@@ -17,7 +17,7 @@ use crate::terminals::{TerminalBrand, TerminalId};
 use crate::view;
 use crate::view::layout::Layout;
 
-/// Simulates a render with the target `error`. Its noise is 10 % after one second and keeps falling.
+/// Simulates a render with the target `error`. The noise is 10 % after one second and keeps falling.
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
@@ -61,7 +61,7 @@ fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     }
 }
 
-/// The panel's text in one line, without thumbnails.
+/// Returns the panel's text on one line, without thumbnails.
 fn panel(ui: &mut TestUi) -> String {
     let panel = Layout::for_state(&ui.state).panel;
     let buffer = ui.draw_screen();
@@ -98,7 +98,7 @@ fn finished_render_has_a_noise_curve() {
     ui.press('s');
     ui.finish_render(BLUE);
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "a single point is not drawn as a curve");
-    // An image that has been rendered before has its curve restored.
+    // The curve is restored for an image that was rendered before.
     ui.press('0');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
@@ -291,7 +291,7 @@ fn moving_the_camera_adds_a_single_entry() {
 fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
-    // A typo is introduced and fixed, so the image is unchanged.
+    // Make and fix a typo, which leaves the image unchanged.
     ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.handle_event(Event::Settled);
@@ -436,7 +436,7 @@ fn written_files_are_hyperlinks() {
         let name: String = cells.positions().map(|place| buffer[place].symbol().to_owned()).collect();
         assert_eq!((name.as_str(), path.as_os_str().to_str()), ("cornell.png", Some("cornell.png")));
         ui.press('?');
-        assert!(view::draw(&ui.state, &mut buffer).files.is_empty(), "covered by the help");
+        assert!(view::draw(&ui.state, &mut buffer).files.is_empty(), "covered text should not be linked");
     }
 }
 
@@ -463,7 +463,7 @@ fn long_renders_send_a_notification_at_the_end() {
     assert_eq!(notification(31, focus(false)).as_deref(), Some(words));
     assert_eq!(notification(30, focus(false)), None);
     assert_eq!(notification(31, focus(true)), None);
-    assert_eq!(notification(31, |_| {}), None, "the terminal has not reported a loss of focus");
+    assert_eq!(notification(31, |_| {}), None, "no notification should be sent before focus is lost");
     assert_eq!(notification(31, |ui| ui.state.display.has_focus = true), None);
     // Pauses are not counted.
     let held = |ui: &mut TestUi| {

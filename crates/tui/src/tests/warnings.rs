@@ -1,4 +1,4 @@
-//! Tests of the number of warnings and of the pane that lists them.
+//! Tests for the warning count and the diagnostics pane.
 
 use crate::Changed;
 use crate::event::{Event, KeyPress};

@@ -77,7 +77,7 @@ fn resume_message_disappears_after_the_render() {
 }
 
 #[test]
-fn first_render_hint_does_not_say_again() {
+fn first_render_hint_omits_the_word_again() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!ui.text().contains("render again"), "{}", ui.text());
@@ -110,7 +110,7 @@ fn stage_reason_in_a_wide_panel_is_not_wrapped() {
 
 /// The hint must not be shown at the right edge of an empty screen.
 #[test]
-fn save_hint_is_on_a_line_of_its_own() {
+fn save_hint_has_its_own_line() {
     for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);

@@ -1,4 +1,4 @@
-//! Images written with `w`: the lines on the screen and after `q`.
+//! Tests for images written with `w`: text on the screen and in the exit summary.
 
 use super::{BLUE, RED};
 use crate::Changed;
@@ -10,7 +10,7 @@ use crate::options::{ExternalChange, OutputChange};
 use crate::pipeline::protocol::{self, Command, OwnImageState, SampleCounts, Stage, Status};
 use crate::scene::diagnostic::Severity;
 
-/// A UI that has begun the scene's own image.
+/// Creates a UI that has started to render the scene's own image.
 fn begun(columns: u16, rows: u16) -> TestUi {
     let mut ui = TestUi::with(state(columns, rows));
     ui.read_scene();
@@ -37,7 +37,7 @@ fn finish_unwritten(ui: &mut TestUi, color: [u8; 3]) {
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
 }
 
-/// Presses `w`, which writes an image with all samples or with these.
+/// Presses `w` and reports the written image, with these sample counts if it is unfinished.
 fn write(ui: &mut TestUi, is_own: bool, unfinished: Option<SampleCounts>) {
     ui.press('w');
     let generation = ui.state.request.generation;
@@ -49,7 +49,7 @@ fn write(ui: &mut TestUi, is_own: bool, unfinished: Option<SampleCounts>) {
 
 #[track_caller]
 fn assert_shows(ui: &mut TestUi, words: &str) {
-    // A side panel wraps its lines, with the preview between them.
+    // A side panel wraps its lines, so the preview is between them.
     let text: String = ui.text().chars().filter(|it| *it != '▀' && !it.is_whitespace()).collect();
     let words: String = words.chars().filter(|it| !it.is_whitespace()).collect();
     assert!(text.contains(&words), "{words}: {}", ui.text());
@@ -59,7 +59,7 @@ fn assert_shows(ui: &mut TestUi, words: &str) {
 fn w_writes_the_newest_step() {
     let mut ui = begun(80, 24);
     ui.press(']');
-    assert!(ui.press(']').is_empty(), "the step waits for a preview of the first one");
+    assert!(ui.press(']').is_empty(), "the step should wait for the first step's preview");
     let effects = ui.press('w');
     assert_eq!(request(&effects).expect("the waiting step").overrides.exposure, Some(0.5));
     assert!(matches!(effects.last(), Some(Effect::Send(Command::Write))), "{effects:?}");
@@ -83,8 +83,8 @@ fn image_written_on_request_is_named_until_replaced() {
         finish_unwritten(&mut ui, BLUE);
         assert_eq!(summary_text(&ui.state), part);
         assert_shows(&mut ui, &messages::unfinished_image("cornell.png"));
-        assert!(!ui.text().contains("→ cornell.png"), "it has fewer samples: {}", ui.text());
-        // Another image is shown, then the scene's own image, which does not replace the written one.
+        assert!(!ui.text().contains("→ cornell.png"), "a partial image should not be listed: {}", ui.text());
+        // Show another image, then the scene's own image, which does not replace the written one.
         ui.press('s');
         own_image(&mut ui, OwnImageState::Begun { is_rendering: false });
         finish_unwritten(&mut ui, RED);
@@ -94,7 +94,7 @@ fn image_written_on_request_is_named_until_replaced() {
         finish_unwritten(&mut ui, RED);
         assert_eq!(summary_text(&ui.state), part);
         assert_shows(&mut ui, &messages::other_image_with("cornell.png", "exposure +0.25"));
-        assert!(!ui.text().contains("→ cornell.png"), "it shows something else: {}", ui.text());
+        assert!(!ui.text().contains("→ cornell.png"), "the old image should not be listed: {}", ui.text());
         write(&mut ui, true, None);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         assert_shows(&mut ui, "→ cornell.png");
@@ -103,7 +103,7 @@ fn image_written_on_request_is_named_until_replaced() {
 }
 
 #[test]
-fn finished_image_written_before_the_end_is_described() {
+fn complete_image_written_early_is_described() {
     let mut ui = begun(80, 24);
     ui.press('v');
     write(&mut ui, false, None);
@@ -132,14 +132,14 @@ fn written_image_is_outdated_only_after_a_save() {
     assert!(summary_text(&ui.state).ends_with("(older than your last edit)"), "{}", summary_text(&ui.state));
 }
 
-/// A conflict with an existing file.
+/// Reports a conflict with an existing file.
 fn refuse(ui: &mut TestUi) {
     let conflicts = vec![diagnostic(Severity::Error, "cannot write cornell.png: it is another image")];
     ui.worker_event(protocol::Event::Refused { generation: ui.state.request.generation, conflicts });
 }
 
 #[test]
-fn w_is_not_offered_for_a_file_that_it_keeps() {
+fn w_is_offered_only_if_it_replaces_the_file() {
     for (lost, is_kept) in [
         (ExternalChange::Removed, false),
         (ExternalChange::Replaced, false),
@@ -160,7 +160,7 @@ fn w_is_not_offered_for_a_file_that_it_keeps() {
 }
 
 #[test]
-fn conflict_hides_hints_that_w_would_save() {
+fn conflict_hides_hints_about_saving_with_w() {
     let mut ui = TestUi::with(state(120, 40));
     refuse(&mut ui);
     finish_unwritten(&mut ui, RED);

@@ -15,18 +15,18 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{State, format_stops};
 
-/// Angle of an orbit step in degrees.
+/// Orbit step in degrees.
 const TURN: f64 = 3.0;
 /// Factor by which a dolly step changes the distance.
 const NEARER: f64 = 0.95;
 /// Factor by which a zoom step changes the field of view.
 const WIDER: f64 = 1.05;
-/// Two fields of view that differ by at most this are considered equal, because each step is rounded. Steps
-/// are larger than this.
+/// Maximum difference between two fields of view that are considered equal. Each step is rounded, but is
+/// larger than this.
 const ROUNDING: f64 = 0.015;
-/// Size of an exposure step in stops.
+/// Exposure step in stops.
 const STOPS: f32 = 0.25;
-/// Limit of the exposure in stops, in either direction.
+/// Maximum exposure change in either direction, in stops.
 const MAX_STOPS: f32 = 20.0;
 
 /// Orbits the camera by `right` steps to the right and `up` steps upward.
@@ -124,7 +124,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let saved = state.request.conflicting_camera_saves();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !is_mesh(&state.request.scene) {
-        // The message below lists the saved values, so they no longer cause a conflict.
+        // The message below lists the saved values, so they cause no further conflict.
         state.request.rebase_moves_on_scene();
         let saved = saved.join(", ");
         return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
@@ -133,8 +133,8 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
-/// Handles the result of writing the camera. If the scene now uses this camera, it is no longer treated as
-/// moved.
+/// Handles the result of writing the camera. If the scene now uses this camera, the camera no longer counts
+/// as moved.
 pub(super) fn handle_saved_camera(state: &mut State, outcome: Result<SavedCamera, String>) -> Vec<Effect> {
     let SavedCamera { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,

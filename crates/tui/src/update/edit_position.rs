@@ -4,8 +4,8 @@ use crate::event::FilePosition;
 use crate::scene::diagnostic::{Diagnostic, SourceSpan};
 use crate::state::State;
 
-/// Position to open: the first error, or else the clicked object, the first warning or the start of the
-/// scene.
+/// Returns the position to open: the first error, or else the clicked object, the first warning or the start
+/// of the scene.
 pub(super) fn position_to_edit(state: &State) -> FilePosition {
     let errors = state
         .overlays

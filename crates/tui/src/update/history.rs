@@ -1,4 +1,4 @@
-//! The history: browsing renders, and comparing with the render before the last edit.
+//! Browses the history and switches to the render before the last edit.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) fn record_image(state: &mut State) {
 }
 
 /// Records a new image for the newest request, even if an older render is being viewed. The last image often
-/// arrives after the render has ended. A section shown 1:1 never replaces a finished image.
+/// arrives after the end of its render. A section shown at 1:1 scale never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
     let is_over = !state.work.is_under_way();
     if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
@@ -85,7 +85,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Explains why the history has no image. It consists of previews.
+/// Explains why the history, which consists of previews, has no image.
 fn report_no_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
     notify(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })

@@ -89,7 +89,7 @@ fn change_and_redraw(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Eff
     Vec::new()
 }
 
-/// Whether a setting differs from `base`, the value it had before any key changed it.
+/// Whether a setting differs from `base`, its value before any key changed it.
 fn differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
     base.is_none_or(|base| *next != base)
 }
@@ -102,7 +102,7 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     request_render(state, false)
 }
 
-/// Name of an integrator that supports a setting. `None` if the current one supports it.
+/// Returns the name of an integrator that supports a setting, or `None` if the current integrator does.
 fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<&'static str> {
     if supports(state.request.integrator().method()) {
         return None;
@@ -124,7 +124,7 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     request_render(state, false)
 }
 
-/// Toggles depth of field. If it is off although no setting turned it off, the camera is a pinhole.
+/// Toggles depth of field. If no setting has turned it off but it is off, the camera is a pinhole.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.overrides().dof == Some(false);
     match &state.request.effective {
@@ -134,7 +134,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
         }
         Some(_) => {}
     }
-    // Unless depth of field is turned off, it depends on the lens.
+    // By default, depth of field is on and depends only on the lens.
     let base = state.request.command_line.dof.or(Some(true));
     state.request.toggles.dof = Some(switched_off).filter(|next| differs_from_base(next, base));
     request_render(state, false)

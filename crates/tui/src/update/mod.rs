@@ -70,8 +70,8 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
-            // Keep the message if glimt caused the change by writing the camera, or refused to write the
-            // camera because of the change.
+            // Keep the message if glimt made the change by writing the camera, or refused to write the camera
+            // because of it.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
@@ -89,7 +89,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.saved_at = state.request.generation;
             state.saving.own = OwnImage { state: OwnImageState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
-            // A change saved from the editor is visible only after the editor has exited.
+            // A change saved in the editor becomes visible only when the editor exits.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
             state.saving.change = Some(PendingChange { generation: state.request.generation, noticed });
             effects
@@ -143,8 +143,8 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Keeps the old colors of pixels that differ from the last preview by no more than one code value, since
-/// even such a small difference could change the dither pattern.
+/// Keeps the previous color of each pixel that has changed by at most one code value since the last preview,
+/// because even such a small difference could change the dither pattern.
 fn keep_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const MAX_DIFFERENCE: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);

@@ -1,4 +1,4 @@
-//! Keys of the overlays: help, view list, diagnostics.
+//! Handles keys for the overlays: help, view list and diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -12,7 +12,7 @@ use crate::pipeline::settings::View;
 use crate::state::State;
 use crate::view::{diagnostics, help};
 
-/// Handles a key. `None` if it is not used by an open overlay.
+/// Handles a key. `None` if no open overlay uses it.
 pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);
@@ -28,7 +28,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
     perform_action(state, action).then(Vec::new)
 }
 
-/// Performs the action if an open overlay uses it. Returns whether one did.
+/// Performs the action if an open overlay uses it, and returns true if so.
 pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
     match action {
         OverlayAction::Close => close_topmost(state),
@@ -78,8 +78,8 @@ fn close_topmost(state: &mut State) -> bool {
     is_open
 }
 
-/// Scrolls the help, or the diagnostics pane if its content does not fit. Returns false if nothing scrolls,
-/// so that the key has its usual function.
+/// Scrolls the help, or the diagnostics pane if its content does not fit. Returns false if there is nothing
+/// to scroll, in which case the key keeps its usual function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
         () if state.overlays.help.open => (true, help::scroll_extent(state)),

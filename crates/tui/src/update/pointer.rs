@@ -1,4 +1,4 @@
-//! The mouse, and queries about image positions.
+//! Handles the mouse and queries about image positions.
 
 use super::notices::{notify, prompt, show_change, show_notice};
 use super::{camera, history, overlay, region};
@@ -16,7 +16,7 @@ use crate::view::layout::Layout;
 use crate::view::preview::image_position_at;
 use crate::window_title;
 
-/// Rotation in degrees when dragging across the width of the preview.
+/// Rotation in degrees for a drag across the full width of the preview.
 const TURN_ACROSS: f64 = 180.0;
 
 /// Handles a mouse event.
@@ -100,7 +100,7 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     send_pick_query(state, PickPurpose::Inspect)
 }
 
-/// Waits for a click that sets the focus. If already waiting, focuses at the crosshair.
+/// Waits for a click that sets the focus. If already waiting, sets the focus at the crosshair.
 pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
@@ -176,7 +176,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     effects
 }
 
-/// The inspected values and the pixel position, in one line.
+/// Formats the inspected values and the pixel position on one line.
 fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel

@@ -9,7 +9,7 @@ use crate::view::layout::Layout;
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
 /// request.
 pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
-    // Do not fill the history while the camera is moving.
+    // Do not fill up the history while the camera is moving.
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.picture.history.drop_unfinished(state.request.generation);
     } else {
@@ -32,7 +32,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
-    // Cleared for now. If this request renders a saved change, they are set again later.
+    // Clear these for now. If this request renders a saved change, they are set again later.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;

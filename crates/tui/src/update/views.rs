@@ -41,7 +41,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
     Some(select_if_changed(state, View::ALL[chosen]))
 }
 
-/// Handles a key while the user types a search text. `None` if no search is active.
+/// Handles a key while the user is typing a search. `None` if no search is active.
 pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
@@ -76,7 +76,7 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     effects
 }
 
-/// The first view whose name starts with `name`. If there is none, the first whose name contains it.
+/// Finds the first view whose name starts with `name` or, failing that, contains it.
 fn find_view(name: &str) -> Option<View> {
     let begins = |view: &&View| view.name().starts_with(name);
     let has = |view: &&View| view.name().contains(name);

@@ -1,4 +1,5 @@
-//! Handles worker events. Events of older generations are ignored unless they concern files or user actions.
+//! Handles worker events. Events from older generations are ignored unless they concern files or user
+//! actions.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -33,7 +34,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             report_written(state, &paths);
             return Vec::new();
         }
-        // Images of earlier requests may be written after a new request has started.
+        // Images from earlier requests may be written after a new request has started.
         Event::Written { path, bytes, generation, is_own, unfinished }
             if generation != state.request.generation =>
         {
@@ -49,7 +50,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
     if event_generation(&event) != state.request.generation {
         return Vec::new();
     }
-    // Previews are taken from their slot, and files are handled by the watcher.
+    // Previews come from their slot and file changes from the watcher.
     let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
     state.dirty |= !shows_nothing;
     match event {
@@ -151,8 +152,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
     Vec::new()
 }
 
-/// Sends a notification that a long render has ended, if the user is in another window and the terminal
-/// supports notifications.
+/// Notifies the user that a long render has ended. Requires that the window is not focused and that the
+/// terminal supports notifications.
 fn notify_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, WorkerActivity::Done | WorkerActivity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
@@ -204,7 +205,7 @@ fn handle_started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
-    // A written image remains up to date until rendering of another image begins.
+    // A written image stays up to date until the render of another image begins.
     if state.request.is_own_image() && state.saving.own.state != OwnImageState::Written {
         state.saving.own = OwnImage { state: OwnImageState::Begun { is_rendering: true }, fraction: 0.0 };
     }
@@ -258,8 +259,8 @@ fn record_own_written(
     record_file(state, path, bytes, (generation, is_own), unfinished);
 }
 
-/// Records that an image has been written. Its render may still be running. If there is a report, it belongs
-/// to the same image.
+/// Records that an image has been written. Its render may still be running. Any existing report belongs to
+/// the same image.
 fn record_file(
     state: &mut State,
     path: PathBuf,
@@ -303,7 +304,7 @@ fn describe_files(state: &mut State, generation: u64, report: &Report) {
     }
 }
 
-/// Handles a change to an output file made by another program.
+/// Handles another program's change to an output file.
 pub(super) fn handle_output_change(
     state: &mut State,
     OutputChange { path, lost }: &OutputChange,
@@ -373,7 +374,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     }
 }
 
-/// Adds the time that earlier requests spent on this image's samples.
+/// Adds the time spent on this image's samples by earlier requests.
 fn add_earlier_seconds(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];
@@ -452,7 +453,8 @@ fn handle_failure(state: &mut State, failure: Failure) {
     }
 }
 
-/// Handles the end of rendering the last valid scene, which continues while the scene file is broken.
+/// Handles the end of a render of the last valid scene. Such a render continues while the scene file is
+/// broken.
 fn handle_last_valid_end(state: &mut State, end: LastValidSceneOutcome) {
     match end {
         LastValidSceneOutcome::Finished { unchanged } => {

@@ -1,4 +1,4 @@
-//! A small log-log chart that shows noise over time and a line at the requested `error`.
+//! A small log-log chart of noise over time, with a line at the requested `error`.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -18,7 +18,7 @@ const MIN_ROWS: u16 = 6;
 const MAX_ROWS: u16 = 12;
 /// Maximum width of the chart. More columns would not add detail.
 const MAX_COLUMNS: u16 = 60;
-/// Minimum number of points in a curve, and minimum ratio of its last time to its first.
+/// Minimum number of points in a curve, and minimum ratio between its last and first times.
 const MIN_POINTS: usize = 3;
 const MIN_RATIO: f64 = 1.5;
 
@@ -38,7 +38,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     rows
 }
 
-/// Number of rows used by the chart and its caption. `None` if they do not fit.
+/// Number of rows that the chart and its caption use. `None` if they do not fit.
 pub(super) fn chart_rows(state: &State, area: Rect) -> Option<u16> {
     let words = 1 + caption(state, curve_points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
@@ -60,7 +60,7 @@ fn requested_noise(state: &State) -> Option<f64> {
 /// A no-break space, which keeps a number and its unit on one line.
 const UNBROKEN: &str = "\u{a0}";
 
-/// The caption, wrapped into lines. Numbers are not separated from their units.
+/// Wraps the caption into lines without separating numbers from their units.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', UNBROKEN);

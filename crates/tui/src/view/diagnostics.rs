@@ -1,4 +1,4 @@
-//! The pane with errors and warnings, next to the image or over its lower part.
+//! The pane that lists errors and warnings, next to the image or over its lower part.
 
 use std::collections::HashMap;
 
@@ -45,8 +45,8 @@ pub(super) fn covered_cells(state: &State) -> Rect {
     }
 }
 
-/// The lower part of an area, large enough for the lines and the title. Returns the whole area if it is the
-/// panel.
+/// Returns the lower part of an area, with enough rows for the title and the lines, or the whole area if it
+/// is the panel.
 fn pane_area(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
         return area;
@@ -75,7 +75,7 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
     put_text(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
-/// Number of lines per page, and the maximum scroll position.
+/// Returns the number of lines per page and the maximum scroll position.
 pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
     let area = Layout::for_state(state).pane;
     let text = pane_lines(state, area);
@@ -100,7 +100,8 @@ fn pane_lines(state: &State, area: Rect) -> Vec<StyledLine> {
     text
 }
 
-/// Formats the diagnostics, errors first. A diagnostic reported at several positions is listed once.
+/// Formats the diagnostics, errors first. A diagnostic that is reported at several positions is listed only
+/// once.
 fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
@@ -129,7 +130,7 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     lines
 }
 
-/// Formats the first position in full and the others as line and column, followed by an empty line.
+/// Formats the first position in full and the others only as line and column. An empty line follows.
 fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         SpanRole::Text => Tone::Plain,
@@ -141,7 +142,7 @@ fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
     let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
-    // Drop the empty line and the count at the end of the report. The title contains the count.
+    // Drop the empty line and the count that end the report, because the title already contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| format_position(one)).collect();

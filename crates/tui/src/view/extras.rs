@@ -1,4 +1,4 @@
-//! Parts of the screen that are handled separately: file names and delayed cells.
+//! Parts of the screen that need separate handling: file names and delayed cells.
 
 use std::path::PathBuf;
 

@@ -89,7 +89,7 @@ fn work_label(state: &State) -> (&'static str, &'static str, Tone) {
     }
 }
 
-/// A word for the worker's state, regardless of the displayed image.
+/// Returns a word for the worker's state, regardless of the displayed image.
 pub(super) fn work_word(state: &State) -> &'static str {
     work_label(state).1
 }
@@ -117,7 +117,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     put_text(buffer, area, &pieces, state.display.depth);
 }
 
-/// The view and its range of values, or nothing for the beauty view.
+/// The view and its range of values. Empty for the beauty view.
 fn view_label(state: &State) -> String {
     let open = state.picture.history.viewed_origin();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
@@ -149,7 +149,7 @@ fn close_up_label(state: &State) -> String {
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// Progress or result, in variants from long to short.
+/// Progress or result in several variants, from longest to shortest.
 fn progress_or_result(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
         let is_unfinished = state.picture.history.viewed_origin().is_some_and(|origin| origin.is_unfinished);
@@ -209,7 +209,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
     }
 }
 
-/// Number of the newest render. A running render is included if it has an image.
+/// Number of the newest render. A running render counts if it has an image.
 fn newest_render_number(state: &State) -> u64 {
     let history = &state.picture.history;
     let is_under_way = state.work.is_under_way()

@@ -58,7 +58,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     }
 }
 
-/// Number of columns between labels and texts.
+/// Number of columns between labels and descriptions.
 const BESIDE: u16 = 3;
 
 /// Width of the label column if the help is `width` columns wide.
@@ -80,7 +80,7 @@ fn help_lines(width: u16) -> Vec<(String, String)> {
     help_entries().flat_map(both).collect()
 }
 
-/// Number of lines per page, and the maximum scroll position.
+/// Returns the number of lines per page and the maximum scroll position.
 pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
     let inner = inside_border(help_area(state));
     let page = usize::from(inner.height).max(1);

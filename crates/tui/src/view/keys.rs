@@ -71,8 +71,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Combines toggles and other hints. Space is assigned first to urgent hints, then to toggles, then to the
-/// others.
+/// Combines toggles and other hints. Space goes to urgent hints first, then to toggles, then to the others.
 fn fit_hints(
     (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
     toggles: Vec<KeyHint>,
@@ -100,7 +99,7 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
     hint.width(is_long)
 }
 
-/// Hints for the toggles, with their values. Toggles changed with keys are bold.
+/// Hints for the toggles and their values. Toggles that were changed with keys are bold.
 fn toggle_hints(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
     if state.picture.history.is_viewing_older() {
@@ -138,7 +137,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         of.map(|it| KeyHint::new(it.label, it.hint)).collect()
     };
     let closing = || overlay(&[OverlayAction::Close]);
-    // Scroll keys, if some lines are not visible.
+    // Show scroll keys if some lines are not visible.
     let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
         let (_, last) = super::help::scroll_extent(state);
@@ -200,7 +199,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let has_picture = state.display.kind != PreviewKind::None;
     let is_shown = |it: &&Binding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // If there are changes to list, a hint added above already shows this key with them.
+    // If there are changes to list, a hint added above already shows them next to this key.
     let is_of_use =
         state.request.toggles != KeyOverrides::default() && state.request.key_changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::ResetSettings || is_of_use;
@@ -241,7 +240,7 @@ fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
-/// Hint with the number of errors and warnings, if the pane is closed.
+/// Hint with the number of errors and warnings. `None` if the pane is open.
 fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     let key = keymap::binding_for(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {

@@ -28,20 +28,20 @@ pub(crate) struct Layout {
 
 /// Width of the state block, which is fixed so that the name following it does not move.
 pub(super) const BLOCK: usize = 13;
-/// Windows with fewer rows than this have one line of text.
+/// Windows with fewer rows than this have only one line of text.
 const TWO_LINES: u16 = 6;
 /// Windows with fewer rows than this have two lines of text.
 const THREE_LINES: u16 = 14;
-/// Width of a stage's name, time and time difference.
+/// Combined width of a stage's name, time and time difference.
 const SIDE_WIDTH: u16 = 23;
 /// Width of a stage entry, including the gap between stages.
 pub(super) const ENTRY_WIDTH: u16 = 26;
 /// Minimum height of a panel next to the image, enough for half of the stages.
 const SIDE_HEIGHT: u16 = 4;
-/// Minimum fraction of the image's cells that must remain when a panel is added. Otherwise the panel is
-/// omitted.
+/// Minimum fraction of the image's cells that must remain when a panel is added. If fewer would remain, the
+/// panel is omitted.
 const KEPT: f32 = 0.9;
-/// Minimum sizes of a panel that shows diagnostics. A narrower panel must be taller.
+/// Minimum sizes for a panel that shows diagnostics. Narrower panels must be taller.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
 /// Maximum height of a diagnostics pane over the image.
 const PANE_HEIGHT: u16 = 12;
@@ -92,8 +92,8 @@ impl Layout {
     }
 }
 
-/// Divides the space between image and panel to make the image as large as possible. The panel is omitted if
-/// it would take too much space.
+/// Divides the space between image and panel so that the image is as large as possible. The panel is omitted
+/// if it would take too much space.
 fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
         let (width, height) = fit_image(area, shape);
@@ -122,7 +122,7 @@ fn panel_below_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     (columns > 0).then_some((Rect { height, ..rest }, panel))
 }
 
-/// Columns and rows of the largest image with this aspect ratio that fits into an area.
+/// Returns the columns and rows of the largest image with this aspect ratio that fits into an area.
 fn fit_image(area: Rect, shape: f32) -> (u16, u16) {
     let rows = (f32::from(area.width) / shape).ceil();
     if rows <= f32::from(area.height) {
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn tab_hides_all_lines_but_the_header() {
+    fn tab_hides_all_text_except_the_header() {
         let alone = Layout::new(80, 24, Some(2.0), true);
         assert_eq!((alone.preview, alone.header), (Rect::new(0, 0, 80, 23), Rect::new(0, 23, 80, 1)));
         let none = Layout::new(80, 24, None, true);

@@ -14,7 +14,7 @@ use crate::state::State;
 
 /// Panel height needed for the inspected values.
 const FACTS: u16 = 10;
-/// Columns between a message and the rest of the status line.
+/// Number of columns between a message and the rest of the status line.
 const GAP: u16 = 2;
 
 /// Where a message is shown.
@@ -52,7 +52,7 @@ pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
     message_text(state, layout).is_some()
 }
 
-/// The part of the status line not used by a message.
+/// Returns the part of the status line that no message uses.
 pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
     let spot = message_text(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
@@ -119,7 +119,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
-/// A line and, above it, the rows that a long message may cover.
+/// A line, together with the rows above it that a long message may cover.
 fn with_rows_above(layout: &Layout, line: Rect) -> Rect {
     // Skip empty areas, since their origin would extend the union.
     let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());

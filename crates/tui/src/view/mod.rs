@@ -31,7 +31,7 @@ pub(super) fn activity_word(state: &State) -> &'static str {
     header::work_word(state)
 }
 
-/// Index of the history entry shown at a cell in the history strip.
+/// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, column: u16, row: u16) -> Option<usize> {
     let layout = Layout::for_state(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();

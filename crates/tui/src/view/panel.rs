@@ -45,7 +45,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
     drawn
 }
 
-/// Index of the history entry shown at a cell in the history strip.
+/// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelLayout { lines, columns, room } = panel_layout(state, area);
     side_panel::history_entry_at(state, area, rows_used(&lines, columns, room), place)
@@ -75,13 +75,13 @@ fn panel_layout(state: &State, area: Rect) -> PanelLayout {
     PanelLayout { lines, columns, room }
 }
 
-/// Number of rows used by the lines. If there are several columns, all rows are used.
+/// Number of rows used by the lines. With several columns, all rows are used.
 fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
-/// The panel's lines for this width. Hints are wrapped to the column width. Stage reasons are shown in full,
-/// or shortened to fit next to the stages.
+/// Creates the panel's lines for this width. Hints are wrapped to the column width. Stage reasons are shown
+/// in full, or shortened to fit next to the stages.
 fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, WorkerActivity::Done);
     let mut lines = inspected_lines(state, width);
@@ -139,7 +139,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// The results, as lines with one label and value each.
+/// The results as lines, each with a label and a value.
 fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
@@ -188,11 +188,11 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
 enum RenderEnd {
     Time,
     Samples,
-    /// The requested `error` has been reached in all tiles.
+    /// All tiles have reached the requested `error`.
     Error,
 }
 
-/// The limit that ended the render. `None` if only one limit was set.
+/// Determines which limit ended the render. `None` if only one was set.
 fn render_end(state: &State) -> Option<RenderEnd> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;

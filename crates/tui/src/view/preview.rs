@@ -73,7 +73,7 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
     cells.contains((column, row).into()).then(spot)
 }
 
-/// The preview kind to use if the preview must be drawn with cells.
+/// Returns the preview kind to use if the preview must be drawn as cells.
 fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::from_choice(PreviewChoice::Auto, depth),
@@ -113,8 +113,8 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// Draws an image into these cells for a terminal with a dark background, xterm's colors, and cells twice as
-/// tall as wide.
+/// Draws an image into these cells for a terminal with a dark background, xterm's colors, and cells that are
+/// twice as tall as wide.
 pub fn draw_for_dark_xterm(
     picture: &Picture,
     choice: PreviewChoice,
@@ -126,7 +126,7 @@ pub fn draw_for_dark_xterm(
     draw_image(picture, choice, inks, (area, 2.0))
 }
 
-/// Draws an image with these color settings and this cell aspect ratio.
+/// Draws an image using these color settings and this cell aspect ratio.
 pub(crate) fn draw_image(
     picture: &Picture,
     choice: PreviewChoice,
@@ -139,7 +139,8 @@ pub(crate) fn draw_image(
     buffer
 }
 
-/// Size in cells of an image drawn with half blocks or ASCII characters, limited to the available cells.
+/// Returns the size in cells of an image drawn with half blocks or ASCII characters, limited to the available
+/// space.
 pub(crate) fn size_in_cells(
     picture: &Picture,
     depth: ColorDepth,
@@ -169,8 +170,8 @@ impl PlacedImage {
         Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
     }
 
-    /// The largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's height divided
-    /// by its width. A pixel is at most `most` cell parts wide.
+    /// Computes the largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's
+    /// height divided by its width. An image pixel covers at most `most` cell parts horizontally.
     fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
@@ -348,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_within_a_cell_use_quadrants() {
+    fn edges_within_a_cell_are_drawn_as_quadrants() {
         let sharp = picture(8, 8, |x, _| if x < 3 { [200, 20, 20] } else { [20, 20, 200] });
         let state = state(4, 2);
         for (kind, symbol) in

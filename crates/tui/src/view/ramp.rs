@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 
 /// Characters and the fraction of a cell covered by their ink, measured with DejaVu Sans Mono. Other fonts
-/// differ by a few percent. All characters are punctuation so that they are not confused with text.
+/// differ by a few percent. All are punctuation, so that they are not mistaken for text.
 const RAMP: [(char, f32); 15] = [
     (' ', 0.0),
     ('.', 0.027),
@@ -64,7 +64,7 @@ impl AsciiRamp {
         self.nearest_glyph(self.stretch(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
-    /// The character that shows a color, and the character's ink color. The ink is as saturated as possible,
+    /// Returns the character that shows a color, and its ink color. The ink is as saturated as possible,
     /// which maximizes the area covered by the character.
     pub(super) fn tinted_glyph(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
@@ -91,7 +91,7 @@ impl AsciiRamp {
     }
 }
 
-/// The first level at which more than `beyond` pixels have been counted.
+/// Returns the first level by which more than `beyond` pixels have been counted.
 fn quantile_level(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
     let mut seen = 0;
     let level = levels.find(|level| {

@@ -11,7 +11,7 @@ use crate::state::{State, WorkerActivity};
 const WIDE: u16 = 120;
 /// Width of the lines in a divided panel, enough for a stage and its reason.
 const COLUMN: u16 = 44;
-/// Minimum panel width for placing the lines next to the curve and the history.
+/// Minimum panel width at which the lines are next to the curve and the history.
 const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
 /// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
@@ -25,7 +25,7 @@ fn is_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
-/// The area next to or below the lines that remains for the curve and the history.
+/// Returns the area left for the curve and the history, next to or below the lines.
 fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
@@ -55,7 +55,7 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
     [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }
 
-/// Index of the history entry shown at a cell in the history strip.
+/// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
     let (_, strip) = divide_curve_and_strip(state, panel, lines);
     strip::entry_at(state, strip, place)

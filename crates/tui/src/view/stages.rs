@@ -18,8 +18,8 @@ const TIME_ENDS: u16 = 16;
 /// Minimum width of a stage's shortened reason.
 const MIN_WHY: u16 = 12;
 
-/// A stage's symbol, name, time, time difference and reason. If there is no space for the reason, it follows
-/// on separate lines.
+/// Formats a stage's symbol, name, time, time difference and reason. A reason that does not fit follows on
+/// separate lines.
 pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let why = stage_reason(state, stage);
@@ -35,7 +35,7 @@ pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledL
     std::iter::once(line).chain(below).collect()
 }
 
-/// A stage's symbol, name, time, time difference and as much of the reason as fits on the same line.
+/// Formats a stage's symbol, name, time, time difference, and as much of the reason as fits on the same line.
 pub(super) fn stage_line_with_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let (why, room) = (stage_reason(state, stage), reason_columns(&line, room));
@@ -90,13 +90,13 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     line
 }
 
-/// Tone of a stage's text, which is bold if the stage was run again after an edit.
+/// Tone of a stage's text. Bold if an edit caused the stage to run again.
 fn tone_of_stage(state: &State, report: Option<&StageReport>) -> Tone {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
 
-/// Difference from the stage's previous time.
+/// Difference between the stage's time and its previous time.
 fn time_change(state: &State, report: &StageReport) -> String {
     match report.status {
         Status::Done => format_time_difference(
@@ -107,8 +107,8 @@ fn time_change(state: &State, report: &StageReport) -> String {
     }
 }
 
-/// One line with the stages that took a significant part of the time, followed by the number of cached
-/// stages. Shortened to fit, and empty if even the longest stage does not fit.
+/// Lists the stages that took a significant part of the time on one line, followed by the number of cached
+/// stages. The line is shortened to fit, and empty if even the longest stage does not fit.
 pub(super) fn summary_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
@@ -154,7 +154,7 @@ pub(super) fn running_stage(state: &State) -> Option<&'static str> {
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
-/// Fraction of an asset that has been loaded.
+/// Loaded fraction of an asset.
 pub(super) fn loaded_fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }

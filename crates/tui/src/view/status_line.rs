@@ -20,13 +20,13 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{OwnImage, State, WorkerActivity, WrittenFile};
 
-/// Save hints for narrow windows.
+/// Short save hints, for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
 const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
 /// Minimum width of a progress bar.
 const MIN_BAR: u16 = 6;
 
-/// Draws the status line in the part that is not used by a message.
+/// Draws the status line in the space that no message uses.
 pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     match status_content(state) {
         StatusContent::Nothing => {}
@@ -47,7 +47,7 @@ enum StatusContent {
 }
 
 fn status_content(state: &State) -> StatusContent {
-    // The results are those of the newest render.
+    // The results belong to the newest render.
     if state.picture.history.is_viewing_older() && !state.work.is_running() {
         return StatusContent::Nothing;
     }
@@ -77,13 +77,13 @@ pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
     }
 }
 
-/// Progress of rendering the last valid scene, which continues while the file is broken.
+/// Progress of the last valid scene's render, which continues while the file is broken.
 pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, WorkerActivity::Broken | WorkerActivity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Fraction and text of the progress bar, for the asset being loaded or the render.
+/// Progress bar fraction and text for the asset being loaded or for the render.
 fn progress_text(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_time(state.now).map_or(String::new(), format_running_time);
     match (&state.work.progress, state.work.assets.last()) {
@@ -211,7 +211,7 @@ pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &Writte
         .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
-/// Messages about an image that is not in its files, and about the images that are.
+/// Returns messages about a displayed image that has not been written, and about the images that have.
 pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
     let saving = &state.saving;
     if current_image_files(state).next().is_some() {
@@ -244,7 +244,7 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
     [messages::NOT_SAVED.to_owned()].into_iter().chain(other).collect()
 }
 
-/// A message about each written file that another program has changed.
+/// Returns a message for each written file that another program has changed.
 pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
     state.saving.written.iter().filter_map(WrittenFile::loss)
 }
@@ -277,8 +277,7 @@ fn is_unreadable(state: &State) -> bool {
     diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
 }
 
-/// Two texts about the cost of sending the last preview: the number of bytes with and without the round-trip
-/// time.
+/// Describes the cost of the last preview in two variants: bytes sent with and without the round-trip time.
 fn preview_cost_variants(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);

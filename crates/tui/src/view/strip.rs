@@ -1,4 +1,5 @@
-//! The history strip: recent renders from newest to oldest, each with the changes since the previous one.
+//! The history strip: recent renders from newest to oldest, each listed with the changes since the previous
+//! one.
 
 use super::preview;
 use super::strip_words::{EntryText, fit_text};
@@ -65,7 +66,7 @@ fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buf
     preview::draw_thumbnail(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
-    // The text is next to the thumbnail and starts at the same column whether or not there is a mark.
+    // The text next to the thumbnail starts at the same column with or without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", render_label(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
@@ -88,14 +89,15 @@ fn is_under_way(state: &State, index: usize) -> bool {
     state.work.is_under_way() && state.picture.history.belongs_to_request(index, state.request.generation)
 }
 
-/// Width of a thumbnail, given its height. Limited to leave space for text.
+/// Computes a thumbnail's width from its height, leaving space for text.
 fn thumbnail_width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
     width.clamp(1, cells.width.saturating_sub(MIN_WORDS + 1).max(1))
 }
 
-/// Number of rows used by the strip in an area. 0 if there are too few entries or too little space.
+/// Returns the number of rows that the strip uses in an area, or 0 if there are too few entries or too little
+/// space.
 pub(super) fn strip_rows(state: &State, area: Rect) -> u16 {
     let items = visible_entries(state, area);
     let top = items.iter().map(|item| item.cells.y).min();
@@ -131,7 +133,7 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
     (0..shown).map(item).collect()
 }
 
-/// Index of the history entry shown at a cell in the strip.
+/// Returns the index of the history entry shown at a cell in the strip.
 pub(super) fn entry_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
     visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)

@@ -20,7 +20,7 @@ enum ChangeForm {
     Full,
     /// The key with its new value.
     New,
-    /// The new value, and only the last parts of the key, which identify an object and its property.
+    /// The new value and the last parts of the key, which identify an object and its property.
     Short,
     /// Like `Short`, but with only this many changes.
     First(usize),
@@ -54,7 +54,7 @@ pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec
     lines
 }
 
-/// The pieces of all changes that are shown.
+/// Splits all displayed changes into pieces.
 fn shown_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
@@ -91,7 +91,7 @@ impl ChangePiece {
         Self { text: text.into(), is_key: false }
     }
 
-    /// The parts after which a line may be broken: parts of the key, or words.
+    /// Splits the text where a line may be broken: after parts of the key, or between words.
     fn breakable_parts(&self) -> Vec<String> {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();
@@ -135,7 +135,7 @@ fn format_key(key: &str, form: ChangeForm, beside_head: usize) -> String {
     }
 }
 
-/// The last parts of a key, which identify an object and its property. Returns `lamp.emission` for
+/// Returns the last parts of a key, which identify an object and its property: `lamp.emission` for
 /// `materials.lamp.emission`, but all of `light.1.direction`.
 fn last_parts(key: &str) -> String {
     let parts = key_parts(key);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn number_is_first_and_new_value_is_complete() {
+    fn number_comes_first_and_new_value_is_complete() {
         let emission = "materials.lamp.emission [14, 13, 11] → [20, 13, 5]";
         assert_eq!(lines("▸4", &[emission], 13), ["▸4 materials.", "lamp.emission", "→ [20, 13, 5]"]);
         assert_eq!(lines("▸4", &[emission], 12), ["▸4 lamp.", "emission →", "[20, 13, 5]"]);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_reset_together_are_one_change() {
+    fn settings_reset_together_form_one_change() {
         assert_eq!(lines(" 4", &["integrator and view reset"], 60), [" 4 integrator and view reset"]);
     }
 

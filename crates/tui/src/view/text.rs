@@ -1,4 +1,4 @@
-//! Text in cells: styles that also work without color, and formatting of quantities.
+//! Text in cells: styles that also work without color, and quantity formatting.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ pub(super) enum Tone {
 }
 
 impl Tone {
-    /// The style for text with this tone. Without color support, only modifiers are used.
+    /// Returns the style for text with this tone. Without color support, only modifiers are used.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
             Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
@@ -47,8 +47,8 @@ impl Tone {
         Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
     }
 
-    /// The style for a solid block with black or white text, chosen to be readable in any theme. Without
-    /// color support, text is reversed.
+    /// Returns a style for a solid block of color with black or white text that is readable in any theme.
+    /// Without color support, the text is reversed.
     pub(super) fn block(self, depth: ColorDepth) -> Style {
         let (fg, bg) = match self {
             _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
@@ -109,7 +109,7 @@ pub(crate) fn text_columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
-/// A row of an area, counted from the top. Empty if `index` is out of range.
+/// Returns a row of an area, counting from the top. Empty if `index` is out of range.
 pub(super) fn row_of(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
@@ -166,8 +166,8 @@ pub(crate) fn format_duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
-/// Formats a running time. Up to a minute, tenths of a second are always shown, so that the format does not
-/// keep changing.
+/// Formats a running time. Always shows tenths of a second up to a minute, so that the format does not keep
+/// changing.
 pub(super) fn format_running_time(time: Duration) -> String {
     if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { format_duration(time) }
 }
@@ -193,7 +193,7 @@ pub(super) fn approximate_time(seconds: f64) -> String {
     }
 }
 
-/// Formats the difference between a stage's time and its previous time, in the same unit as the time unless
+/// Formats the difference between a stage's time and its previous time. Uses the same unit as the time unless
 /// the difference is far larger. Empty if insignificant.
 pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> String {
     /// Relative variation in time between runs of identical work.
@@ -218,7 +218,7 @@ pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> Strin
     }
 }
 
-/// Filled and empty parts of a thin progress bar that is `columns` wide.
+/// Returns the filled and empty parts of a thin progress bar that is `columns` wide.
 pub(super) fn progress_bar_parts(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);
@@ -226,7 +226,7 @@ pub(super) fn progress_bar_parts(fraction: f64, columns: u16, ascii: bool) -> (S
     (full.repeat(filled_squares), empty.repeat(columns - filled_squares))
 }
 
-/// Percentage rounded down, so 100 is shown only when finished.
+/// Percentage, rounded down so that 100 appears only at the end.
 pub(crate) fn floor_percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }

@@ -1,4 +1,4 @@
-//! The view list, shown briefly after a view was selected, in the panel or over the image.
+//! The view list. It appears briefly in the panel or over the image after a view is selected.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -10,7 +10,7 @@ use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::state::State;
 
-/// Width of a view in the list, including its digit.
+/// Width of a list entry, including its digit.
 const WIDTH: u16 = 16;
 /// Number of views that can be selected with a digit.
 pub(crate) const DIGITS: usize = 9;
@@ -25,7 +25,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let is_in_panel = layout.panel.intersection(area) == area;
     Clear.render(if is_in_panel { layout.panel } else { area }, buffer);
     let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
-    // If not all views fit, center the current one.
+    // Center the current view if not all views fit.
     let shown = columns * rows;
     let first = current.saturating_sub(shown / 2).min(View::ALL.len().saturating_sub(shown));
     for (index, number) in (first..View::ALL.len()).take(shown).enumerate() {
@@ -44,12 +44,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Number of views per column of the view list.
+/// Number of views per column in the view list.
 pub(crate) fn rows_per_column(state: &State) -> usize {
     usize::from(list_area(&Layout::for_state(state)).height).max(1)
 }
 
-/// Draws a view and its digit, and a mark if more views are hidden above or below.
+/// Draws a view and its digit, with a mark if more views are hidden above or below.
 fn draw_view_line(
     state: &State,
     number: usize,
@@ -67,8 +67,8 @@ fn draw_view_line(
     put_text(buffer, place, &pieces, state.display.depth);
 }
 
-/// The area for the list, which has one column if the panel is tall enough and as many columns as necessary
-/// otherwise.
+/// Returns the area for the list. The list has one column if the panel is tall enough, and as many as
+/// necessary otherwise.
 fn list_area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;

@@ -12,7 +12,8 @@ pub(super) struct LogAxis {
 }
 
 impl LogAxis {
-    /// Creates an axis that spans the positive values and leaves the fraction `free` empty at the start.
+    /// Creates an axis that spans the positive values and leaves a fraction `free` of its length empty at the
+    /// start.
     pub(super) fn spanning(values: impl Iterator<Item = f64>, free: f64) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
         let (low, high) =
@@ -72,7 +73,7 @@ pub(super) fn format_decimal(mark: f64) -> String {
     }
 }
 
-/// A mark's leading digit and exponent.
+/// Returns the leading digit and exponent of a mark.
 fn digit_and_exponent(mark: f64) -> (i32, i32) {
     let whole = (mark + 1e-9).floor();
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)

@@ -1,4 +1,4 @@
-//! Draws the panel of one scene.
+//! Draws the panel for one scene.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -9,7 +9,7 @@ use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::visible;
 
-/// The color-blind safe palette of Okabe and Ito.
+/// Okabe and Ito's color-blind-safe palette.
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -22,7 +22,7 @@ const COLORS: [RGBColor; 7] = [
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const GRAY: RGBColor = RGBColor(110, 110, 110);
 
-/// Half the size of a marker in pixels.
+/// Half the marker size in pixels.
 const MARKER: i32 = 4;
 
 /// The drawing area of a panel.
@@ -30,7 +30,7 @@ type PanelArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
 type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<LogAxis, LogAxis>>;
 
-/// Draws the panel of one scene: axes, reference noise, error bars, medians and legend.
+/// Draws the panel for one scene: axes, reference noise, error bars, medians and legend.
 pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(), DrawError<'a>> {
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;
@@ -65,7 +65,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
     draw_legend(&mut chart)
 }
 
-/// The caption, without characters that are invalid in XML.
+/// Returns the caption, without characters that are invalid in XML.
 fn caption(scene: &SceneResult) -> String {
     format!("{}, {}×{}", visible(&scene.scene), scene.width, scene.height)
 }
@@ -90,7 +90,7 @@ fn draw_legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), DrawError<'a
         .draw()
 }
 
-/// Draws the noise of the references as a dashed line.
+/// Draws the reference noise as a dashed line.
 fn draw_reference_noise<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     level: f64,
@@ -103,7 +103,7 @@ fn draw_reference_noise<'c, 'a: 'c>(
     Ok(())
 }
 
-/// Draws the error range of each step.
+/// Draws each step's error range.
 fn draw_error_bars<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
@@ -142,7 +142,7 @@ fn draw_medians<'c, 'a: 'c>(
     Ok(())
 }
 
-/// A filled marker centered on a pixel. The shape depends on the method's number.
+/// Returns a filled marker centered on a pixel. Its shape depends on the method's index.
 fn method_marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     let corners: &[(i32, i32)] = match number % 4 {
         0 => &[(-1, -1), (1, -1), (1, 1), (-1, 1)],

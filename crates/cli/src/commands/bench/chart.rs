@@ -17,7 +17,7 @@ use crate::tui::paint::as_text_lines;
 /// Method colors, from the terminal's palette.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Method markers. The combinations of marker and color repeat after 30 methods.
+/// Method markers. Marker and color combinations repeat after 30 methods.
 const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Height of a chart in rows.
 const ROWS: u16 = 16;
@@ -28,14 +28,14 @@ const MIN_SIZE: (u16, u16) = (30, 8);
 /// Rows reserved for the current task, the bar and the prompt.
 const RESERVED_ROWS: u16 = 6;
 
-/// The points of one scene measured so far.
+/// The points measured so far for one scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ConvergenceChart {
     scene: String,
     methods: Vec<MethodCurve>,
 }
 
-/// The curve of a method: seconds and relMSE of its steps.
+/// A method's curve: the time in seconds and the relMSE of each step.
 #[derive(Clone, Debug, PartialEq)]
 struct MethodCurve {
     name: String,
@@ -62,8 +62,8 @@ impl ConvergenceChart {
         }
     }
 
-    /// The chart as text, for a terminal of this size. Empty if there are no points or if the chart does not
-    /// fit.
+    /// Renders the chart as text for a terminal of this size. Empty if there are no points or if the chart
+    /// does not fit.
     pub(super) fn render_text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
         // Some terminals wrap lines that fill the whole width.
         let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));
@@ -93,7 +93,7 @@ impl ConvergenceChart {
     }
 }
 
-/// The line through the points, and the markers with the method's name.
+/// Returns two datasets: the line through the points, and the markers, which carry the method's name.
 fn datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
@@ -113,7 +113,7 @@ impl MethodCurve {
     }
 }
 
-/// Draws a chart of every scene if stdout is a terminal.
+/// Draws a chart for every scene if stdout is a terminal.
 pub(super) fn print_charts(results: &Results, console: &Console) {
     if !std::io::stdout().is_terminal() {
         return;
@@ -129,7 +129,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
     }
 }
 
-/// The range of the values, with a margin.
+/// Returns the range of the values plus a margin.
 fn axis_bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));

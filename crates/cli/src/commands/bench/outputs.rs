@@ -1,4 +1,4 @@
-//! Output files of `glimt bench`. They must differ from the inputs and from each other.
+//! Output files for `glimt bench`. They must differ from the inputs and from each other.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use crate::system::{describe_error, file};
 
 /// Files to write, and input files that must not be overwritten.
 pub(super) struct BenchOutputs {
-    /// Option, file and content of each output.
+    /// Option, path and content type of each output.
     files: Vec<(&'static str, PathBuf, OutputKind)>,
     /// Role and path of each input.
     inputs: Vec<(&'static str, PathBuf)>,
@@ -29,7 +29,7 @@ pub(super) struct BenchOutputs {
 }
 
 #[derive(Clone, Copy)]
-/// Content of an output file.
+/// Content type of an output file.
 enum OutputKind {
     Csv,
     Json,
@@ -67,7 +67,7 @@ impl BenchOutputs {
         if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
             let (option, ..) = self.files[index];
             let reason =
-                format!("{option} {STDOUT_NAME} would mix with the tables on standard output: pass a file");
+                format!("{option} {STDOUT_NAME} would mix with the tables on stdout; use a file instead");
             return Err(OutputError::Refused { reason });
         }
         if matches!(kind, OutputKind::Plot) && !is_svg {
@@ -78,7 +78,7 @@ impl BenchOutputs {
         output::check_path(path)
     }
 
-    /// Checks that output `index`, which resolves to `real`, is neither an input nor another output.
+    /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.
     fn check_replaceable(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         if FileIdentity::of(real).is_none() {
             return Ok(());
@@ -102,12 +102,12 @@ impl BenchOutputs {
     }
 
     /// Rejects files not written by glimt. For example, `--csv scene.toml` would overwrite the scene if the
-    /// user forgot the name of the CSV file.
+    /// user forgot the CSV file's name.
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
             OutputKind::Csv => may_replace_table(real, csv::HEAD),
-            // Accept valid baselines, which all have scenes.
+            // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
                 may_replace_json(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }

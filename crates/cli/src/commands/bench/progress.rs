@@ -1,4 +1,4 @@
-//! Progress of a benchmark on stderr.
+//! Reports benchmark progress on stderr.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -59,7 +59,7 @@ impl BenchProgress {
         Self { console, format, begin: now, what, left: None, fraction: 0.0, last: now }
     }
 
-    /// Handles an event of the benchmark.
+    /// Handles a benchmark event.
     pub(super) fn handle(&mut self, news: BenchEvent) {
         match news {
             BenchEvent::Begins { what, left } => {

@@ -15,7 +15,7 @@ use crate::tui::{NamedImage, images_as_text};
 /// FLIP below this value is hard to see in false color.
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
-/// Renders the images as text. Empty if the terminal is too small.
+/// Renders the images as text. Returns an empty string if the terminal is too small.
 pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
@@ -50,7 +50,7 @@ fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
-/// FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
+/// Returns FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
 fn difference_image(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {

@@ -13,7 +13,8 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::store_command_line;
 
-/// The script. Candidates replace `$2`, the end of the line after the last space, `=`, `:` or open quote.
+/// The script. Candidates replace `$2`, the text between the cursor and the last space, `=`, `:` or open
+/// quote.
 const SCRIPT: &str = r#"_glimt_complete() {
     local answer line space=true
     compopt +o nospace 2> /dev/null && space=false
@@ -34,8 +35,8 @@ else
 fi
 "#;
 
-/// The bash adapter. The script passes the line up to the cursor and the part at its end that candidates
-/// replace.
+/// The bash adapter. The script passes the line up to the cursor, and separately its trailing part, which
+/// candidates replace.
 pub(super) struct BashCompleter;
 
 impl EnvCompleter for BashCompleter {
@@ -89,7 +90,7 @@ impl EnvCompleter for BashCompleter {
     }
 }
 
-/// The quote left open at the end of a line.
+/// The quote that is still open at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quote {
     None,
@@ -97,8 +98,8 @@ enum Quote {
     Double,
 }
 
-/// The unquoted words of a line and the quote left open at its end. The last word is empty if the line ends
-/// with a space.
+/// The unquoted words of a line, and the quote that is still open at its end. The last word is empty if the
+/// line ends with a space.
 struct CommandLine {
     words: Vec<String>,
     quote: Quote,
@@ -137,7 +138,7 @@ fn split_command_line(line: &str) -> CommandLine {
     CommandLine { words, quote }
 }
 
-/// Quotes a candidate that follows the open quote `quote`. `None` if this is impossible.
+/// Quotes a candidate that is inserted after the open quote `quote`. `None` if it cannot be quoted.
 fn quote_candidate(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
@@ -232,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_split_like_bash() {
+    fn lines_are_split_as_in_bash() {
         let line = split_command_line("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
         assert_eq!(line.words, ["glimt", "--set", "a=b c d", "e\\", "f$\\g "]);
         assert_eq!(line.quote, Quote::Double);

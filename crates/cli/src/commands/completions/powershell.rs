@@ -9,8 +9,9 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::store_command_line;
 
-/// The script. Unlike `clap_complete`'s script, which executes `$(…)` on completion, it does not evaluate the
-/// line. The last word is prefixed with `+` because some PowerShell versions do not pass empty arguments.
+/// The script. It does not evaluate the line, unlike `clap_complete`'s script, which executes `$(…)` on
+/// completion. The last word is prefixed with `+` because some PowerShell versions do not pass empty
+/// arguments.
 const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -ScriptBlock {
     param($wordToComplete, $commandAst, $cursorPosition)
     $words = @()
@@ -40,8 +41,8 @@ const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -S
 }
 "#;
 
-/// The PowerShell adapter. Prints one line per candidate: the quoted candidate, the unquoted candidate and
-/// the description, separated by tabs.
+/// The PowerShell adapter. Prints one line per candidate, with three tab-separated fields: the quoted
+/// candidate, the unquoted candidate and the description.
 pub(super) struct PowershellCompleter;
 
 impl EnvCompleter for PowershellCompleter {

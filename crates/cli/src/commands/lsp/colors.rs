@@ -48,7 +48,7 @@ fn parse_color(text: &str, key: &OutlineKey) -> Option<Color> {
     Some(Color { red, green, blue, alpha: 1.0 })
 }
 
-/// Formats a color picked in the editor as `#rrggbb` and as linear numbers.
+/// Formats a color picked in the editor, both as `#rrggbb` and as linear numbers.
 pub(super) fn color_presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);

@@ -12,7 +12,7 @@ use super::place::{CursorContext, Section, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{color_names, tables};
 
-/// The candidates at a byte offset. `None` if nothing can be completed there.
+/// Returns the candidates at a byte offset. `None` if nothing can be completed there.
 pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> {
     let items = match cursor_context(&document.text, offset)? {
         CursorContext::Header => header_items(document, offset),
@@ -50,8 +50,8 @@ fn completion_item(label: &str, kind: CompletionItemKind, doc: &str, insert: Str
     }
 }
 
-/// Candidates for table headers. Each replaces the partial header, including closing brackets inserted by the
-/// editor.
+/// Returns candidates for table headers. Each replaces the partial header, including closing brackets
+/// inserted by the editor.
 fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let before = &document.text[..offset];
     let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
@@ -73,7 +73,7 @@ fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     .collect()
 }
 
-/// Candidates for a table's missing keys, with example values unless `=` follows the cursor.
+/// Returns candidates for a table's missing keys. They include example values unless `=` follows the cursor.
 fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
@@ -158,7 +158,8 @@ fn word_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
     list.iter().map(word).collect()
 }
 
-/// Candidates for the names that the document defines in `table`, such as `wall` in `[materials.wall]`.
+/// Returns candidates for the names of the tables in `table`. For example, `[materials.wall]` defines the
+/// name `wall`.
 fn table_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());

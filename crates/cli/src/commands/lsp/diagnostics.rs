@@ -11,14 +11,14 @@ use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
 
-/// Diagnostics of a document's text.
+/// Returns the diagnostics for a document's text.
 pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
     let found = parse(document.text.as_str().into(), &document.path).diagnostics;
     found.iter().map(|one| to_lsp_diagnostic(document, one)).collect()
 }
 
-/// Diagnostics of the file and its referenced files, as in `glimt check`. `None` if the file differs from the
-/// open document, if it cannot be read, or if the token is cancelled.
+/// Returns the diagnostics for the file and the files it references, as in `glimt check`. `None` if the file
+/// differs from the open document, if it cannot be read, or if the token is cancelled.
 pub(super) fn file_diagnostics(
     document: &OpenDocument,
     checker: &mut IncrementalChecker,

@@ -26,7 +26,7 @@ impl OpenDocument {
         Self { path, version, tables: outline(&text), lines, text }
     }
 
-    /// The byte offset of a position, clamped to the end of its line.
+    /// Returns the byte offset of a position, clamped to the end of its line.
     pub(super) fn offset(&self, position: Position) -> usize {
         let line = usize::try_from(position.line).unwrap_or(usize::MAX);
         let Some(&start) = self.lines.get(line) else { return self.text.len() };
@@ -41,7 +41,7 @@ impl OpenDocument {
         start + text.len()
     }
 
-    /// The LSP position of a byte offset.
+    /// Returns the LSP position for a byte offset.
     pub(super) fn position(&self, offset: usize) -> Position {
         let offset = offset.min(self.text.len());
         let line = self.lines.partition_point(|start| *start <= offset) - 1;

@@ -21,7 +21,7 @@ pub(super) struct FileCheckThread {
     thread: Option<JoinHandle<()>>,
 }
 
-/// The requests, with a condition variable that signals changes.
+/// The requests, and a condition variable that signals changes to them.
 #[derive(Default)]
 struct CheckQueue {
     requests: Mutex<CheckRequests>,
@@ -68,7 +68,7 @@ impl Drop for FileCheckThread {
         self.shared.lock().end();
         self.shared.changed.notify_one();
         if let Some(thread) = self.thread.take() {
-            // Ignore a panic on the thread.
+            // Ignore a panic in the thread.
             let _ = thread.join();
         }
     }

@@ -9,8 +9,8 @@ use super::document::OpenDocument;
 use crate::scene::keys::key::{Default, KeyInfo, ValueKind};
 use crate::scene::outline::{OutlineKey, OutlineTable};
 
-/// The key under the cursor and its table. Inside an inline table, `outer` is the key of the inline table.
-/// Otherwise, it equals `key`.
+/// The key under the cursor, and its table. `outer` is the inline table's key if the cursor is inside an
+/// inline table, and otherwise equals `key`.
 struct KeyAtCursor<'d> {
     table: &'d OutlineTable,
     outer: &'d OutlineKey,
@@ -30,7 +30,7 @@ fn key_at(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     })
 }
 
-/// Hover text for the key under the cursor.
+/// Returns the hover text for the key under the cursor.
 pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let name = key.name.text.as_str();
@@ -74,16 +74,16 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
     text
 }
 
-/// Keys of a texture's inline table.
+/// Returns the keys allowed in a texture's inline table.
 pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
         ("channel", "The channel to read: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
-        ("scale", "A factor for the texture, only in `emission`."),
+        ("scale", "A scale factor for the texture. Only allowed in `emission`."),
     ]
 }
 
-/// The range where the name under the cursor is defined.
+/// Returns the location of the definition of the name under the cursor.
 pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let group = if std::ptr::eq(key, outer) {

@@ -1,7 +1,7 @@
 //! `glimt lsp`: a language server for scenes, on stdin and stdout.
 //!
-//! The client sends the full document with every change, and the server parses it immediately. Referenced
-//! files are checked on a separate thread when the document is opened or saved.
+//! The client sends the full document with every change, and the server parses it immediately. When a
+//! document is opened or saved, a separate thread checks the files it references.
 
 mod colors;
 mod complete;
@@ -108,8 +108,8 @@ type Documents = Arc<Mutex<HashMap<String, OpenDocument>>>;
 struct Server<'c> {
     client: &'c Client,
     documents: Documents,
-    /// Checks referenced files. `None` if the thread could not be started. In that case, only the documents
-    /// themselves are checked.
+    /// The thread that checks referenced files. If it could not be started, this is `None`, and only the
+    /// documents themselves are checked.
     files: Option<FileCheckThread>,
 }
 
@@ -247,7 +247,7 @@ impl Server<'_> {
     }
 }
 
-/// Publishes the diagnostics of a document and its files, unless the document has changed.
+/// Publishes the diagnostics for a document and its files, unless the document has changed.
 fn publish_if_current(
     documents: &Documents,
     send: impl FnOnce(Message),
@@ -265,7 +265,7 @@ fn parse_params<P: DeserializeOwned>(params: Value) -> Option<P> {
     serde_json::from_value(params).ok()
 }
 
-/// The notification with a document's diagnostics.
+/// Creates the notification that publishes a document's diagnostics.
 fn diagnostics_notification(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
     let params = PublishDiagnosticsParams { uri, diagnostics, version };
     Notification::new(PublishDiagnostics::METHOD.to_owned(), params).into()
@@ -275,7 +275,7 @@ fn unknown_method_response(id: RequestId, method: &str) -> Response {
     Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("unsupported method {method}"))
 }
 
-/// The path in a file URI. For other URIs, a path that does not exist.
+/// Returns the path in a file URI, or a nonexistent path for other URIs.
 fn uri_to_path(uri: &Uri) -> PathBuf {
     let decoded = uri.path().as_estr().decode().into_string();
     decoded.map_or_else(|_| PathBuf::from(uri.as_str()), |path| PathBuf::from(path.into_owned()))

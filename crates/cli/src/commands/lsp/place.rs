@@ -1,4 +1,5 @@
-//! Determines the context of the cursor. Works line by line, because incomplete text may have syntax errors.
+//! Determines what can be completed at the cursor. Works line by line, because incomplete text may have
+//! syntax errors.
 
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::table;
@@ -8,7 +9,7 @@ use crate::scene::keys::table;
 pub(super) enum CursorContext {
     /// A header, or a line where a header can start.
     Header,
-    /// A key of a table. Contains the table's other keys and whether `=` follows.
+    /// A key of a table. `given` contains the table's other keys, and `is_assigned` is true if `=` follows.
     Key { of: Section, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: Section, key: String, is_quoted: bool },
@@ -36,7 +37,7 @@ impl Section {
     }
 }
 
-/// The context at a byte offset. `None` in comments, arrays and unknown tables.
+/// Returns the context at a byte offset. `None` in comments, arrays and unknown tables.
 pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext> {
     let before = text.get(..offset)?;
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
@@ -63,8 +64,9 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
     context_in_table(info, body, (line, after), false)
 }
 
-/// The context in a table. `body` contains the table's lines, or an inline table's items. The tuple contains
-/// the text before and after the cursor. `None` in arrays and after complete values.
+/// Returns the context in a table. `body` contains the lines of a table or the items of an inline table. The
+/// tuple contains the text before the cursor and the text after it. `None` in arrays and after complete
+/// values.
 fn context_in_table(
     info: &'static TableInfo,
     body: &str,
@@ -97,7 +99,7 @@ fn context_in_inline_table(typed: &str) -> CursorContext {
     }
 }
 
-/// The last item of a comma-separated list. Ignores commas within brackets.
+/// Returns the last item in a comma-separated list. Ignores commas within brackets.
 fn last_item(typed: &str) -> &str {
     let mut depth = 0_i32;
     let mut start = 0;
@@ -116,7 +118,7 @@ fn is_in_quotes(value: &str) -> bool {
     LineEndState::after(value).quote.is_some()
 }
 
-/// State at the end of a line: open string, comment and brackets.
+/// State at the end of a line: whether a string, a comment or brackets are open.
 #[derive(Clone, Copy, Debug, Default)]
 struct LineEndState {
     /// The opening quote, if a string is open.
@@ -150,7 +152,7 @@ impl LineEndState {
     }
 }
 
-/// The table around a byte offset, and whether the offset is in an array.
+/// The table that contains a byte offset, and a flag that is set if the offset is in an array.
 #[derive(Debug, Default)]
 struct EnclosingTable<'t> {
     /// The last header before the offset, without its brackets, and the lines of its table. `None` before the
@@ -194,7 +196,7 @@ fn is_key(line: &str) -> bool {
     rest.trim_start().starts_with('=')
 }
 
-/// The name in a table header. `None` for other lines, such as `[1, 0],` in an array.
+/// Returns the name in a table header. `None` for other lines, such as `[1, 0],` in an array.
 fn header_name(line: &str) -> Option<&str> {
     let (name, rest) = line.trim_start().strip_prefix('[')?.trim_start_matches('[').split_once(']')?;
     let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '"' | '\'' | ' ');
@@ -204,7 +206,7 @@ fn header_name(line: &str) -> Option<&str> {
     (is_name && (rest.is_empty() || rest.starts_with('#'))).then(|| name.trim())
 }
 
-/// The table's type as set by its key `type`, or the default type.
+/// Returns the table's type: the value of its key `type`, or the default type.
 fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
@@ -219,7 +221,7 @@ fn first_string(value: &str) -> Option<&str> {
     Some(rest.split(['"', '\'']).next().unwrap_or(rest))
 }
 
-/// The keys in `body`, except the key being typed.
+/// Returns the keys in `body`, except the key being typed.
 fn keys_present(body: &str, typed: &str) -> Vec<String> {
     let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
     keys.filter(|key| key != typed).collect()
@@ -229,7 +231,7 @@ fn keys_present(body: &str, typed: &str) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// The context at `|` in the text.
+    /// Returns the context at the `|` in the text.
     fn at(text: &str) -> Option<CursorContext> {
         let offset = text.find('|').expect("a cursor");
         cursor_context(&text.replace('|', ""), offset)

@@ -19,7 +19,7 @@ const MAX_HEADER_BYTES: u64 = 1 << 14;
 pub(super) enum Received {
     /// A valid message.
     Message(Message),
-    /// The error response to an invalid message.
+    /// The response to an invalid message.
     Invalid(Value),
 }
 
@@ -94,7 +94,7 @@ fn parse_message(bytes: Vec<u8>) -> Received {
     }
 }
 
-/// An error response. `id` is null if it is unknown.
+/// Creates an error response. `id` is null if the request's ID is unknown.
 fn error_response(id: &Value, code: ErrorCode, why: &str) -> Value {
     json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code as i32, "message": why } })
 }

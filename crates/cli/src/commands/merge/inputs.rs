@@ -11,18 +11,18 @@ use crate::pipeline::companion_files;
 use crate::scene::named_files;
 use crate::scene::sanitize::visible;
 
-/// Inputs of the parts and of their scenes.
+/// Input files of the parts and their scenes.
 pub(super) struct MergeInputs<'a> {
     parts: &'a [PartFile],
     token: &'a CancelToken,
-    /// Scenes of the parts, and the files that they name.
+    /// The parts' scenes, and the files that these scenes name.
     named: BTreeSet<PathBuf>,
-    /// Files referenced by the named ones, listed on demand.
+    /// Files referenced by the files in `named`, listed on demand.
     companions: OnceCell<BTreeSet<PathBuf>>,
 }
 
 impl<'a> MergeInputs<'a> {
-    /// Collects the inputs for a merge into `out`.
+    /// Collects the input files that a merge into `out` must not replace.
     pub(super) fn new(parts: &'a [PartFile], out: &Path, token: &'a CancelToken) -> Self {
         // The output may be a link into the scene's folder.
         let target = out.canonicalize().ok();
@@ -32,8 +32,8 @@ impl<'a> MergeInputs<'a> {
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
 
-    /// Returns the reason if the file at `path` is an input. Lists the files that meshes reference last,
-    /// because that requires reading the meshes.
+    /// Returns the reason if the file at `path` must be kept because it is an input. Checks the files that
+    /// meshes reference last, because listing them requires reading the meshes.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
@@ -43,11 +43,11 @@ impl<'a> MergeInputs<'a> {
             // Relative to the working directory.
             let name = scene_path::relative(input, Path::new(""));
             let name = visible(name.strip_prefix("./").unwrap_or(&name)).into_owned();
-            Some(format!("the scene of the parts references it ({name})"))
+            Some(format!("the parts' scene references it ({name})"))
         };
         let by_name = || {
             let name = part::input_with_name(self.parts, path)?;
-            Some(format!("the scene of the parts references a file with this name ({name})"))
+            Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {
             let name = part::input_with_content(self.parts, path)?;
@@ -70,7 +70,8 @@ impl<'a> MergeInputs<'a> {
     }
 }
 
-/// Possible paths of the parts' scenes, existing or not: relative to each part, then next to the output.
+/// Returns all possible paths of the parts' scenes, whether or not they exist: first relative to each part,
+/// then next to the output.
 pub(super) fn scene_paths(parts: &[PartFile], out: &Path) -> impl Iterator<Item = PathBuf> {
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
     let named = named.map(|part| part.path.with_file_name(&part.head.scene));

@@ -1,4 +1,4 @@
-//! The JSON Schema of scene files, generated from the definitions of their keys.
+//! The JSON Schema for scene files, generated from the key definitions.
 //!
 //! Draft 4 is for editors that use Taplo, which does not support `if`. In this draft, a material or light
 //! accepts the keys of all types, and dependencies restrict each key to its types. In draft 2020-12, each
@@ -18,7 +18,7 @@ use crate::scene::keys::tables;
 /// The file name of the schema.
 pub const FILE: &str = "glimt.schema.json";
 
-/// First line of a scene, which references the schema in the same folder.
+/// First line of a scene that references the schema in the same folder.
 pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
@@ -27,7 +27,7 @@ pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
     Exit::DONE
 }
 
-/// The schema as formatted text.
+/// Returns the schema as formatted text.
 pub fn schema_text(draft: Draft) -> String {
     format!("{:#}\n", schema(draft))
 }
@@ -49,7 +49,7 @@ pub fn schema(draft: Draft) -> Value {
     schema
 }
 
-/// The schema of a top-level key: a table, named tables or a list of tables.
+/// Returns the schema for a top-level key: a table, named tables or a list of tables.
 fn top_level_key_schema(info: &'static TableInfo, draft: Draft) -> Value {
     let one = table_schema(info, draft);
     let mut all = match info.form {
@@ -75,7 +75,7 @@ fn table_schema(info: &'static TableInfo, draft: Draft) -> Value {
     table
 }
 
-/// The schema of an object that allows only these keys.
+/// Returns the schema for an object that allows only these keys.
 fn object_schema(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
     let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
@@ -88,12 +88,12 @@ fn object_schema(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static K
     object
 }
 
-/// Whether a key can be omitted if another key is present instead.
+/// Whether a key can be omitted in favor of another key.
 fn is_conditional(key: &KeyInfo) -> bool {
     matches!(key.name, "position" | "look_at")
 }
 
-/// The schema of a key's value, with its description and default.
+/// Returns the schema for a key's value, with the key's description and default.
 fn key_schema(key: &KeyInfo, draft: Draft) -> Value {
     let mut schema = value_schema(key.kind, draft);
     schema["description"] = description(key).into();
@@ -105,7 +105,7 @@ fn key_schema(key: &KeyInfo, draft: Draft) -> Value {
     schema
 }
 
-/// Description, unit, range and default as Markdown.
+/// Returns a key's description, unit, range and default as Markdown.
 fn description(key: &KeyInfo) -> String {
     let named =
         |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
@@ -117,7 +117,7 @@ fn description(key: &KeyInfo) -> String {
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range()))
 }
 
-/// The schema of a table with types, with one condition per type.
+/// Returns the schema for a table that has types. Contains one condition per type.
 fn schema_by_type(info: &'static TableInfo) -> Value {
     let draft = Draft::Latest;
     let conditions: Vec<Value> = info
@@ -137,21 +137,22 @@ fn schema_by_type(info: &'static TableInfo) -> Value {
     json!({ "type": "object", "properties": { "type": type_key_schema(info) }, "allOf": conditions })
 }
 
-/// The condition that a table has a given type. The key `type` is optional for the default type.
+/// Returns the condition that a table has this type. The key `type` is optional for the default type.
 fn type_condition(info: &TableInfo, kind: &TypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
     let required: &[&str] = if is_default { &[] } else { &["type"] };
     json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
 }
 
-/// The schema of the key `type`.
+/// Returns the schema for the key `type`.
 fn type_key_schema(info: &TableInfo) -> Value {
     let names: Vec<&str> = info.types.iter().map(|kind| kind.name).collect();
     let docs: Vec<String> = info.types.iter().map(|kind| format!("`{}`: {}", kind.name, kind.doc)).collect();
     json!({ "type": "string", "enum": names, "default": names.first(), "description": docs.join("\n\n") })
 }
 
-/// The schema of a table that accepts the keys of all types. Dependencies restrict each key to its types.
+/// Returns the schema for a table that accepts the keys of all types. Dependencies restrict each key to its
+/// types.
 fn all_types_schema(info: &'static TableInfo) -> Value {
     let draft = Draft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
@@ -172,7 +173,7 @@ fn all_types_schema(info: &'static TableInfo) -> Value {
     table
 }
 
-/// The schema of a key shared by several types. Accepts the values of any of these types.
+/// Returns the schema for a key shared by several types. Accepts the values that any of these types accepts.
 fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let draft = Draft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();
@@ -187,7 +188,7 @@ fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     schema
 }
 
-/// The dependency that restricts a key to its types.
+/// Returns the dependency that restricts a key to its types.
 fn type_dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
@@ -198,7 +199,7 @@ fn type_dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInf
     schema
 }
 
-/// Conditions on combinations of keys in a table.
+/// Returns conditions on combinations of keys in a table.
 fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
@@ -227,7 +228,7 @@ fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)>
     }
 }
 
-/// Conditions on combinations of keys in a type.
+/// Returns conditions on combinations of a type's keys.
 fn type_key_conditions(kind: &str) -> Vec<(&'static str, Value)> {
     match kind {
         // Require exactly one of three groups of keys.

@@ -1,4 +1,4 @@
-//! JSON Schemas of key values.
+//! JSON Schemas for key values.
 
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ use crate::scene::keys::color_names;
 use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::limits::Limits;
 
-/// The schema of a value type.
+/// Returns the schema for a value type.
 pub(super) fn value_schema(kind: ValueKind, draft: Draft) -> Value {
     match kind {
         ValueKind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
@@ -79,13 +79,13 @@ fn number_array_schema(count: usize, limits: Limits, draft: Draft) -> Value {
     json!({ "type": "array", "items": number_schema(limits, draft), "minItems": count, "maxItems": count })
 }
 
-/// The schemas of a color.
+/// Returns the schemas for a color.
 fn color_schemas(limits: Limits, draft: Draft) -> Vec<Value> {
     let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
     vec![number_schema(limits, draft), number_array_schema(3, limits, draft), written]
 }
 
-/// The schema of a color string.
+/// Returns the schema for a color string.
 pub(super) fn color_string_schema() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
@@ -95,7 +95,7 @@ pub(super) fn color_string_schema() -> Value {
     })
 }
 
-/// A pattern for `#rrggbb` and color names that ignores case.
+/// Returns a case-insensitive pattern for `#rrggbb` and color names.
 fn color_pattern(names: &[&str]) -> String {
     let in_any_case =
         |text: &str| text.chars().map(|c| format!("[{}{c}]", c.to_ascii_uppercase())).collect::<String>();
@@ -103,7 +103,7 @@ fn color_pattern(names: &[&str]) -> String {
     format!("^(#[0-9A-Fa-f]{{6}}|{})$", names.join("|"))
 }
 
-/// The schema of a path with one of these extensions, ignoring case.
+/// Returns the schema for a path with one of these extensions, ignoring case.
 fn path_schema(endings: &[&str]) -> Value {
     let in_any_case = |ending: &&str| {
         ending
@@ -124,7 +124,7 @@ fn path_schema(endings: &[&str]) -> Value {
     json!({ "type": "string", "pattern": format!("\\.({})$", endings.join("|")) })
 }
 
-/// The schema of `{ texture = "name" }` with additional keys.
+/// Returns the schema for `{ texture = "name" }` with additional keys.
 fn texture_schema(more: Value) -> Value {
     let mut properties = more;
     properties["texture"] =
@@ -132,7 +132,7 @@ fn texture_schema(more: Value) -> Value {
     json!({ "type": "object", "properties": properties, "required": ["texture"], "additionalProperties": false })
 }
 
-/// The schema of `{ texture = "name", channel = "r" }`.
+/// Returns the schema for `{ texture = "name", channel = "r" }`.
 fn channel_schema() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
     let doc = "The channel to read. The default is luminance, or alpha for opacity.";

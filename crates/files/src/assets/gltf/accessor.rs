@@ -3,7 +3,7 @@
 use super::json::{Accessor, BufferView};
 use super::{GltfError, GltfFile};
 
-/// Maximum element count of an accessor without a buffer view, whose elements are all zero.
+/// Maximum number of elements in an accessor without a buffer view. All of its elements are zero.
 const MAX_ZEROS: u64 = 1 << 22;
 
 /// Type of an accessor's components.
@@ -38,7 +38,7 @@ impl ComponentType {
         }
     }
 
-    /// Decodes a component to a float. Normalized integers map to [0, 1] or [-1, 1] (3.6.2.2).
+    /// Decodes a component as a float. Normalized integers map to [0, 1] or [-1, 1] (3.6.2.2).
     fn decode_number(self, bytes: &[u8], normalized: bool) -> f32 {
         let word = || [bytes[0], bytes[1]];
         let long = || [bytes[0], bytes[1], bytes[2], bytes[3]];
@@ -84,7 +84,7 @@ struct StridedElements<'a> {
     stride: usize,
 }
 
-/// Reads the elements of a validated accessor.
+/// Reads the elements in a validated accessor.
 pub(super) struct AccessorReader<'a> {
     component: ComponentType,
     normalized: bool,
@@ -99,7 +99,7 @@ pub(super) struct AccessorReader<'a> {
 }
 
 impl<'a> AccessorReader<'a> {
-    /// Opens an accessor by its index.
+    /// Opens an accessor, given its index.
     pub(super) fn open(container: &'a GltfFile, number: usize) -> Result<Self, GltfError> {
         let accessor = container.root.accessors.get(number);
         let accessor =
@@ -170,7 +170,7 @@ impl<'a> AccessorReader<'a> {
         })
     }
 
-    /// Bytes starting at an element. `None` if the element is zero.
+    /// Returns the bytes from the start of an element. `None` if the element is zero.
     fn element_bytes(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
             && let Ok(element) = indices.binary_search(&(index as u32))
@@ -180,7 +180,7 @@ impl<'a> AccessorReader<'a> {
         self.elements.map(|elements| &elements.bytes[index * elements.stride..])
     }
 
-    /// First `N` components of an element. Missing components are set to `missing`. The element must exist.
+    /// Returns an element's first `N` components. Missing ones are set to `missing`. The element must exist.
     pub(super) fn element_floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
         let (size, element) = (self.component.size(), self.element_bytes(index));
         std::array::from_fn(|component| match element {
@@ -215,7 +215,7 @@ fn locate_elements<'a>(
     let bytes = view_bytes(container, json).map_err(|wrong| wrong.add_location(place.clone()))?;
     let stride = json.byte_stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 1 << 16 {
-        return Err(GltfError::new(format!("invalid stride of {stride} bytes for elements of {size} bytes"))
+        return Err(GltfError::new(format!("invalid stride of {stride} bytes for {size}-byte elements"))
             .add_location(place));
     }
     let stride = stride as usize;
@@ -227,7 +227,7 @@ fn locate_elements<'a>(
     Ok(StridedElements { bytes: &bytes[offset as usize..], stride })
 }
 
-/// Bytes of a buffer view.
+/// Returns the bytes in a buffer view.
 pub(super) fn view_bytes<'a>(container: &'a GltfFile, view: &BufferView) -> Result<&'a [u8], GltfError> {
     let buffers = &container.buffers;
     let buffer =

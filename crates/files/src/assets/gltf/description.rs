@@ -15,7 +15,7 @@ pub struct ModelScene {
     pub lights: Vec<ModelLight>,
     /// Cameras placed by nodes.
     pub cameras: Vec<ModelCamera>,
-    /// Notes about approximations and omissions, with their location in the file.
+    /// Notes about approximations and omissions, each with its location in the file.
     pub notes: Vec<String>,
     /// Minimum and maximum coordinates of all instances. `None` if there are no instances.
     pub bounds: Option<[DVec3; 2]>,
@@ -103,11 +103,11 @@ pub struct TextureRef {
     pub wrap: TextureWrap,
     /// Whether the lookup uses the part's second set of texture coordinates.
     pub is_second: bool,
-    /// Scale of the coordinates, never 0.
+    /// Scale factors for the coordinates, never 0.
     pub repeat: Vec2,
     /// Rotation angle in degrees, from u to v.
     pub rotate: f64,
-    /// Offset of the coordinates.
+    /// Offset added to the coordinates.
     pub offset: Vec2,
 }
 
@@ -116,11 +116,11 @@ pub struct TextureRef {
 pub enum Alpha {
     /// Fully opaque.
     Opaque,
-    /// Opaque where the opacity is at least the cutoff, invisible elsewhere.
+    /// Opaque where the opacity reaches the cutoff, invisible elsewhere.
     Mask {
         /// Opacity, from the texture's alpha.
         value: TexturedValue,
-        /// Minimum opacity of visible points.
+        /// Minimum opacity at which points are visible.
         cutoff: f64,
     },
     /// Partially transparent.
@@ -130,7 +130,7 @@ pub enum Alpha {
 /// Solid glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glass {
-    /// Transmittance per unit of distance.
+    /// Transmittance per unit distance.
     pub tint: DVec3,
 }
 
@@ -147,7 +147,7 @@ pub struct ModelMaterial {
     pub roughness: TexturedValue,
     /// Index of refraction.
     pub ior: f64,
-    /// Scale of the specular reflection, from the texture's alpha.
+    /// Scale factor for the specular reflection, from the texture's alpha.
     pub specular: TexturedValue,
     /// Color of the specular reflection at normal incidence.
     pub specular_color: TexturedValue,
@@ -165,9 +165,9 @@ pub struct ModelMaterial {
     pub normal_strength: f64,
     /// Opacity.
     pub alpha: Alpha,
-    /// Whether both sides are visible and emit.
+    /// Whether both sides are visible and emit light.
     pub is_two_sided: bool,
-    /// Solid glass, which replaces all other parameters except the roughness.
+    /// Solid glass. If set, all other parameters except the roughness are ignored.
     pub glass: Option<Glass>,
 }
 
@@ -251,7 +251,7 @@ impl ImportNotes {
     /// Maximum number of notes per file.
     const LIMIT: usize = 200;
 
-    /// Adds a note about an element of the file.
+    /// Adds a note about an element in the file.
     pub(super) fn add(&mut self, place: &str, what: &str) {
         let note = format!("{place}: {what}");
         if !self.0.contains(&note) && self.0.len() < Self::LIMIT {

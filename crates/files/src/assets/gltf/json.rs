@@ -1,4 +1,4 @@
-//! JSON schema for the subset of glTF 2.0 used by glimt (Khronos, *glTF 2.0 Specification*). Only types are
+//! JSON schema for the subset of glTF 2.0 that glimt uses (Khronos, *glTF 2.0 Specification*). Only types are
 //! checked here. Indices are checked when they are used.
 
 use std::collections::BTreeMap;
@@ -272,7 +272,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 fn decoded(coded: &str) -> Result<Vec<u8>, String> {
     BASE64.decode(coded).map_err(|error| match error {
         DecodeError::InvalidByte(at, byte) => invalid_base64(byte, at),
-        DecodeError::InvalidLength(digits) => format!("invalid base64 length of {digits} digits"),
+        DecodeError::InvalidLength(digits) => format!("invalid base64 length: {digits} digits"),
         DecodeError::InvalidLastSymbol { .. } | DecodeError::InvalidPadding => "truncated base64".to_owned(),
     })
 }

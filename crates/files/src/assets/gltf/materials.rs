@@ -34,7 +34,7 @@ impl JsonMaterial {
         base.into_iter().chain(extended).flatten().collect()
     }
 
-    /// Texture coordinate sets of all textures, starting with the base color texture.
+    /// Texture coordinate sets used by all textures, starting with the base color texture.
     pub(super) fn coordinate_sets(&self) -> Vec<usize> {
         self.supported_textures().into_iter().map(TextureInfo::coordinate_set).collect()
     }
@@ -48,7 +48,7 @@ impl TextureInfo {
     }
 }
 
-/// Known but unsupported extensions, with the note for each.
+/// Known but unsupported extensions, each with its note.
 const UNSUPPORTED: [(&str, &str); 6] = [
     ("KHR_materials_sheen", "sheen is ignored"),
     ("KHR_materials_iridescence", "iridescence is ignored"),
@@ -78,7 +78,7 @@ pub(super) fn convert_material(
 struct MaterialReader<'a> {
     container: &'a GltfFile,
     place: String,
-    /// Texture coordinate sets of the mesh.
+    /// The mesh's texture coordinate sets.
     sets: [usize; 2],
     notes: &'a mut ImportNotes,
 }
@@ -119,8 +119,8 @@ impl MaterialReader<'_> {
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
-            // Materials converted from specular-glossiness have an index of refraction of 0, which means
-            // full reflection.
+            // An index of refraction of 0 means full reflection. Materials converted from
+            // specular-glossiness use it.
             if ior.ior == 0.0 {
                 self.note("an index of refraction of 0 (full reflection) is replaced by 10");
             }
@@ -150,7 +150,7 @@ impl MaterialReader<'_> {
                 self.solid_glass(&material, volume.attenuation_color, volume.attenuation_distance);
         }
         if extensions.unlit {
-            self.note("unlit: the color is emitted, which also lights other surfaces");
+            self.note("the material is unlit, so its color is emitted and also lights other surfaces");
             material.emission = std::mem::replace(&mut material.color, TexturedValue::number(0.0));
             // Remove all reflection and transmission.
             let black = || TexturedValue::number(0.0);
@@ -166,7 +166,8 @@ impl MaterialReader<'_> {
         Ok(material)
     }
 
-    /// Converts a volume to solid glass. The attenuation color becomes the transmittance per unit of distance.
+    /// Converts a volume to solid glass. The attenuation color becomes the transmittance per unit of
+    /// distance.
     fn solid_glass(
         &mut self,
         material: &ModelMaterial,
@@ -174,7 +175,7 @@ impl MaterialReader<'_> {
         distance: Option<f64>,
     ) -> Option<Glass> {
         if material.transmission.texture.is_some() || material.transmission.factor.x < 0.5 {
-            self.note("the volume is ignored because the material does not transmit everywhere");
+            self.note("the volume is ignored because the surface is not transmissive everywhere");
             return None;
         }
         if material.color.texture.is_some() || material.color.factor != DVec3::ONE {
@@ -206,7 +207,8 @@ impl MaterialReader<'_> {
         }
     }
 
-    /// Whether an image may have alpha. Checks the first bytes of embedded images and the names of image files.
+    /// Whether an image may have an alpha channel. Checks the first bytes of embedded images and the names of
+    /// image files.
     fn may_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.image(image) {
@@ -288,7 +290,7 @@ impl MaterialReader<'_> {
     }
 }
 
-/// A transform of texture coordinates: scale, then rotation, then translation.
+/// A texture coordinate transform: scale, then rotation, then translation.
 struct UvTransform {
     repeat: Vec2,
     degrees: f64,
@@ -303,7 +305,7 @@ impl UvTransform {
         let finite = |number: f64| if number.is_finite() { number.clamp(-1e9, 1e9) } else { 0.0 };
         let ([x, y], [across, down], angle) =
             (json.offset.map(finite), json.scale.map(finite), finite(json.rotation));
-        // Avoid a scale of 0, which would have no inverse.
+        // Avoid a scale of 0, which is not invertible.
         let nonzero = |scale: f64| if scale.abs() < 1e-6 { 1e-6 } else { scale };
         let (across, down) = (nonzero(across), nonzero(down));
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
@@ -326,7 +328,7 @@ fn clamp_to_unit(number: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Compares the conversion with the formula of `KHR_texture_transform`, whose v is measured from the top.
+    /// Compares the conversion with the formula from `KHR_texture_transform`, which measures v from the top.
     #[test]
     fn uv_transforms_match_the_extension() {
         let json =

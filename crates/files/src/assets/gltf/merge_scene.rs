@@ -1,4 +1,4 @@
-//! Merges the scene of a glTF file into one mesh with mesh-file materials.
+//! Merges a glTF file's scene into one mesh with mesh-file materials.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -104,7 +104,7 @@ fn append_part(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMa
     merged.materials.resize(merged.triangles.len(), material);
 }
 
-/// Appends a part's values of a vertex attribute. The list stays empty until a part has the attribute.
+/// Appends a part's values for a vertex attribute. The list stays empty until a part has the attribute.
 fn append_attribute<T: Copy>(
     all: &mut Vec<T>,
     first: u32,

@@ -34,7 +34,7 @@ use super::{AssetError, Companion, FileHash};
 use crate::control::{CancelToken, Progress, ignore_progress};
 use crate::system::file::FileStamp;
 
-/// Maximum file size, and maximum total size of the buffers.
+/// Maximum size of the file, and of all its buffers together.
 const FILE_LIMIT: u64 = 4 << 30;
 /// Maximum size of the JSON, including data URIs.
 const JSON_LIMIT: usize = 512 << 20;
@@ -59,7 +59,7 @@ impl GltfError {
 
     /// Error for an out-of-range index into `list`.
     fn index(list: &str, index: usize, length: usize) -> Self {
-        Self(format!("{list}[{index}] does not exist: there are {length}"))
+        Self(format!("{list}[{index}] does not exist; {list} has length {length}"))
     }
 
     /// Prefixes the error with an enclosing location.
@@ -79,10 +79,10 @@ pub struct GltfFile {
     path: PathBuf,
     root: Root,
     buffers: Vec<Vec<u8>>,
-    /// Separate buffer files that were read.
+    /// Buffer files outside the glTF file.
     companions: Vec<Companion>,
     hash: FileHash,
-    /// For each part, the first part with the same mesh. Only this first part is built.
+    /// For each part, the first part with the same mesh. Only that first part is built.
     first_part_with_same_mesh: Vec<usize>,
 }
 
@@ -113,7 +113,7 @@ impl GltfFile {
         if text.len() > JSON_LIMIT {
             let (has, limit) = (text.len().div_ceil(1 << 20), JSON_LIMIT >> 20);
             return Err(wrong(GltfError::new(format!(
-                "{has} MiB of JSON; the limit is {limit} MiB; store the buffers in .glb or .bin files"
+                "the JSON has {has} MiB; the limit is {limit} MiB; store the buffers in .glb or .bin files"
             ))));
         }
         let text = text.strip_prefix(BOM).unwrap_or(text);
@@ -167,7 +167,7 @@ impl GltfFile {
         &self.path
     }
 
-    /// Separate buffer files of the glTF file.
+    /// Buffer files outside the glTF file.
     pub fn companions(&self) -> &[Companion] {
         &self.companions
     }
@@ -177,7 +177,7 @@ impl GltfFile {
         self.hash
     }
 
-    /// Image files referenced by the glTF file, used or not.
+    /// Image files referenced by the glTF file, including unused ones.
     pub fn pictures(&self) -> Vec<PathBuf> {
         let file = |image: &JsonImage| match &image.uri {
             Some(Uri::File(uri)) => resolve_uri(&self.path, uri).ok(),
@@ -227,13 +227,13 @@ impl GltfFile {
         AssetError::malformed(&self.path, None, wrong.0)
     }
 
-    /// First part with the same mesh as `part`. It is built instead of `part`.
+    /// Returns the first part with the same mesh as `part`. That first part is built instead of `part`.
     pub(super) fn first_part_with_same_mesh(&self, part: usize) -> usize {
         self.first_part_with_same_mesh.get(part).copied().unwrap_or(part)
     }
 
-    /// Finds the first part with the same mesh for each part. Rejects files whose meshes reuse the same buffer
-    /// bytes so often that they would take many times the file's size in memory.
+    /// Maps each part to the first part with the same mesh. Rejects files whose meshes reuse the same buffer
+    /// bytes so often that they would need many times the file size in memory.
     fn deduplicate_parts(&self) -> Result<Vec<usize>, GltfError> {
         /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
@@ -309,9 +309,7 @@ impl GltfFile {
 }
 
 fn too_many_corners(corners: u64, bytes: u64, limit: u64) -> String {
-    format!(
-        "its primitives have {corners} triangle corners; the limit for {bytes} bytes of buffers is {limit}"
-    )
+    format!("its primitives have {corners} triangle corners; the limit for {bytes} buffer bytes is {limit}")
 }
 
 /// Error message for an empty file.
@@ -334,7 +332,7 @@ fn invalid_version(text: &str) -> String {
     format!("asset.minVersion is not a version: {:?}", truncate_for_message(text))
 }
 
-/// Error message for a file whose meshes or images need an unsupported extension.
+/// Error message for an unsupported extension that a file's meshes or images need.
 fn unsupported_extension(extension: &str, help: &str) -> String {
     format!("{extension} is not supported; {help}")
 }
@@ -351,7 +349,7 @@ fn short_buffer(claimed: u64, has: usize) -> String {
 }
 
 fn missing_buffer(reason: &str, number: usize, name: &str) -> String {
-    format!("{reason}; it contains buffers[{number}] of {name}")
+    format!("{reason}; {name} stores buffers[{number}] there")
 }
 
 fn not_relative(uri: &str) -> String {
@@ -361,8 +359,8 @@ fn not_relative(uri: &str) -> String {
 /// An unsupported mesh compression extension.
 const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Returns the version of a file older than glTF 2.0, whose JSON has objects instead of arrays. `None` for
-/// other files.
+/// Returns the version of a file that predates glTF 2.0. `None` for other files. Older versions use JSON
+/// objects where glTF 2.0 uses arrays.
 fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Old {
@@ -399,7 +397,7 @@ fn truncate_parser_message(text: &str) -> String {
 
 type Range = std::ops::Range<usize>;
 
-/// Byte ranges of the JSON and the binary chunk of a GLB file (4.4).
+/// Byte ranges of the JSON and binary chunks in a GLB file (4.4).
 fn glb_chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     const JSON: u32 = 0x4e4f_534a;
     const BINARY: u32 = 0x004e_4942;
@@ -418,7 +416,7 @@ fn glb_chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
         let start = at + 8;
         let Some(end) = end_of(at) else {
-            // Ignore bytes past the length given in the header.
+            // Ignore bytes past the length declared in the header.
             if at >= declared && json.is_some() && !matches!(kind, JSON | BINARY) {
                 break;
             }
@@ -461,17 +459,17 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
     }
 }
 
-/// Unsupported extensions that change how meshes or images are stored, each with advice on how to export
-/// the file without the extension.
+/// Unsupported extensions that change how meshes or images are stored, each with advice on exporting the
+/// file without it.
 const MISSING: [(&str, &str); 5] = [
     (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
     ("KHR_meshopt_compression", "export it without meshopt compression"),
-    ("KHR_texture_basisu", "export it with PNG or JPEG textures instead of Basis ones"),
+    ("KHR_texture_basisu", "export it with PNG or JPEG textures instead of Basis textures"),
     ("EXT_mesh_gpu_instancing", "export it with a node for each instance"),
 ];
 
-/// Extensions that are supported, or ignored with a note.
+/// Extensions that are either supported or ignored with a note.
 const KNOWN: [&str; 21] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
@@ -510,7 +508,7 @@ fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Reads all buffers, and returns them with the list of buffer files.
+/// Reads all buffers. Returns them and the list of buffer files.
 fn read_buffers(
     path: &Path,
     root: &mut Root,

@@ -1,4 +1,4 @@
-//! Traverses the nodes of a glTF file to find its instances, lights and cameras.
+//! Traverses the nodes in a glTF file to find its instances, lights and cameras.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -16,10 +16,10 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
-/// Maximum number of vertices for exact bounds, summed over all instances.
+/// Maximum total number of instance vertices for which the bounds are exact.
 const MAX_MEASURED: usize = 20_000_000;
-/// Limit on coordinates, transform entries and light intensities. The limit for scenes is 10¹⁸, and cameras
-/// are placed at a distance of several times the model's size.
+/// Limit on coordinates, transform entries and light intensities. It is lower than the limit of 10¹⁸ for
+/// scenes because cameras are placed several model sizes away.
 const LIMIT: f64 = 1e15;
 /// Maximum number of instances per file.
 const MAX_INSTANCES: usize = 1 << 20;
@@ -44,8 +44,8 @@ impl GltfFile {
         Ok(scene)
     }
 
-    /// Computes the bounds and outline of the instances. Skips invalid parts, whose errors are reported when the
-    /// parts are loaded, unless all parts are invalid.
+    /// Computes the bounds and outline of the instances. Skips invalid parts unless all parts are invalid.
+    /// Their errors are reported when the parts are loaded.
     fn measure_bounds(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
         let (mut vertices, mut first_wrong) = (0, None);
@@ -66,7 +66,7 @@ impl GltfFile {
             };
             let placed = &instance.placed;
             scene.outline.extend(extremes.iter().map(|at| placed.point(*at)));
-            // Measure every vertex up to the limit, then only extreme points.
+            // Measure every vertex until the limit is reached, then only extreme points.
             vertices += mesh.positions.len();
             let all = mesh.positions.iter().map(|at| at.as_dvec3() + mesh.origin);
             let few = extremes.iter().copied();
@@ -94,7 +94,7 @@ impl GltfFile {
     }
 }
 
-/// Traversal of the node hierarchy, with the results so far.
+/// State of a node hierarchy traversal, including the results so far.
 struct SceneWalk<'a> {
     container: &'a GltfFile,
     scene: ModelScene,
@@ -282,8 +282,8 @@ impl SceneWalk<'_> {
         Ok(index)
     }
 
-    /// Transform of a skin in its bind pose (glTF 2.0, 3.7.3). All joints have the same transform in this
-    /// pose, so only the first is evaluated.
+    /// Transform of a skin in its bind pose (glTF 2.0, 3.7.3). In this pose, all joints yield the same
+    /// transform, so only the first joint is evaluated.
     fn bind_pose(
         &mut self,
         number: usize,
@@ -320,7 +320,7 @@ impl SceneWalk<'_> {
                 let inner = json.spot.inner_cone_angle.clamp(0.0, outer);
                 if inner < outer {
                     self.notes
-                        .add(place, "the falloff between the light's inner and outer cone is approximate");
+                        .add(place, "the falloff between the light's inner and outer cones is approximate");
                 }
                 ModelLightKind::Spot { angle: 2.0 * outer.to_degrees(), blend: 1.0 - inner / outer }
             }
@@ -393,11 +393,11 @@ pub(super) fn node_visited_twice(node: usize) -> String {
     format!("nodes[{node}] is its own ancestor or has two parents")
 }
 
-/// Note about a camera of unknown type.
+/// Note about a camera whose type is unknown.
 pub(super) const UNKNOWN_CAMERA: &str = "the camera is skipped: it is neither perspective nor orthographic";
 
 /// Rejects transforms with entries above the limit. If one of the node's own properties exceeds the limit,
-/// the error names this property.
+/// the error names that property.
 fn check_transform_limit(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |largest, number| largest.max(number.abs()));
     let all = |placed: &AffineMap| {
@@ -442,7 +442,7 @@ fn check_intensity(json: &JsonLight, number: usize) -> Result<(), GltfError> {
 
 /// World transforms of all nodes.
 struct WorldTransforms {
-    /// Nodes in traversal order, with their transform and visibility (`KHR_node_visibility`).
+    /// Nodes in traversal order, each with its transform and visibility (`KHR_node_visibility`).
     order: Vec<(usize, AffineMap, bool)>,
     /// Transform of each node. `None` for nodes outside the scene.
     of_node: Vec<Option<AffineMap>>,

@@ -1,4 +1,4 @@
-//! Builds a part (primitive) of a glTF file as a mesh in local coordinates (glTF 2.0, 3.7.2).
+//! Builds a part (primitive) from a glTF file as a mesh in local coordinates (glTF 2.0, 3.7.2).
 
 use super::accessor::AccessorReader;
 use super::json::{Primitive, TRIANGLES};
@@ -12,7 +12,7 @@ use crate::control::{CancelToken, Progress};
 use crate::math::color::linear_to_srgb8;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Primitive modes with faces, other than [`TRIANGLES`].
+/// Primitive modes that produce faces, other than [`TRIANGLES`].
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
 
@@ -22,7 +22,7 @@ impl Primitive {
         [TRIANGLES, STRIP, FAN].contains(&self.mode)
     }
 
-    /// Number of triangle corners for `count` vertices in this mode.
+    /// Number of triangle corners that `count` vertices form in this mode.
     pub(super) fn triangle_corner_count(&self, count: u64) -> u64 {
         match self.mode {
             TRIANGLES => count,
@@ -33,7 +33,7 @@ impl Primitive {
 }
 
 impl GltfFile {
-    /// Returns the location of a part in the file, and the part's primitive.
+    /// Returns a part's location in the file and its primitive.
     pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;
         for (mesh, json) in self.root.meshes.iter().enumerate() {
@@ -134,8 +134,8 @@ impl GltfFile {
         AccessorReader::open(self, number).map(Some).map_err(|wrong| wrong.add_location(name))
     }
 
-    /// The two texture coordinate sets of a primitive's mesh: the first two used by its material's textures,
-    /// in ascending order. If the textures use only one set, this set comes first.
+    /// Selects the two texture coordinate sets for a primitive's mesh: the first two that its material's
+    /// textures use, in ascending order. If the textures use only one set, that set is first.
     pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
         let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
@@ -146,8 +146,8 @@ impl GltfFile {
         }
     }
 
-    /// Returns the vertex index of each corner, and the list of vertices that these indices refer to. The
-    /// list contains all vertices, or only the used ones if there are few corners.
+    /// Returns each corner's index into a list of vertices, and that list. The list contains all vertices, or
+    /// only the used ones if there are few corners.
     fn corner_indices(
         &self,
         primitive: &Primitive,

@@ -1,4 +1,4 @@
-//! Lists the files that a glTF file references without loading it.
+//! Lists the files that a glTF file references. Does not load the buffers or images.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -11,7 +11,7 @@ use super::{BOM, JSON_LIMIT, resolve_uri};
 use crate::assets::read;
 use crate::control::{CancelToken, Cancelled};
 
-/// The parts of a glTF file with URIs. Ignores everything else, valid or not.
+/// The URIs in a glTF file. Everything else in the file is ignored, valid or not.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct References {
@@ -25,7 +25,7 @@ struct Reference {
     uri: Option<FileUri>,
 }
 
-/// The URI of a file. `None` for data URIs, which are not copied.
+/// A file URI. `None` for data URIs, which are not copied.
 #[derive(Debug)]
 struct FileUri(Option<String>);
 
@@ -60,8 +60,8 @@ impl<R: Read> Read for CancellableReader<'_, R> {
     }
 }
 
-/// Lists the buffer and image files that a glTF file references, used or not. Reads only the JSON, without
-/// keeping it in memory. Empty for unreadable files and invalid JSON.
+/// Lists the buffer and image files that a glTF file references, including unused ones. Reads only the JSON,
+/// without keeping it in memory. Returns an empty list if the file is unreadable or its JSON is invalid.
 ///
 /// # Errors
 /// Returns [`Cancelled`] if the token is cancelled.
@@ -73,10 +73,10 @@ pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>
     Ok(uris.filter_map(|uri| resolve_uri(path, &uri).ok()).collect())
 }
 
-/// Opens the JSON of a glTF file.
+/// Opens the JSON in a glTF file.
 fn json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read + use<'a>> {
-    /// Number of bytes before the JSON in a GLB file (4.4.2): the file header and the first chunk's length
-    /// and type.
+    /// Number of bytes that precede the JSON in a GLB file (4.4.2): the file header and the first chunk's
+    /// length and type.
     const BEFORE_JSON: u64 = 20;
     const BUFFER: usize = 1 << 16;
     let (mut file, _) = read::open(path, u64::MAX).map_err(io::Error::other)?;

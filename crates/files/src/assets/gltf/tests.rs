@@ -42,7 +42,7 @@ fn scene(container: &GltfFile) -> Result<ModelScene, AssetError> {
     container.scene(&CancelToken::new())
 }
 
-/// Error from opening a file, converting its scene or building its first part.
+/// Returns the error from opening a file, converting its scene or building its first part.
 fn error(json: &Value) -> String {
     let all = || {
         let container = open_json(json)?;
@@ -52,7 +52,7 @@ fn error(json: &Value) -> String {
     rejection(all()).1
 }
 
-/// Buffer of a square: four positions, six indices and four texture coordinates.
+/// Buffer for a square: four positions, six indices and four texture coordinates.
 fn bytes() -> Vec<u8> {
     let mut bytes = Vec::new();
     for number in [0.0_f32, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 1.0, 0.0] {
@@ -294,7 +294,7 @@ fn two_used_texture_coordinate_sets_are_kept() {
     let mut json = square();
     json["textures"] = json!([{"source": 0}]);
     json["images"] = json!([{"uri": "a.png"}]);
-    // Sets 0, 1 and 2 contain the same numbers in different order.
+    // Sets 0, 1 and 2 contain the same numbers in different orders.
     let primitive = json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2, "TEXCOORD_1": 3, "TEXCOORD_2": 4}, "indices": 1, "material": 0});
     json["meshes"][0]["primitives"][0] = primitive;
     for turned in [8, 16] {
@@ -331,7 +331,7 @@ fn two_used_texture_coordinate_sets_are_kept() {
     let (first, two, second, notes) = read([2, 0, 2]);
     assert_eq!((&first, second, notes), (&zero, [true, false, true], 0));
     assert!(two != zero && two != one);
-    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "a third set should be noted");
+    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "a third set should add a note");
 }
 
 #[test]
@@ -412,11 +412,11 @@ fn errors_include_their_location() {
     assert!(found.ends_with(&too_many_zeros(4_000_000_000)), "{found}");
 }
 
-/// Primitives that reuse the same buffer bytes could take far more memory than the size of the file.
+/// Primitives that reuse the same buffer bytes could need far more memory than the file size suggests.
 #[test]
-fn reuse_of_buffer_bytes_is_limited() {
+fn buffer_byte_reuse_is_limited() {
     let mut json = square();
-    // 400 accessors with many elements but few bytes.
+    // 400 accessors without buffer views: many elements, but no buffer bytes.
     let accessors: Vec<Value> =
         (0..400).map(|_| json!({"componentType": 5126, "count": 1 << 20, "type": "VEC3"})).collect();
     json["accessors"] = json!(accessors);
@@ -425,7 +425,7 @@ fn reuse_of_buffer_bytes_is_limited() {
     assert_eq!(error(&json), too_many_corners(400 << 20, 92, 92 + (1 << 20)));
 }
 
-/// A mesh shared by many primitives is built once, with the texture coordinates used by their materials.
+/// Primitives with the same mesh share one part, with the texture coordinates used by their materials.
 #[test]
 fn equal_primitives_share_one_part() {
     let mut json = square();
@@ -503,7 +503,7 @@ fn old_versions_and_wrong_types_are_rejected() {
     assert!(error(&flat).ends_with(&part::wrong_width(2)), "{}", error(&flat));
 }
 
-/// Some programs write unpadded chunks, or extra bytes past the length given in the header.
+/// Some programs write unpadded chunks, or extra bytes past the length declared in the header.
 #[test]
 fn unpadded_chunks_and_trailers_are_accepted() {
     let folder = GltfDir::new();
@@ -528,7 +528,7 @@ fn unpadded_chunks_and_trailers_are_accepted() {
     }
 }
 
-/// Errors name the index of an image that is missing or damaged after its header.
+/// Errors include the image index if the image is missing, or damaged after its header.
 #[test]
 fn image_errors_include_the_image_index() {
     let folder = GltfDir::new();
@@ -578,7 +578,7 @@ fn truncated_and_invalid_glbs_are_rejected() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Mutated files are either read or rejected and never cause a panic.
+    /// Mutated files are either read or rejected. They never cause a panic.
     #[test]
     fn mutated_files_never_panic(changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 1..8), cut in any::<u16>()) {
         let mut json = square();
@@ -665,7 +665,7 @@ fn newer_versions_are_rejected() {
 }
 
 #[test]
-fn cameras_of_unknown_type_are_noted() {
+fn unknown_camera_types_produce_a_note() {
     let mut json = square();
     json["nodes"][0]["camera"] = json!(0);
     for camera in [json!({"type": "panorama"}), json!({"type": "perspective"}), json!({})] {

@@ -11,7 +11,7 @@ const CHUNK: usize = 1 << 16;
 pub(super) struct CountingReader<R> {
     inner: R,
     at: u64,
-    /// Furthest position read so far. Decoders may seek backwards.
+    /// Farthest position read so far. Decoders may seek backward.
     reached: u64,
     length: u64,
     report: ProgressReporter,

@@ -17,10 +17,10 @@ const POLL: Duration = Duration::from_millis(2);
 /// Maximum number of unread progress reports.
 const QUEUE_LENGTH: usize = 16;
 
-/// Abandoned threads that have not finished.
+/// Abandoned threads that are still running.
 static ABANDONED: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 
-/// Reports the progress of a decoder.
+/// Reports a decoder's progress.
 #[derive(Clone)]
 pub(super) struct ProgressReporter(Option<SyncSender<u64>>);
 
@@ -35,9 +35,9 @@ impl ProgressReporter {
     }
 }
 
-/// Runs `work` on another thread and forwards its progress reports, out of `total`. Returns `None` if `work`
-/// panics. If no thread can be started, runs `work` on the calling thread, without progress reports or
-/// cancellation.
+/// Runs `work` on another thread and forwards its progress reports, which count up to `total`. Returns `None`
+/// if `work` panics. If no thread can be started, runs `work` on the calling thread, without progress reports
+/// or cancellation.
 ///
 /// Abandoned work still uses memory, so new work starts only after all abandoned work has finished.
 pub(super) fn run<T: Send + 'static>(

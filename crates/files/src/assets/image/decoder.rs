@@ -17,7 +17,7 @@ use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
 use super::{empty_image, exceeds_memory, implausible_size, side_too_long};
 
-/// A decoder, and the metadata that the decoder itself does not apply.
+/// A decoder, with metadata that the decoder itself does not apply.
 pub(super) struct OpenedImage {
     pub(super) decoder: Box<dyn ImageDecoder>,
     pub(super) metadata: ImageMetadata,
@@ -84,7 +84,7 @@ fn with_profile(
     encoding: ImageEncoding,
     memory_bytes: u64,
 ) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
-    // Width and height are checked in `check_size`, with better messages.
+    // `check_size` checks the width and height, and reports errors more clearly.
     let mut limits = Limits::default();
     limits.max_alloc = Some(memory_bytes);
     decoder.set_limits(limits)?;
@@ -97,8 +97,8 @@ fn with_profile(
     Ok((Box::new(decoder), metadata))
 }
 
-/// Orientation of an image from its Exif data. Some programs also write JPEG's Exif prefix in other formats,
-/// which `image` does not support.
+/// Returns an image's orientation from its Exif data. Accepts JPEG's Exif prefix in all formats. Some
+/// programs write it there, but `image` does not support it.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
@@ -121,7 +121,7 @@ pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &
 
 /// Memory allowed for any image, regardless of its file size.
 const SMALL_BYTES: u64 = 256 << 20;
-/// Maximum ratio of memory to file size for a format. The memory includes the decoded image and its texels.
+/// Maximum ratio of memory size to file size for a format. The memory holds the decoded image and its texels.
 pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
     match format {
         // Worst case: eight pixels per byte in a bitmap.
@@ -136,8 +136,8 @@ pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
 }
 
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
-/// size of the file data kept by the decoder. `in_memory` is the size of the file in memory, which is freed
-/// before the texels are complete.
+/// size of the file data kept by the decoder. `in_memory` is the size of the in-memory copy of the file,
+/// which is freed before the texels are complete.
 pub(super) fn check_size(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,

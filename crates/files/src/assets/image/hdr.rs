@@ -12,7 +12,7 @@ use super::space::ColorSpace;
 
 /// Maximum size of a header, including the resolution line. PLY headers have the same limit.
 const HEADER_BYTES: u64 = 1 << 20;
-/// Luminous efficacy of white light in lm/W. XYZE values are scaled by it (`WHTEFFICACY` in Radiance).
+/// Luminous efficacy of white light in lm/W (`WHTEFFICACY` in Radiance). XYZE values include this factor.
 const WHITE_EFFICACY: f64 = 179.0;
 /// First bytes of an HDR file, followed by a program name.
 pub(super) const MAGIC: &[u8] = b"#?";
@@ -219,7 +219,7 @@ fn are_positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 
-/// Storage direction of pixels along one axis.
+/// Direction in which pixels are stored along one axis.
 #[derive(Clone, Copy)]
 struct ScanAxis {
     is_vertical: bool,
@@ -301,7 +301,7 @@ fn read_scanline(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) 
     (0..4).try_for_each(|channel| read_run_length_channel(file, channel, pixels))
 }
 
-/// Reads one run-length encoded channel of a scanline.
+/// Reads one run-length encoded channel in a scanline.
 fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> ImageResult<()> {
     let mut done = 0;
     while done < pixels.len() {
@@ -322,7 +322,7 @@ fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[
     Ok(())
 }
 
-/// Reads a scanline stored pixel by pixel. A pixel of (1, 1, 1, n) repeats the previous pixel.
+/// Reads a scanline stored pixel by pixel. The value (1, 1, 1, n) repeats the previous pixel.
 fn read_flat_scanline(
     file: &mut impl Read,
     first: [u8; 4],

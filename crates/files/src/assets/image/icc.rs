@@ -8,7 +8,7 @@ use crate::math::{DMat3, DVec3};
 /// Maximum length of a curve's table.
 const MAX_VALUES: usize = 1 << 16;
 
-/// Returns the color space of a profile for a gray or RGB image, or the reason for ignoring the profile.
+/// Returns the color space from a profile for a gray or RGB image, or the reason for ignoring the profile.
 pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
     let profile = IccProfile::parse(profile).ok_or(MALFORMED)?;
     match (profile.field(16), profile.field(20)) {
@@ -52,7 +52,7 @@ impl<'a> IccProfile<'a> {
         self.field(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
     }
 
-    /// Returns the data of a tag.
+    /// Returns a tag's data.
     fn tag(&self, name: &[u8; 4]) -> Option<&'a [u8]> {
         const TABLE: usize = 128;
         let count = self.word(TABLE)?.min(self.0.len() / 12);

@@ -43,8 +43,8 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
     Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
 }
 
-/// Offset of the transform byte of a misleading Adobe segment. The segment is misleading if it specifies RGB
-/// but the file also has a JFIF segment, which implies YCbCr and takes precedence in other readers.
+/// Returns the offset of the transform byte in a misleading Adobe segment: one that specifies RGB in a file
+/// with a JFIF segment. JFIF implies YCbCr, and other readers give it precedence.
 pub(super) fn misleading_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
@@ -65,7 +65,7 @@ pub(super) fn fix_misleading_transform(bytes: &mut [u8]) {
     }
 }
 
-/// Markers and data offsets of the segments before the first scan.
+/// Returns the marker and data offset of each segment before the first scan.
 fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     const SCAN: u8 = 0xda;
     let mut at = 2;

@@ -44,7 +44,7 @@ impl ImageMetadata {
         self.warnings.push(ImageWarning { line: None, words: words.into() });
     }
 
-    /// Warns that only the first frame of an animation is used.
+    /// Adds a warning that only the first frame of an animation is used.
     pub(super) fn warn_of_frames(&mut self, frames: u32) {
         if frames > 1 {
             self.warn(format!("it has {frames} frames; only the first is used"));

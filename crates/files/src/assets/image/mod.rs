@@ -51,7 +51,7 @@ pub enum ImageEncoding {
     Srgb,
     /// Always linear, as in normal maps.
     Linear,
-    /// Like [`Self::Color`], but keeps negative and nonfinite floats. Used for comparing images.
+    /// Like [`Self::Color`], but keeps negative and nonfinite floats. Used to compare images.
     Raw,
     /// One scalar per pixel, stored in all channels. Alpha is always linear.
     Number {
@@ -65,7 +65,7 @@ pub enum ImageEncoding {
     CutOut(ColorCurve),
 }
 
-/// Transfer function of colors.
+/// Transfer function for colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ColorCurve {
     /// [`ImageEncoding::Color`].
@@ -204,10 +204,10 @@ fn load_source(
     Ok(LoadedImage { texels, warnings: warnings.into_iter().map(warning).collect() })
 }
 
-/// Reads an image's width and height from its header, and returns them with the size of the texels in bytes.
+/// Reads an image header. Returns the width and height in pixels, and the size of the texels in bytes.
 ///
 /// # Errors
-/// The errors of [`load`] that can be detected from the start of the file.
+/// Any error from [`load`] that can be detected at the start of the file.
 pub fn size(
     path: &Path,
     encoding: ImageEncoding,
@@ -273,7 +273,7 @@ pub fn size_embedded(
     )
 }
 
-/// Computes the mip levels of an image.
+/// Computes mip levels for an image.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -289,7 +289,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     })
 }
 
-/// Computes the mip levels of an image's coverage, the fraction of texels with values of at least `cutoff`.
+/// Computes mip levels for an image's coverage: the fraction of texels whose value is at least `cutoff`.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -541,7 +541,8 @@ fn shorten_decoder_error(error: &ImageError) -> String {
     }
 }
 
-/// Replaces a PNG chunk type, printed by the decoder in debug format, with the chunk's name.
+/// Replaces PNG chunk types in a decoder message with the chunk names. The decoder prints them in debug
+/// format.
 fn name_png_chunks(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };

@@ -166,8 +166,8 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
     }
 }
 
-/// Transfer function for a `gAMA` value in units of 1/100000. A gamma of 1/2.2 usually means sRGB (PNG,
-/// 11.3.2.5).
+/// Returns the transfer function for a `gAMA` value in units of 1/100000. A gamma of 1/2.2 usually means sRGB
+/// (PNG, 11.3.2.5).
 fn gamma_curve(gamma: u32) -> Curve {
     const SRGB: u32 = 45_455;
     const TOLERANCE: u32 = 500;
@@ -178,8 +178,8 @@ fn gamma_curve(gamma: u32) -> Curve {
     }
 }
 
-/// Color space for video signal code points (ITU-T H.273, tables 2 and 3). `None` for undefined codes, for
-/// logarithmic curves, and for samples other than full-range RGB.
+/// Returns the color space for video signal code points (ITU-T H.273, tables 2 and 3). `None` for undefined
+/// codes, logarithmic curves, and anything other than full-range RGB.
 fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
         1 => Primaries::REC_709,
@@ -257,7 +257,7 @@ fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk
     }
 }
 
-/// Decompresses the profile in a chunk. The data follows the profile's name and a compression method of 0.
+/// Decompresses a chunk's profile. The data follows the profile name and the compression method, which is 0.
 fn decompress_profile(chunk: &[u8]) -> Option<Vec<u8>> {
     let name = memchr::memchr(0, chunk)?;
     let packed = chunk[name + 1..].strip_prefix(&[0])?;

@@ -1,4 +1,4 @@
-//! Conversion of colors between primaries.
+//! Converts colors between primaries.
 
 use crate::math::{DMat3, DVec3};
 
@@ -9,7 +9,7 @@ const TOLERANCE: f64 = 2e-3;
 /// XYZ of D50, the white point of ICC profiles (ICC.1, 6.3.4.3).
 const D50: DVec3 = DVec3::new(0.9642, 1.0, 0.8249);
 
-/// Chromaticities (x, y) of primaries and white point.
+/// Chromaticities (x, y) of the primaries and the white point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Primaries {
     pub(super) red: [f64; 2],
@@ -32,7 +32,7 @@ impl Primaries {
     pub(super) const XYZ: Self =
         Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// Creates primaries from numbers in the order used by files: red, green, blue, white.
+    /// Creates primaries from numbers in the order in which files store them: red, green, blue, white.
     pub(super) fn from_numbers([rx, ry, gx, gy, bx, by, wx, wy]: [f64; 8]) -> Self {
         Self { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] }
     }
@@ -61,12 +61,12 @@ impl Primaries {
     }
 }
 
-/// Matrix to linear Rec. 709 from the colorants of an ICC profile, given in XYZ relative to D50.
+/// Matrix to linear Rec. 709 from an ICC profile's colorants, which are in XYZ relative to D50.
 pub(super) fn colorants_to_rec_709(colorants: DMat3) -> Option<DMat3> {
     Some(rec_709_from_xyz(D50)? * colorants)
 }
 
-/// Whether a matrix is the identity up to rounding.
+/// Whether a matrix is the identity, up to rounding.
 pub(super) fn is_identity(matrix: &DMat3) -> bool {
     (*matrix - DMat3::IDENTITY).to_cols_array().iter().all(|entry| entry.abs() <= TOLERANCE)
 }

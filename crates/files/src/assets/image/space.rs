@@ -1,4 +1,4 @@
-//! Color spaces of image files: transfer curves and primaries.
+//! Color spaces in image files: transfer curves and primaries.
 
 use std::f64::consts::E;
 
@@ -73,7 +73,7 @@ impl Curve {
         }
     }
 
-    /// Whether the curve matches sRGB for 8-bit samples, within the rounding of profile values.
+    /// Whether the curve matches sRGB for 8-bit samples, within the rounding error of profile values.
     fn is_srgb(&self) -> bool {
         const TOLERANCE: f64 = 1.5e-3;
         *self == Self::Srgb
@@ -138,7 +138,7 @@ impl ColorSpace {
         }
     }
 
-    /// A color space that differs from the default only in its primaries.
+    /// Creates a color space that differs from the default only in its primaries.
     pub(super) fn from_rec_709_matrix(matrix: DMat3) -> Self {
         Self::new(None, matrix)
     }

@@ -30,7 +30,7 @@ fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texel
     load_with(&path, encoding)
 }
 
-/// Warnings about a file, with the directory stripped from its path.
+/// Returns the warnings about a file, with the directory stripped from its path.
 fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
@@ -41,7 +41,7 @@ fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String>
     loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }
 
-/// Reason for rejecting an image.
+/// Returns the reason why an image is rejected.
 fn error(name: &str, bytes: &[u8]) -> String {
     rejection(load_bytes(name, bytes, ImageEncoding::Color)).1
 }
@@ -184,7 +184,7 @@ fn checksum(bytes: &[u8]) -> [u8; 4] {
     (!crc).to_be_bytes()
 }
 
-/// A PNG with a valid checksum and a false size in its header.
+/// A PNG whose header has a false image size but a valid checksum.
 fn png_claiming(width: u32, height: u32) -> Vec<u8> {
     let mut file = small_png();
     file[16..20].copy_from_slice(&width.to_be_bytes());
@@ -194,7 +194,7 @@ fn png_claiming(width: u32, height: u32) -> Vec<u8> {
     file
 }
 
-/// A run-length encoded BMP that ends immediately and decodes to a single color.
+/// A run-length encoded BMP without runs, which decodes to a single color.
 fn empty_bmp(width: u32, height: u32) -> Vec<u8> {
     let palette = [[16, 32, 48, 0]; 256].concat();
     let runs = [0, 1];
@@ -206,7 +206,7 @@ fn empty_bmp(width: u32, height: u32) -> Vec<u8> {
     [file, palette, runs.to_vec()].concat()
 }
 
-/// Short files must not take gigabytes of memory, regardless of their extension.
+/// Short files must not use gigabytes of memory, regardless of their extension.
 #[test]
 fn short_files_take_little_memory() {
     assert!(load_bytes("a.bmp", &empty_bmp(600, 400), ImageEncoding::Color).is_ok());
@@ -253,7 +253,7 @@ fn sides_are_limited_to_65536_pixels() {
 }
 
 #[test]
-fn long_headers_give_short_errors() {
+fn long_headers_produce_short_errors() {
     let header = |line: &str| format!("P7\n{line} {}\n", "x".repeat(100_000));
     for line in ["WIDTH", "FOO", "TUPLTYPE"] {
         let reason = error("a.ppm", header(line).as_bytes());

@@ -1,5 +1,5 @@
-//! Handles TGA features that `image` does not support: the meaning of alpha, and some headers that `image`
-//! rejects (Truevision, *TGA File Format Specification*, version 2.0).
+//! Adds TGA support that `image` lacks: determines the meaning of alpha, and corrects some headers that
+//! `image` rejects (Truevision, *TGA File Format Specification*, version 2.0).
 
 use std::io::{self, Chain, Cursor, Read, Seek, SeekFrom};
 
@@ -24,8 +24,8 @@ const ATTRIBUTES: u64 = 494;
 /// A TGA file with a corrected header.
 type Patched<R> = Chain<Cursor<[u8; HEADER]>, R>;
 
-/// Returns a decoder and the meaning of alpha. `image` requires the header to declare exactly as many alpha
-/// bits as the pixel format can store, but many files declare none, or too many.
+/// Creates a decoder and determines the meaning of alpha. `image` requires the header to declare exactly as
+/// many alpha bits as the pixel format can store, but many files declare too many or none at all.
 pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patched<R>>, AlphaUsage)> {
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
@@ -46,7 +46,7 @@ pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patch
     Ok((TgaDecoder::new(Cursor::new(header).chain(file))?, alpha))
 }
 
-/// Number of bits per color. `None` for gray images and unknown types.
+/// Returns the number of bits per color. `None` for gray images and unknown types.
 fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
     match header[2] {
         1 | 9 => Some(header[7]),
@@ -55,7 +55,7 @@ fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
     }
 }
 
-/// Number of bits per pixel that may contain alpha.
+/// Returns how many bits of each pixel may contain alpha.
 fn possible_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
     let kind = header[2];
     let bits = match (kind, color_bits(header)) {
@@ -67,9 +67,9 @@ fn possible_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
         (3 | 11, 8) | (1 | 2 | 9 | 10, 15 | 16 | 24) => Ok(0),
         (3 | 11, 16) | (1 | 2 | 9 | 10, 32) => Ok(8),
         (3 | 11, _) => Err(format!(
-            "gray pixels of {bits} bits are not supported (only 8, or 16 with alpha); save it as PNG"
+            "{bits}-bit gray is not supported (only 8-bit, or 16-bit including alpha); save it as PNG"
         )),
-        _ => Err(format!("colors of {bits} bits are not supported (only 15, 16, 24 or 32); save it as PNG")),
+        _ => Err(format!("{bits}-bit color is not supported (only 15, 16, 24 or 32 bits); save it as PNG")),
     }
 }
 

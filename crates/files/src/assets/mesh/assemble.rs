@@ -14,7 +14,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Number of faces between two polls of the cancel token.
+/// Number of faces between polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: triangulates polygons, drops unusable faces, removes unused vertices and completes the
@@ -23,7 +23,7 @@ pub(crate) fn assemble(source: &MeshSource<'_>, parsed: ParsedMesh) -> Result<Lo
     assemble_text(source, parsed, |_| None)
 }
 
-/// Like [`assemble`], but for text files. `start_of` returns the byte offset of a face, given its index.
+/// Like [`assemble`], but for text files. `start_of` maps a face index to the byte offset of the face.
 pub(super) fn assemble_text(
     source: &MeshSource<'_>,
     mut parsed: ParsedMesh,
@@ -86,7 +86,7 @@ pub(super) fn assemble_text(
     Ok(LoadedMesh { hash, mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
-/// Returns positions relative to an origin near the vertices used by faces. Numbers too large for `f32`
+/// Converts positions to offsets from an origin near the vertices that faces use. Offsets too large for `f32`
 /// become infinite.
 fn relative_to_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
@@ -120,14 +120,14 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
 }
 
 const NON_FINITE_UVS: &str = "has non-finite texture coordinates; such coordinates are set to (0, 0)";
-const NON_FINITE_NORMALS: &str = "has non-finite normals; such normals are computed";
+const NON_FINITE_NORMALS: &str = "has non-finite normals; they are recomputed";
 
-/// Vertices with an attribute that is not finite.
+/// Returns the vertices whose attribute is not finite.
 fn non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
     (0_u32..).zip(values).filter(|(_, value)| !is_finite(value)).map(|(vertex, _)| vertex).collect()
 }
 
-/// Warns about the first face that has any of these vertices.
+/// Warns about the first face that uses any of the vertices.
 fn non_finite_warning(
     faces: &Faces,
     line_of: impl Fn(usize) -> Option<usize>,
@@ -143,7 +143,7 @@ fn non_finite_warning(
     Some(format!("{} {words}", face_label(face, line_of(face))))
 }
 
-/// Label of a face, with its line in text files.
+/// Label of a face in warnings, with the line number in text files.
 fn face_label(face: usize, line: Option<usize>) -> String {
     match line {
         Some(line) => format!("line {line}: face {}", face + 1),
@@ -283,14 +283,14 @@ impl<'a> FaceTriangulator<'a> {
     }
 }
 
-/// Whether three finite points form a triangle with nonzero area. `f32` points neither overflow nor underflow
-/// in `f64`, and products of nearby points are exact.
+/// Whether three finite points form a triangle with nonzero area. In `f64`, `f32` coordinates neither
+/// overflow nor underflow, and products for nearby points are exact.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Removes unused vertices, which may have arbitrary coordinates and would enlarge the bounds.
+/// Removes unused vertices. Their coordinates may be arbitrary and would enlarge the bounds.
 fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {
@@ -360,7 +360,7 @@ mod tests {
     const SQUARE: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
 
     #[test]
-    fn arities_start_at_the_first_polygon() {
+    fn arities_include_triangles_before_a_polygon() {
         let faces = faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 2, 3], &[0, 1, 2]]);
         assert_eq!((faces.len(), faces.arities), (4, vec![3, 3, 4, 3]));
     }
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_f32_triangles_have_area() {
+    fn huge_and_tiny_triangles_have_area() {
         for scale in [f32::MAX / 2.0, f32::MIN_POSITIVE / 1024.0] {
             let positions = exact(&[Vec3::ZERO, Vec3::X * scale, Vec3::Y * scale]);
             let parsed = ParsedMesh { positions, faces: faces(&[&[0, 1, 2]]), ..ParsedMesh::default() };
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn reasons_for_unusable_faces_are_counted() {
+    fn unusable_faces_are_counted_by_reason() {
         let positions = exact(&[Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)]);
         let parsed =
             ParsedMesh { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..ParsedMesh::default() };

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Average number of vertices per bucket. Buckets are sorted in parallel. The cancel token is polled once per
-/// bucket.
+/// Average number of vertices per bucket. Buckets are sorted in parallel, and each bucket polls the cancel
+/// token once.
 const BUCKET: usize = 1 << 12;
 
-/// Number of vertices between two polls of the cancel token.
+/// Number of vertices between polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
 /// Hash and index of a vertex.
@@ -48,8 +48,8 @@ fn hash_of(position: Vec3) -> u32 {
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
 }
 
-/// Sorts vertices into buckets by the upper bits of their hashes. Returns the vertices and the end of each
-/// bucket.
+/// Sorts vertices into buckets by the upper bits of their hashes. Returns the sorted vertices and the end
+/// index of each bucket.
 fn sort_into_buckets(
     hashes: &[u32],
     bits: u32,
@@ -77,7 +77,7 @@ fn sort_into_buckets(
     Ok((entries, ends))
 }
 
-/// Finds the coincident vertices in a bucket by grouping by hash, then by position.
+/// Finds the coincident vertices in a bucket. Groups the vertices by hash, then by position.
 fn find_in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn grid_positions_use_all_buckets() {
+    fn grid_positions_spread_over_all_buckets() {
         let mut counts = [0; 64];
         for i in 0..64_000_u32 {
             let position = Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32) * 0.5;

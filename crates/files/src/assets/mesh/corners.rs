@@ -7,14 +7,14 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::Vec2;
 
-/// Number of corners between two polls of the cancel token.
+/// Number of corners between polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
-/// Vertex index, texture coordinates (bits) and color of a corner.
+/// A corner's vertex index, texture coordinates (as bit patterns) and color.
 type CornerKey = (u32, [u32; 2], [u8; 3]);
 
-/// Creates a vertex for each distinct combination of vertex, texture coordinates and color among the corners.
-/// New vertices keep the original vertex's normal.
+/// Creates one vertex for each combination of vertex, texture coordinates and color that occurs at a corner.
+/// New vertices keep the normal of the original vertex.
 pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
@@ -58,7 +58,7 @@ pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Re
     Ok(())
 }
 
-/// Replaces `values` with the value of each source. An empty list stays empty.
+/// Replaces `values` with the values at the indices in `sources`. An empty list stays empty.
 fn gather_values<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();

@@ -1,5 +1,5 @@
-//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser collects vertices and faces. `assemble` then builds
-//! a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser collects vertices and faces. `assemble` then
+//! builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(crate) mod assemble;
 mod coincident;
@@ -61,9 +61,9 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     Ok(loaded)
 }
 
-/// Lists the material libraries that an OBJ file references, and the images that the libraries reference, used
-/// or not. Reads only the statements with file names, also from files with errors, in bounded memory. Empty for
-/// other formats and unreadable files.
+/// Lists the material libraries that an OBJ file references, and the images that these libraries reference,
+/// including unused ones. Reads only the statements with file names, so errors elsewhere in the files do not
+/// matter. Memory use is bounded. Returns an empty list for other formats and unreadable files.
 ///
 /// # Errors
 /// Returns [`Cancelled`] if the token is cancelled.
@@ -77,7 +77,7 @@ const UNKNOWN_FORMAT: &str = "unknown mesh format; the extension must be .obj, .
 /// Error message for an empty file.
 const EMPTY_FILE: &str = "the file is empty";
 
-/// Error message for an invalid vertex index in a file with `count` vertices. Indices start at 0.
+/// Error message for an out-of-range vertex index in a file with `count` vertices. Indices start at 0.
 pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
     format!("vertex {vertex} is out of range: there are {count}, numbered from 0")
 }
@@ -85,7 +85,7 @@ pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
 type ParseFn = fn(&MeshSource<'_>) -> Result<LoadedMesh, AssetError>;
 type ReadFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
-/// A mesh file in memory, and the monitor for its parser.
+/// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]
 pub(crate) struct MeshSource<'a> {
     pub(crate) path: &'a Path,
@@ -109,7 +109,7 @@ impl MeshSource<'_> {
         AssetError::malformed(self.path, Some(self.line(at)), reason)
     }
 
-    /// Number of the line that contains byte `at`, starting at 1.
+    /// Returns the number of the line that contains byte `at`. The first line is 1.
     fn line(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
         1 + memchr::memchr_iter(b'\n', before).count()
@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    /// Text made of mesh file keywords, so that parsers get past the first line.
+    /// Random text made of mesh file keywords, so that parsers get past the first line.
     fn wordy() -> impl Strategy<Value = String> {
         let words = "OFF COFF STOFF 4OFF ply format ascii binary_little_endian 1.0 element vertex face property \
                      list uchar int float x y z vertex_indices end_header v vt vn f l g o usemtl mtllib \

@@ -11,8 +11,8 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
-/// Minimum cosine between the normals of coincident vertices for merging the normals. Normals that differ by at
-/// most 45 degrees are merged, as at a texture seam. Otherwise, the vertices form a sharp edge, as in a box with
+/// Minimum cosine at which the normals of coincident vertices are merged. Normals that differ by at most 45
+/// degrees are merged, as at a texture seam. Otherwise, the vertices form a sharp edge, as in a box with
 /// separate sides.
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
@@ -20,7 +20,7 @@ const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Larger sets are merged without comparing normals.
 const COMPARED: usize = 64;
 
-/// Number of triangles or vertices between two polls of the cancel token.
+/// Number of triangles or vertices between polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
 /// Computes a unit normal for each vertex, pointing to the front side of its faces. Each face is weighted by
@@ -69,7 +69,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
-/// For each vertex, the first vertex with the same normal. Empty if there are no groups.
+/// Maps each vertex to the first vertex with the same normal. Empty if there are no groups.
 fn first_vertex_with_same_normal(groups: &[NormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
@@ -84,8 +84,8 @@ fn first_vertex_with_same_normal(groups: &[NormalGroup]) -> Vec<usize> {
 /// Whether a mesh without normals consists of flat faces, like a box. In a faceted mesh, the face normals
 /// around most vertices partly cancel out.
 pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
-    /// Minimum length of the mean unit normal around a vertex of a smooth surface. A cone with a half-angle
-    /// of 32 degrees has this length.
+    /// Minimum length of the mean unit normal around a vertex on a smooth surface. It corresponds to normals
+    /// that form a cone with a half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != NormalGroup::BY_ANGLE) {
@@ -120,8 +120,8 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
     Ok(())
 }
 
-/// Sums the unit normals of each vertex's faces, weighted by their angles, in the order of the faces. Each
-/// thread owns a range of vertices, so the order does not depend on the number of threads.
+/// Sums the unit face normals around each vertex in face order, weighted by the faces' angles at the vertex.
+/// Each thread owns a range of vertices, so the order does not depend on the number of threads.
 fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
@@ -148,8 +148,8 @@ fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>,
     Ok(sums)
 }
 
-/// Returns the unit normal (0 without area) and the angle at each corner. Unlike the arccosine, the
-/// arctangent is accurate for the tiny angles of slivers.
+/// Returns a triangle's unit normal (0 if it has no area) and the angle at each corner. Unlike the arccosine,
+/// the arctangent is accurate for the tiny angles in slivers.
 fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     let (ab, bc, ca) = (b - a, c - b, a - c);
@@ -193,8 +193,8 @@ fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     }
 }
 
-/// Assigns a normal to vertices whose face normals cancel out: the normal of one of the faces, or +y for
-/// vertices without faces.
+/// Assigns normals to vertices whose face normals cancel out. Uses the normal of one of the faces, or +y if
+/// the vertex has no faces.
 fn replace_canceled_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn seams_are_smooth_and_edges_are_sharp() {
-        // Two quads folded by `height`, with separate vertices along the fold.
+        // Two quads with a fold of the specified height and separate vertices along the fold.
         let folded = |height: f32| {
             mesh(
                 &[

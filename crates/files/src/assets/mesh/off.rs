@@ -1,6 +1,7 @@
 //! OFF: a header keyword and counts, followed by one vertex per line, then one polygon per line (Geomview
-//! manual, section *OFF*). Many files deviate from this: they have counts directly after the keyword, no edge
-//! count, undeclared columns after coordinates and faces, or comments and blank lines anywhere.
+//! manual, section *OFF*). Many files deviate from this. The counts may follow the keyword directly, the edge
+//! count may be missing, coordinates and faces may be followed by undeclared columns, and comments and blank
+//! lines may be anywhere.
 
 use super::assemble::assemble_text;
 use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored};
@@ -8,7 +9,7 @@ use super::text::{Cursor, expected, expected_at_line_end, shown};
 use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Number of vertices or faces between two polls of the cancel token.
+/// Number of vertices or faces between polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
 /// Vertex columns declared by the header keyword.
@@ -30,13 +31,13 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
 struct OffReader<'a> {
     source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Lines with undeclared numbers.
+    /// Lines with numbers that the header does not declare.
     excess: IgnoredLines,
     /// Lines whose color is an index into a colormap.
     indices: IgnoredLines,
 }
 
-/// Lines to warn about: the number of lines, and the byte offset of the first one.
+/// Lines to warn about: their number and the byte offset of the first one.
 #[derive(Clone, Copy, Default)]
 struct IgnoredLines(u64, usize);
 
@@ -111,7 +112,7 @@ fn too_many_corners(arity: usize) -> String {
 }
 
 fn short_face(corner: usize, arity: usize) -> String {
-    format!("a face of {arity} corners ends after {corner}")
+    format!("a face with {arity} corners ends after {corner}")
 }
 
 /// Optional colors of vertices or corners.
@@ -119,12 +120,12 @@ fn short_face(corner: usize, arity: usize) -> String {
 struct OffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
-    /// Minimum alpha, and a byte offset on the same line.
+    /// Minimum alpha and a byte offset on its line.
     least_alpha: Option<(f64, usize)>,
 }
 
 impl OffColors {
-    /// Adds a color for `times` vertices or corners.
+    /// Adds the same color for `times` vertices or corners.
     fn push(&mut self, color: &[f64], times: usize, at: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied();
         color.iter().for_each(|color| self.range.add(*color, at));
@@ -174,7 +175,7 @@ impl OffReader<'_> {
         assemble_text(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
     }
 
-    /// Byte offset of the face with this index. The reader must be at the first face.
+    /// Returns the byte offset of a face, given its index. The reader must be at the first face.
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
         ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
@@ -305,7 +306,7 @@ impl OffReader<'_> {
         Ok(())
     }
 
-    /// Adds the color at the end of a line to `times` vertices or corners.
+    /// Adds a color from the end of a line to `times` vertices or corners.
     fn color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
         colors.push(color, times, self.cursor.at());
         match color {
@@ -330,7 +331,8 @@ impl OffReader<'_> {
         }
     }
 
-    /// Reads the remaining numbers of the line: a color of any length, and texture coordinates.
+    /// Reads the remaining numbers on the line: a color with any number of components, and texture
+    /// coordinates.
     fn rest_of_line(&mut self) -> Result<Vec<f64>, AssetError> {
         let mut rest = Vec::new();
         while self.cursor.skip_to_word_in_line() {
@@ -339,7 +341,8 @@ impl OffReader<'_> {
         Ok(rest)
     }
 
-    /// Reads texture coordinates: the last two numbers of the line, possibly after a color of any length.
+    /// Reads texture coordinates: the last two numbers on the line. A color with any number of components may
+    /// precede them.
     fn read_uv(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_to_word_in_line() {
@@ -441,7 +444,7 @@ mod tests {
             format!("4OFF\n4 2 0\n{}{FACES}", lines(" 1")),
             format!("OFF\n4 2 0\n{}3 0 1 2 7\n3  0 2 3 x\n", lines("")),
             format!("OFF\n4 2 0\n{}{}", lines(""), FACES.trim_end()),
-            // A polygon instead of two triangles.
+            // One polygon instead of two triangles.
             format!("OFF\n4 1 0\n{}4 0 1 2 3\n", lines("")),
             format!("OFF\n4 1 0\n{}4 0 1\n2 3\n", lines("")),
         ] {

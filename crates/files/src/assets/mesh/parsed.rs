@@ -10,7 +10,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Index of the face that contains a corner, given the number of corners of each face.
+/// Returns the index of the face that contains a corner, given each face's number of corners.
 pub(super) fn face_of_corner(arities: &[u32], corner: usize) -> usize {
     let mut end = 0;
     let is_before = |arity: &&u32| {
@@ -90,7 +90,7 @@ pub(crate) struct ParsedMesh {
     /// sRGB.
     pub(crate) colors: Vec<[u8; 3]>,
     pub(crate) faces: Faces,
-    /// Texture coordinates of each face corner, or empty. NaN means that the vertex's coordinates are used.
+    /// Texture coordinates of each face corner, or empty. For NaN, the vertex's coordinates are used.
     pub(crate) corner_uvs: Vec<Vec2>,
     /// Color of each face corner, or empty.
     pub(crate) corner_colors: Vec<[u8; 3]>,
@@ -104,13 +104,13 @@ pub(crate) struct ParsedMesh {
     pub(crate) pictures: Vec<PathBuf>,
 }
 
-/// Extremes of the values of a color component, each with the byte offset of its color.
+/// Extreme values of a color component, each with the byte offset of its color.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Extremes {
     least: Option<(f64, usize)>,
     greatest: Option<(f64, usize)>,
     non_finite: Option<(f64, usize)>,
-    /// First number that is not an integer.
+    /// First value that is not an integer.
     fraction: Option<(f64, usize)>,
 }
 
@@ -136,7 +136,7 @@ impl Extremes {
         self.greatest.map_or(0.0, |(greatest, _)| greatest.max(0.0))
     }
 
-    /// A value outside of 0 to `one`: the byte offset of its color, and a warning.
+    /// Returns the byte offset of a color with a value outside [0, `one`], and a warning.
     pub(super) fn outside(&self, one: f64) -> Option<(usize, String)> {
         let least = self.least.filter(|(least, _)| *least < 0.0);
         let greatest = self.greatest.filter(|(greatest, _)| *greatest > one);
@@ -144,20 +144,20 @@ impl Extremes {
         Some((at, color_clamped(value, one)))
     }
 
-    /// A value of an integer type that is not an integer: the byte offset of its color, and a warning.
+    /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
     pub(super) fn fraction(&self) -> Option<(usize, String)> {
         self.fraction.map(|(value, at)| (at, color_not_integer(value)))
     }
 }
 
-/// Warning about colors outside of their range.
+/// Warning about colors that are out of range.
 pub(super) fn color_clamped(value: f64, one: f64) -> String {
     format!("the color component {value} is outside the range from 0 to {one}; such values are clamped")
 }
 
 /// Warning about fractions in colors declared as integers.
 pub(super) fn color_not_integer(value: f64) -> String {
-    format!("the color component {value} is not an integer, as the header declares; fractions are dropped")
+    format!("the header declares integer colors, but a component is {value}; fractions are dropped")
 }
 
 /// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
@@ -165,20 +165,20 @@ pub(super) fn color_not_integer(value: f64) -> String {
 pub(crate) struct ColorRange(Extremes);
 
 impl ColorRange {
-    /// Adds a color, given its byte offset.
+    /// Adds a color and its byte offset.
     pub(crate) fn add(&mut self, parts: [f64; 3], at: usize) {
         parts.into_iter().for_each(|part| self.0.add(part, at));
     }
 
-    /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are taken
-    /// as bright colors, not bytes.
+    /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are
+    /// assumed to be bright colors rather than bytes.
     pub(crate) fn one(&self) -> f64 {
         let (max, has_fractions) = (self.0.max(), self.0.fraction.is_some());
         let are_bytes = max > 2.0 || (max > 1.0 && !has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
     }
 
-    /// A value outside of the range: the byte offset of its color, and a warning.
+    /// Returns the byte offset of a color with an out-of-range value, and a warning.
     pub(super) fn outside(&self) -> Option<(usize, String)> {
         self.0.outside(self.one())
     }

@@ -12,13 +12,13 @@ use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::read;
 use crate::math::DVec3;
 
-/// Size of a binary file's header. The number of facets follows.
+/// Size of a binary file's header, which precedes the number of facets.
 const HEADER: usize = 80;
 /// Offset of the first facet in a binary file.
 const START: usize = HEADER + 4;
 /// Size of a facet: a normal and three corners (three floats each), followed by a two-byte attribute.
 const FACET: usize = 50;
-/// Number of facets (binary) or words (text) between two polls of the cancel token.
+/// Number of facets (binary) or words (text) between polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -46,8 +46,8 @@ enum StlEncoding {
     Binary,
 }
 
-/// Detects the encoding. If the file size matches the number of facets in a binary header, the file is
-/// binary, regardless of the header's text.
+/// Detects the encoding. A file whose size matches the number of facets in a binary header is binary,
+/// regardless of the header's text.
 fn detect_encoding(bytes: &[u8]) -> StlEncoding {
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
@@ -57,7 +57,7 @@ fn detect_encoding(bytes: &[u8]) -> StlEncoding {
     if is_text && !has_binary_size(bytes) { StlEncoding::Text } else { StlEncoding::Binary }
 }
 
-/// Whether the file size matches the number of facets, assuming a binary file.
+/// Whether the file size matches the number of facets if the file is read as binary.
 fn has_binary_size(bytes: &[u8]) -> bool {
     claimed_facets(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
@@ -81,7 +81,7 @@ fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
     }
     if found == 0 {
         return Err(source.wrong(format!(
-            "the header claims 0 facets, and only {excess} bytes follow, less than a facet ({FACET} bytes)"
+            "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET} bytes)"
         )));
     }
     // Accept a count of 0. Some programs write the header before they know the number of facets.
@@ -121,7 +121,7 @@ fn excess_bytes(bytes: u64, claimed: u64) -> String {
     format!("ignored {bytes} bytes after the {claimed} facets declared in the header")
 }
 
-const VERTEX_OUTSIDE: &str = "a vertex outside of \"outer loop\" and \"endloop\"";
+const VERTEX_OUTSIDE: &str = "a vertex is not between \"outer loop\" and \"endloop\"";
 const ENDS_IN_FACET: &str = "the file ends inside a facet";
 const KEYWORD: &str = "an STL keyword";
 
@@ -139,12 +139,12 @@ fn add(parsed: &mut ParsedMesh, position: DVec3) {
 struct TextReader<'a> {
     source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Index of each face with more than 3 corners, and the byte offset of its loop.
+    /// Indices of faces with more than 3 corners, each with the byte offset of its loop.
     polygons: Vec<(usize, usize)>,
 }
 
 impl TextReader<'_> {
-    /// Byte offset of a face's loop, for faces with more than 3 corners.
+    /// Returns the byte offset of a face's loop. `None` for faces with 3 corners.
     fn start_of(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }
@@ -219,8 +219,8 @@ impl TextReader<'_> {
         }
     }
 
-    /// Skips a name with any number of words. The name ends at the end of the line, or at a facet on the same
-    /// line.
+    /// Skips a solid's name, which may have any number of words. It ends at the end of the line, or at a
+    /// facet on the same line.
     fn skip_name(&mut self) {
         let bytes = self.source.bytes;
         let is_blank = |byte: &u8| byte.is_ascii_whitespace();
@@ -272,7 +272,7 @@ mod tests {
         rejection(read(bytes))
     }
 
-    /// Corners of a tetrahedron's facets. All facets face outward.
+    /// Corners of the outward-facing facets of a tetrahedron.
     const TETRAHEDRON: [[[f32; 3]; 3]; 4] = {
         let [o, x, y, z] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         [[o, y, x], [o, x, z], [o, z, y], [x, y, z]]
@@ -302,7 +302,7 @@ mod tests {
         text + "endsolid of any name\n"
     }
 
-    /// Positions of each triangle's corners.
+    /// Returns the positions of each triangle's corners.
     fn places(loaded: &LoadedMesh) -> Vec<[Vec3; 3]> {
         let mesh = &loaded.mesh;
         (0..mesh.triangles.len() as u32)

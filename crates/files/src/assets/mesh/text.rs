@@ -1,4 +1,5 @@
-//! Tokenizer for text files of numbers. Works on bytes, and neither requires UTF-8 nor copies the text.
+//! Tokenizer for text files that consist mostly of numbers. Works on bytes: it does not require UTF-8 or copy
+//! the text.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -11,7 +12,7 @@ use crate::assets::AssetError;
 use crate::assets::read;
 use crate::control::{CancelToken, Cancelled};
 
-/// Replaces carriage returns with line feeds if there are no line feeds (classic Mac OS).
+/// Replaces carriage returns with line feeds in files without line feeds (classic Mac OS).
 pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
         return Cow::Borrowed(bytes);
@@ -33,7 +34,7 @@ pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// Lines of a text file, read one at a time. A file that can no longer be read ends early.
+/// Lines of a text file, read one at a time. If reading fails, the lines end early.
 pub(super) struct Lines {
     reader: BufReader<File>,
     /// Last byte of each line: a line feed, or a carriage return in classic Mac OS files.
@@ -47,7 +48,7 @@ impl Lines {
     /// Maximum length of a line. Longer lines are split.
     const MAX_LENGTH: usize = 1 << 20;
 
-    /// Opens a file of at most `limit` bytes and skips the byte order mark.
+    /// Opens a file with at most `limit` bytes, and skips the byte order mark.
     pub(super) fn open(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let (file, _) = read::open(path, limit)?;
         let mut reader = BufReader::with_capacity(Self::BUFFER, file);
@@ -59,13 +60,14 @@ impl Lines {
         Ok(Self { reader, end, line: Vec::new() })
     }
 
-    /// Reads the next line, including its end.
+    /// Reads the next line, including its line end.
     pub(super) fn next(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Cancelled> {
         self.line.clear();
         Ok(self.append(token)?.then_some(&self.line))
     }
 
-    /// Skips buffered lines that do not contain `letter` in either case. This is much faster than reading them.
+    /// Skips buffered lines that do not contain `letter` in upper or lower case. This is much faster than
+    /// reading them.
     pub(super) fn skip_lines_without(&mut self, letter: u8) {
         let Ok(buffer) = self.reader.fill_buf() else { return };
         let (lower, upper) = (letter.to_ascii_lowercase(), letter.to_ascii_uppercase());
@@ -74,7 +76,7 @@ impl Lines {
         self.reader.consume(skipped);
     }
 
-    /// Appends the following lines while the current one ends with a backslash, and returns all of them.
+    /// Appends the next line as long as the current one ends with a backslash. Returns the joined lines.
     pub(super) fn join_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
         let is_continued = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
         while is_continued(&self.line) && self.line.len() < Self::MAX_LENGTH && self.append(token)? {}
@@ -170,7 +172,7 @@ impl<'a> Cursor<'a> {
         whole.then_some(if negative { -value } else { value })
     }
 
-    /// Moves past a number of `length` bytes if a word ends there.
+    /// Moves past a number that is `length` bytes long, if a word ends there.
     fn skip_number(&mut self, length: usize) -> bool {
         let ends =
             self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
@@ -179,7 +181,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Formats the first 20 bytes of a word for a message, with control characters escaped.
+/// Formats the first 20 bytes of a word for a message. Control characters are escaped.
 pub(super) fn shown(bytes: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(20)]))
 }

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use crate::math::{DMat3, DVec3};
 
-/// Linear Rec. 709 to XYZ: columns for red, green and blue.
+/// Matrix from linear Rec. 709 to XYZ. Its columns are red, green and blue.
 const XYZ_OF_RGB: DMat3 = DMat3::from_cols(
     DVec3::new(10_135_552.0 / 24_577_794.0, 2_613_072.0 / 12_288_897.0, 1_425_312.0 / 73_733_382.0),
     DVec3::new(8_788_810.0 / 24_577_794.0, 8_788_810.0 / 12_288_897.0, 8_788_810.0 / 73_733_382.0),
@@ -32,7 +32,7 @@ pub(super) struct OpponentColor {
 }
 
 impl OpponentColor {
-    /// Converts a linear color.
+    /// Converts from a linear color.
     pub(super) fn from_linear(rgb: DVec3) -> Self {
         let xyz = XYZ_OF_RGB * rgb / WHITE;
         Self { y: 116.0 * xyz.y - 16.0, cx: 500.0 * (xyz.x - xyz.y), cz: 200.0 * (xyz.y - xyz.z) }
@@ -55,7 +55,7 @@ pub(super) struct PerceivedColor {
 }
 
 impl PerceivedColor {
-    /// Converts a linear color.
+    /// Converts from a linear color.
     pub(super) fn from_linear(rgb: DVec3) -> Self {
         let [x, y, z] = (XYZ_OF_RGB * rgb / WHITE).to_array().map(lightness);
         let hunt = 0.01 * (116.0 * y - 16.0);
@@ -75,7 +75,7 @@ fn lightness(t: f64) -> f64 {
     if t > DELTA * DELTA * DELTA { libm::cbrt(t) } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
 }
 
-/// Distance between green and blue, the two display colors that are furthest apart.
+/// Distance between green and blue, the two display colors that are farthest apart.
 pub(super) fn max_display_color_distance() -> f64 {
     PerceivedColor::from_linear(DVec3::Y).distance(&PerceivedColor::from_linear(DVec3::Z))
 }

@@ -12,8 +12,8 @@ struct SensitivityTerm {
     b: f64,
 }
 
-/// Contrast sensitivity of the achromatic, red–green and blue–yellow channels (table 1 of the paper, without
-/// second terms of 0).
+/// Contrast sensitivity of the achromatic, red–green and blue–yellow channels (table 1 in the paper, omitting
+/// second terms that are 0).
 const SENSITIVITY: [&[SensitivityTerm]; 3] = [
     &[SensitivityTerm { a: 1.0, b: 0.0047 }],
     &[SensitivityTerm { a: 1.0, b: 0.0053 }],
@@ -21,7 +21,7 @@ const SENSITIVITY: [&[SensitivityTerm]; 3] = [
 ];
 /// Width of the widest Gaussian in square degrees.
 const WIDEST: f64 = 0.04;
-/// Size in degrees of the features that the eye detects best.
+/// Size of the features that the eye detects best, in degrees.
 const FEATURE_DEGREES: f64 = 0.082;
 /// Filter radius in standard deviations.
 const REACH: f64 = 3.0;
@@ -32,7 +32,7 @@ struct WeightedBlur {
     taps: Vec<f64>,
 }
 
-/// All filters for a given number of pixels per degree, padded to the same length.
+/// All filters for a specific number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
     blurs: [Vec<WeightedBlur>; 3],
@@ -103,7 +103,7 @@ impl Filters {
     }
 }
 
-/// Gaussians of a channel. Their weights are chosen so that all 2D taps sum to 1.
+/// Creates the Gaussian blurs for a channel. Their weights are chosen so that all 2D taps sum to 1.
 fn blurs(terms: &[SensitivityTerm], radius: usize, pixels_per_degree: f64) -> Vec<WeightedBlur> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
@@ -132,7 +132,7 @@ pub(super) struct Features {
 }
 
 impl Features {
-    /// Feature difference of each pixel, in [0, 1].
+    /// Returns each pixel's feature difference, in [0, 1].
     pub(super) fn differences<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = f64> + 'a {
         let between = |a: &'a [f64], b: &'a [f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs());
         let edges = between(&self.edges, &other.edges);

@@ -1,5 +1,5 @@
 //! FLIP (P. Andersson et al., *FLIP: A Difference Evaluator for Alternating Images*, 2020) for low dynamic
-//! range images, at [`PIXELS_PER_DEGREE`]. Images are extended by repeating their border pixels.
+//! range images, viewed at [`PIXELS_PER_DEGREE`]. Images are extended by repeating their border pixels.
 
 mod color;
 mod filters;
@@ -13,7 +13,8 @@ use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
-/// Pixels per degree of the visual field, for a display that is 3840 pixels and 0.7 m wide, viewed from 0.7 m.
+/// Pixels per degree of the visual field. The display is 0.7 m wide, has 3840 columns, and is viewed from 0.7
+/// m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
 /// Exponent applied to color differences.
@@ -48,7 +49,7 @@ fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32>
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
 
-/// Perceived colors and features of one image in a tile.
+/// Computes the perceived colors and the features of one image within a tile.
 fn tile_features(
     pair: &Pair,
     which: usize,

@@ -65,7 +65,7 @@ impl Dither {
     fn nearest(&self, aim: [i32; 3]) -> usize {
         let distance = |color: &[i32; 3]| {
             let squared = |channel: usize| (color[channel] - aim[channel]).pow(2);
-            // Approximate sensitivity of the eye.
+            // Approximate the eye's sensitivity to each channel.
             2 * squared(0) + 4 * squared(1) + squared(2)
         };
         let nearest = self.palette.iter().enumerate().min_by_key(|(_, color)| distance(color));

@@ -12,7 +12,7 @@ use crate::film::Picture;
 
 /// Size of the palette.
 const COLORS: usize = 256;
-/// Approximate number of pixels used for computing the palette.
+/// Approximate number of pixels used to compute the palette.
 const SAMPLES: usize = 1 << 20;
 /// Quantizer setting: 1 uses every sample.
 const EVERY_SAMPLE: i32 = 1;
@@ -24,10 +24,10 @@ pub(super) fn encode(
 ) -> Result<Vec<u8>, EncodingError> {
     let cancelled = |cancelled| EncodingError::from(std::io::Error::other(cancelled));
     let (width, height) = frames.first().map_or((0, 0), |first| (first.width as u16, first.height as u16));
-    // Choose the palette from pixels of all frames.
+    // Choose the palette from pixels in all frames.
     let palette = palette(frames);
     token.check().map_err(cancelled)?;
-    // Write the header: palette, infinite loop, metadata as comments.
+    // Write the header: the palette, an infinite loop, and the metadata as comments.
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette)?;
     encoder.set_repeat(Repeat::Infinite)?;
     let comment = AnyExtension::from(Extension::Comment);
@@ -77,7 +77,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     NeuQuant::new(EVERY_SAMPLE, COLORS, samples.as_flattened()).color_map_rgb()
 }
 
-/// Distinct colors of a frame, at most one more than the palette size.
+/// Returns a frame's distinct colors. Stops when there is one more than the palette can hold.
 fn distinct_colors(pixels: &[[u8; 3]]) -> Vec<[u8; 4]> {
     let mut colors = std::collections::BTreeSet::new();
     for &[red, green, blue] in pixels {

@@ -43,7 +43,7 @@ pub fn encode(
     bytes.map_err(|why| failed(format!("could not be encoded: {why}")))
 }
 
-/// Duration of a frame, in units of 1/`per_second` seconds.
+/// Returns the duration of a frame in units of 1/`per_second` seconds.
 fn frame_time(frames: usize, per_second: f64) -> f64 {
     (TURN_SECONDS / frames as f64).max(SHORTEST_FRAME) * per_second
 }

@@ -42,13 +42,13 @@ fn apng_frames_are_lossless() {
     assert!(bytes == self::bytes(AnimationFormat::Apng));
 }
 
-/// Decodes the frames of a GIF to three bytes per pixel.
+/// Decodes GIF frames to three bytes per pixel.
 fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut options = ::gif::DecodeOptions::new();
     options.set_color_output(::gif::ColorOutput::Indexed);
     let mut decoder = options.read_info(bytes).expect("GIF");
     assert_eq!(decoder.repeat(), ::gif::Repeat::Infinite);
-    let palette = decoder.global_palette().expect("a palette for all frames").to_vec();
+    let palette = decoder.global_palette().expect("a global palette").to_vec();
     let mut frames = Vec::new();
     while let Some(frame) = decoder.read_next_frame().expect("a frame") {
         assert!(frame.palette.is_none() && frame.delay == 50);
@@ -58,11 +58,11 @@ fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Averages of 4 × 4 pixels must be close to the frame, and much closer than without dithering, which causes
-/// banding.
+/// Averages over 4 × 4 pixels must be close to the frame. They must be much closer than without dithering,
+/// where gradients show banding.
 #[test]
 fn gif_dithering_preserves_gradients_on_average() {
-    // Slow gradients in many colors, so that the palette colors are far apart.
+    // Use slow gradients in many colors, so that the palette colors are far apart.
     let smooth = |number: u32| {
         let pixel = |i: u32| {
             let (x, y, k) = (i % 96, i / 96, number % 8);

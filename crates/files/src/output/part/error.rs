@@ -8,7 +8,7 @@ use nix::errno::Errno;
 use crate::system::describe_error;
 use crate::system::file::FileKind;
 
-/// Index of a part, and the number of parts.
+/// Part index and part count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartIndex {
     /// Index of the part, starting at 1.
@@ -53,7 +53,7 @@ pub enum PartError {
         known: u32,
     },
     /// The file is truncated: it is still being copied, or copying was interrupted.
-    #[error("{}: it is damaged: truncated at byte {bytes}; copy or render it again", path.display())]
+    #[error("{}: it is damaged (truncated at byte {bytes}); copy or render it again", path.display())]
     Unfinished {
         /// The file.
         path: PathBuf,
@@ -61,7 +61,7 @@ pub enum PartError {
         bytes: u64,
     },
     /// A checksum is wrong or the file is malformed.
-    #[error("{}: it is damaged: {why}; copy or render it again", path.display())]
+    #[error("{}: it is damaged ({why}); copy or render it again", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -89,7 +89,7 @@ pub enum PartError {
         differences: Vec<String>,
     },
     /// Two files contain the same part.
-    #[error("{} and {}: part {index}/{count} is given twice", first.display(), second.display())]
+    #[error("{} and {} both contain part {index}/{count}", first.display(), second.display())]
     Doubled {
         /// The first file.
         first: PathBuf,

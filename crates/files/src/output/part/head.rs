@@ -1,5 +1,5 @@
-//! Header of a part: properties of the image, the share of the image that the file contains, and the encoding
-//! settings.
+//! Header of a part file: the image's properties, the share of the image that the file contains, and the
+//! encoding settings.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -22,12 +22,12 @@ pub struct Head {
     pub share: PartShare,
     /// Properties of the image.
     pub picture: ImageHeader,
-    /// Path of the scene, relative to the part. It may differ between the parts of an image. Empty if
+    /// Scene path, relative to the part. It may differ between parts of the same image. Empty if
     /// unknown.
     #[serde(default)]
     pub scene: String,
-    /// Files that the scene references, used or not, relative to the scene's folder, or only their names if
-    /// they are outside that folder. They do not affect the image.
+    /// Files that the scene references, including unused ones. Paths are relative to the scene's folder.
+    /// Files outside that folder are listed by name only. This list does not affect the image.
     #[serde(default)]
     pub references: Vec<String>,
 }
@@ -38,12 +38,12 @@ pub struct Head {
 pub enum PartKind {
     /// A finished part of an image.
     Part,
-    /// The current state of a render, for resuming it.
+    /// The saved state of a render that can be resumed.
     Checkpoint,
 }
 
 impl PartKind {
-    /// Name of the type.
+    /// Returns the name of the type.
     pub fn name(self) -> &'static str {
         match self {
             Self::Part => "part",
@@ -79,14 +79,14 @@ impl Head {
             && picture.tone.exposure.is_finite()
     }
 
-    /// Returns the name of the image's input file with this hash (hexadecimal). `None` if there is no such file.
+    /// Returns the name of the input file with this hexadecimal hash. `None` if no input file has this hash.
     pub(super) fn input_with_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
-    /// Finds an input file or another file that the scene references, existing or not, whose name matches the
-    /// end of this path. Returns the name, relative to the scene's folder.
+    /// Searches the input files, then the scene's other references, for a name that matches the end of
+    /// `path`. The file need not exist. Returns the name, relative to the scene's folder.
     pub(super) fn input_matching_path(&self, path: &Path) -> Option<&str> {
         let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         let references = self.references.iter().map(String::as_str);
@@ -94,7 +94,7 @@ impl Head {
     }
 }
 
-/// Whether a path ends with a name, apart from the name's components up to the last `..`.
+/// Whether a path ends with a name. Ignores the name's components up to the last `..`.
 fn is_end_of_path(name: &str, path: &Path) -> bool {
     let mut end = PathBuf::new();
     for component in Path::new(name).components() {
@@ -116,11 +116,11 @@ pub struct PartShare {
     pub count: u32,
     /// Number of sample blocks in the image. 0 if parts contain complete tiles.
     pub block_count: u32,
-    /// Indices of the sample blocks in each tile of this part, in ascending order.
+    /// Indices of the sample blocks that this part contains in each tile, in ascending order.
     pub blocks: Vec<u32>,
 }
 
-/// Properties of the image to which a part belongs.
+/// Properties of the image that a part belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageHeader {
     /// Width of the full image.
@@ -129,13 +129,13 @@ pub struct ImageHeader {
     pub height: u32,
     /// Rendered region: left, top, width and height.
     pub crop: [u32; 4],
-    /// Whether the noise converges as in photon mapping.
+    /// Whether the noise converges as it does in photon mapping.
     pub is_by_photons: bool,
     /// Displayed quantity: `radiance`, `samples` or `error`.
     pub quantity: String,
     /// Tone mapping.
     pub tone: ToneHeader,
-    /// Bits per channel of PNG and PPM files, 8 or 16.
+    /// Bits per channel in PNG and PPM files, 8 or 16.
     pub bit_depth: u8,
     /// Metadata names and values for the image file.
     pub metadata: Vec<(String, String)>,
@@ -164,7 +164,7 @@ const QUANTITIES: [(Quantity, &str); 3] =
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
 impl ImageHeader {
-    /// Describes the image of a film with these settings.
+    /// Describes the image that these settings produce from a film.
     pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;
@@ -196,7 +196,7 @@ impl ImageHeader {
         }
     }
 
-    /// Settings for encoding the image file. `None` if a name is unknown.
+    /// Returns the settings for encoding the image file. `None` if a name is unknown.
     pub fn finish(&self) -> Option<DevelopSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
@@ -262,10 +262,10 @@ pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &st
         .collect()
 }
 
-/// Name of the input for the program's version and build.
+/// Name of the input that identifies the program's version and build.
 const PROGRAM: &str = "glimt";
 
-/// Name of the input for the hash of all inputs.
+/// Name of the input that contains the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
 fn is_content(name: &str) -> bool {
@@ -276,7 +276,7 @@ fn name_of(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
-/// Prefix of the names of file inputs.
+/// Name prefix for file inputs.
 const FILE: &str = "file ";
 
 impl Dependency {
@@ -285,12 +285,12 @@ impl Dependency {
         Self { name: name.to_owned(), value: value.into() }
     }
 
-    /// Creates an input for a file, with the hash of its content.
+    /// Creates an input for a file from its name and content hash.
     pub fn file(name: &str, content: impl Into<String>) -> Self {
         Self { name: format!("{FILE}{name}"), value: content.into() }
     }
 
-    /// Creates an input for the hash of everything the image depends on.
+    /// Creates the input that contains the hash of everything the image depends on.
     pub fn everything(key: impl Into<String>) -> Self {
         Self { name: EVERYTHING.to_owned(), value: key.into() }
     }

@@ -21,8 +21,8 @@ pub struct MergedParts {
 /// Checks that parts belong to the same image. Returns the indices of missing parts.
 ///
 /// # Errors
-/// A file is not a part, belongs to another image, or is given twice. The error names the first file with a
-/// problem.
+/// A file is not a part, belongs to another image, or contains the same part as another file. The error names
+/// the first file with a problem.
 pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
@@ -60,7 +60,7 @@ fn head_differences(a: &Head, b: &Head) -> Vec<String> {
     found
 }
 
-/// Describes the differences between the metadata of two images.
+/// Describes the differences between two images' metadata.
 fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<String> {
     let value = |all: &[(String, String)], name: &str| all.iter().find(|(known, _)| known == name).cloned();
     let names = a.iter().chain(b.iter().filter(|(name, _)| value(a, name).is_none()));
@@ -114,7 +114,7 @@ pub fn merge(
     Ok(MergedParts { film, missing, count })
 }
 
-/// Returns a tile contained in a single part, and whether it has all samples.
+/// Returns a tile that only one part contains, and whether the tile has all of its samples.
 fn whole_tile(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(StoredTile, bool)>, PartError> {
     let mut found: Option<(StoredTile, &PartFile)> = None;
     for part in parts {

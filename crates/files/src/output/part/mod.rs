@@ -1,4 +1,4 @@
-//! Part files and checkpoints. Each file contains a film and a description of everything the image depends on.
+//! Part files and checkpoints. Each file contains a film and describes everything the image depends on.
 //!
 //! | bytes | |
 //! | --- | --- |
@@ -25,8 +25,8 @@ pub use merge::{MergedParts, check, merge};
 pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
-/// Magic number. As in PNG, text conversion of the file corrupts the number, which makes the conversion
-/// detectable.
+/// Magic number. As in PNG, a program that converts the file as if it were text corrupts the number, so the
+/// conversion is detected.
 const MARK: [u8; 12] = crate::system::file::PART_MAGIC;
 
 /// Version of the part file format.
@@ -38,7 +38,7 @@ const FOOTER: u32 = u32::MAX;
 /// Digest of a record or the header.
 type Digest = [u8; 16];
 
-/// Digest of bytes in a file, given the header's digest.
+/// Computes the digest of bytes in a file, given the header's digest.
 fn digest(header_digest: &Digest, parts: &[&[u8]]) -> Digest {
     let mut hasher = blake3::Hasher::new();
     hasher.update(header_digest);
@@ -50,7 +50,7 @@ fn digest(header_digest: &Digest, parts: &[&[u8]]) -> Digest {
     digest
 }
 
-/// Footer of a part file.
+/// Part file footer.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Footer {
     /// Number of tiles.

@@ -39,9 +39,9 @@ pub fn is_part(path: &Path) -> bool {
     open(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
 }
 
-/// Finds an input file of these images with the same content as the file at `path`, and returns its name.
-/// Input files must not be overwritten, even if the parts were rendered on another machine. `None` if there
-/// is no such input or the file cannot be read.
+/// Finds an input file that has the same content as the file at `path`, and returns its name. Input files
+/// must not be overwritten, even if the parts were rendered on another machine. `None` if there is no such
+/// input or the file cannot be read.
 pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open(path).ok()?).ok()?;
@@ -49,8 +49,8 @@ pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a 
     parts.iter().find_map(|part| part.head.input_with_hash(&hash))
 }
 
-/// Finds an input file of these images whose name matches the end of `path`, and returns the name. Unlike
-/// a comparison of contents, this also finds files that were missing or have changed since.
+/// Finds an input file whose name matches the end of `path`, and returns the name. Unlike a comparison of
+/// contents, this also finds files that were missing or have changed since.
 pub fn input_with_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
@@ -127,7 +127,7 @@ impl PartFile {
         self.tiles.iter().map(|(number, ..)| *number as usize)
     }
 
-    /// Reads a tile of `area` pixels. `None` if the file does not contain it.
+    /// Reads a tile with `area` pixels. Returns `None` if the file does not contain the tile.
     ///
     /// # Errors
     /// The file has changed since it was opened.
@@ -149,7 +149,7 @@ impl PartFile {
         read.map(Some).map_err(|_| damaged(&format!("tile {number} does not belong to this image")))
     }
 
-    /// Adds all tiles to a film of the same image.
+    /// Adds all tiles to a film for the same image.
     ///
     /// # Errors
     /// The tiles do not belong to the film.
@@ -167,7 +167,8 @@ impl PartFile {
     }
 }
 
-/// Opens a regular file. If the process's limit on open files is reached, raises it.
+/// Opens a regular file. If the process has reached its limit on open files, raises the limit and tries
+/// again.
 fn open(path: &Path) -> Result<File, PartError> {
     let opened = match file::open(path) {
         Err(error) if error.raw_os_error() == Some(nix::errno::Errno::EMFILE as i32) => {
@@ -185,7 +186,7 @@ fn raise_file_limit() -> io::Result<()> {
     Ok(setrlimit(Resource::RLIMIT_NOFILE, limit, limit)?)
 }
 
-/// Sequential reader of a part file.
+/// Sequential reader for a part file.
 struct PartReader<'a> {
     path: &'a Path,
     file: BufReader<&'a File>,

@@ -133,7 +133,7 @@ fn mismatched_parts_are_rejected() {
         matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
         "{checkpoint}"
     );
-    // A part with index 3 that contains the tiles of part 2.
+    // A part with index 3 that contains the tiles from part 2.
     let stolen = put(folder.path(), "3.part", &head(3, 3, &film), &film);
     let stolen = error(&[paths[0].clone(), paths[1].clone(), stolen]);
     assert!(matches!(stolen, PartError::Damaged { .. }), "{stolen}");
@@ -226,7 +226,7 @@ fn metadata_differences_are_listed() {
 }
 
 #[test]
-fn parts_of_different_builds_do_not_match() {
+fn parts_from_different_builds_do_not_match() {
     let inputs = |build: &str| vec![Dependency::setting("glimt", build), Dependency::setting("width", "4")];
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
     assert_eq!(differences(&a, &a, ("here", "there")), [""; 0]);

@@ -1,4 +1,4 @@
-//! Reads the comments of a GIF and counts its frames. Existing decoders skip comments.
+//! Reads a GIF's comments and counts its frames. Existing decoders skip comments.
 
 use std::io::Read;
 
@@ -8,13 +8,13 @@ use super::ImageInfo;
 const EXTENSION: u8 = 0x21;
 const FRAME: u8 = 0x2c;
 const END: u8 = 0x3b;
-/// Label of a comment extension.
+/// Label that marks a comment extension.
 const COMMENT: u8 = 0xfe;
 /// Flag for a global or local palette.
 const HAS_PALETTE: u8 = 0x80;
 
-/// Reads a GIF from the start. Returns no frame count if the file is truncated, and `None` if it has no
-/// frames.
+/// Reads a GIF from the start. The frame count is missing if the file is truncated. Returns `None` if the
+/// file has no frames.
 pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = next(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));

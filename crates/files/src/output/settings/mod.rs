@@ -15,27 +15,27 @@ use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
 use crate::system::file::{self, PART_MAGIC};
 
-/// Number of bytes at the start of a file to search for settings.
+/// Number of bytes to search for settings at the start of a file.
 const START_BYTES: u64 = 4 << 20;
 /// Maximum number of settings.
 const LIMIT: usize = 200;
-/// Prefix of the names of glimt's own settings.
+/// Name prefix for glimt's own settings.
 const PREFIX: &str = "glimt:";
 
-/// Properties of an image file from its header.
+/// Properties of an image file, read from its header.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImageInfo {
     /// Description of the format: "PNG", "part 2 of 8".
     pub format: String,
     /// Width and height. `None` if the header does not contain them.
     pub size: Option<(u32, u32)>,
-    /// Number of frames of an animation.
+    /// Number of frames in an animation.
     pub frames: Option<u32>,
-    /// Program and version that wrote the file.
+    /// Name and version of the program that wrote the file.
     pub program: Option<String>,
     /// Names and values of the settings, in file order.
     pub settings: Vec<(String, String)>,
-    /// Channel names of an EXR file.
+    /// Channel names in an EXR file.
     pub channels: Vec<String>,
 }
 
@@ -209,7 +209,7 @@ fn read_part(path: &Path) -> Result<ImageInfo, String> {
             name => info.add(name, &input.value),
         }
     }
-    // If the version is missing, use this version, because files from other versions are rejected.
+    // If the version is missing, assume this version, because files from other versions are rejected.
     info.program.get_or_insert_with(|| SOFTWARE.to_owned());
     Ok(info)
 }

@@ -46,7 +46,7 @@ pub(super) fn read_ppm(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-/// Reads the segments of a JPEG before the pixels.
+/// Reads the segments that precede the pixels in a JPEG.
 pub(super) fn read_jpeg(bytes: &[u8]) -> Option<ImageInfo> {
     const COMMENT: u8 = 0xfe;
     let mut info = ImageInfo { format: "JPEG".to_owned(), ..ImageInfo::default() };

@@ -1,4 +1,4 @@
-//! Reads settings from the chunks of a WebP file (RFC 9649, 2.3).
+//! Reads settings from the chunks in a WebP file (RFC 9649, 2.3).
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -7,7 +7,7 @@ use super::ImageInfo;
 /// Maximum size of an XMP packet.
 const MAX_XMP: u32 = 1 << 20;
 
-/// Reads the chunks of a WebP file. `None` if the size is missing.
+/// Reads the chunks in a WebP file. Returns `None` if the size is missing.
 pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "WebP".to_owned(), ..ImageInfo::default() };
     file.seek(SeekFrom::Start(12)).ok()?;
@@ -34,19 +34,19 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
     info.size.map(|_| info)
 }
 
-/// Canvas width or height in an extended file, stored as 24 bits, minus one.
+/// Reads the canvas width or height in an extended file, stored as 24 bits, minus one.
 fn canvas_side(content: &[u8], at: usize) -> Option<u32> {
     let [a, b, c] = *content.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes([a, b, c, 0]) + 1)
 }
 
-/// Size of a lossless image. Width and height are stored as 14 bits each, minus one.
+/// Reads the size of a lossless image. Width and height are stored as 14 bits each, minus one.
 fn lossless_size(content: &[u8]) -> Option<(u32, u32)> {
     let bits = u32::from_le_bytes(*content.get(1..)?.first_chunk()?);
     Some(((bits & 0x3fff) + 1, (bits >> 14 & 0x3fff) + 1))
 }
 
-/// Adds the program and the description lines of an XMP packet.
+/// Adds the program and the description lines from an XMP packet.
 fn add_xmp_packet(info: &mut ImageInfo, packet: &str) {
     let between = |start: &str, end: &str| {
         let (_, rest) = packet.split_once(start)?;

@@ -10,16 +10,17 @@ use crate::math::Vec3;
 
 const BINS: usize = 16;
 
-/// Primitive count above which a node's halves are built in parallel and the token is polled.
+/// Primitive count above which a node's halves are built in parallel and the cancellation token is polled.
 const PARALLEL_SIZE: usize = 4096;
 
 /// Cost of a traversal step relative to a primitive test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Minimum number of primitives for which splitting by size and shells are worthwhile.
+/// Minimum number of primitives for which shells and splits by size are worthwhile.
 const NESTED_SIZE: usize = 64;
 
-/// The boxes are tested for nesting only if the best plane costs at least this fraction of not splitting.
+/// Boxes are tested for nesting only if the best split costs at least this fraction of the cost without a
+/// split.
 const NESTED_COST: f32 = 0.9;
 
 /// Nested boxes are split by size if that costs less than this fraction of the best plane's cost.
@@ -45,7 +46,7 @@ struct BuiltSubtree {
     bounds: Aabb,
     /// Number of node levels.
     depth: usize,
-    /// Whether many boxes are nested.
+    /// Whether many boxes contain other boxes.
     is_nested: bool,
 }
 
@@ -103,7 +104,7 @@ struct OutputPosition {
     depth: usize,
 }
 
-/// Builds a subtree over `references`. It has fewer nodes than references.
+/// Builds a subtree over `references`. The subtree has fewer nodes than references.
 fn build_subtree(
     references: &mut [PrimitiveReference],
     nodes: &mut [BinaryNode],
@@ -191,8 +192,8 @@ fn smaller_half(references: &mut [PrimitiveReference]) -> usize {
     middle
 }
 
-/// Whether splitting by size is much cheaper than splitting at the best plane. If boxes are nested, any plane
-/// leaves boxes of nearly full size on both sides.
+/// Whether splitting by size is much cheaper than splitting at the best plane. If boxes are nested, every
+/// plane leaves nearly full-size boxes on both sides.
 fn is_nested(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
     let count = references.len() as f32;
     if split.cost < NESTED_COST * bounds.half_area() * count {
@@ -209,9 +210,9 @@ struct Split {
     axis: usize,
     start: f32,
     bins_per_length: f32,
-    /// Bins below this one are on the left.
+    /// The first bin on the right side of the plane.
     bin: usize,
-    /// Sum over both sides of primitive count times surface area.
+    /// Primitive count times surface area, summed over both sides.
     cost: f32,
 }
 
@@ -276,7 +277,7 @@ fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize,
     best
 }
 
-/// Moves the references that satisfy `is_left` to the front and returns their number.
+/// Moves the references that satisfy `is_left` to the front and returns how many there are.
 fn partition_by(
     references: &mut [PrimitiveReference],
     is_left: impl Fn(&PrimitiveReference) -> bool,
@@ -326,8 +327,8 @@ mod tests {
         let grid: Vec<_> =
             (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
         built(&grid);
-        // The distance doubles with every second box, so the surface area heuristic splits the boxes off a
-        // few at a time.
+        // The distance doubles at every other box, so the surface area heuristic splits off only a few boxes
+        // at a time.
         let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
         built(&geometric);
     }

@@ -19,11 +19,12 @@ const LEAF_SIZE: usize = 4;
 /// the depth for any input.
 const SURFACE_AREA_LEVELS: usize = 56;
 
-/// Stack size for the deepest possible tree: [`SURFACE_AREA_LEVELS`] followed by repeated halving of 2³²
+/// Stack size for the deepest possible tree: [`SURFACE_AREA_LEVELS`] levels, then median splits of up to 2³²
 /// primitives.
 const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
 
-/// Stack size for small trees, where initializing a deep stack would take longer than the traversal itself.
+/// Stack size for small trees. For these, initializing a deep stack would take longer than the traversal
+/// itself.
 const SHALLOW_STACK: usize = 12;
 
 /// A binary BVH over boxes identified by index.
@@ -38,13 +39,13 @@ pub struct Bvh {
     depth: usize,
     /// The upper levels of the tree, flattened for packet traversal.
     top: TopNode,
-    /// Whether many boxes are nested.
+    /// Whether many boxes contain other boxes.
     is_nested: bool,
     /// The shells of each node's children. `None` if few boxes are nested.
     shells: Option<Box<[[Shell; 2]]>>,
 }
 
-/// Two children with their boxes, in one cache line.
+/// Two children and their boxes, which fit into one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct BinaryNode {

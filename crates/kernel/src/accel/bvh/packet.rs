@@ -72,8 +72,8 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl SlabIntervals {
-    /// Smallest entry distance among the rays that hit the box. Compares bit patterns, which order
-    /// nonnegative floats correctly and ignore NaN.
+    /// Smallest entry distance among the rays that hit the box. Compares bit patterns, because this orders
+    /// nonnegative floats correctly and ignores NaN.
     #[inline(always)]
     fn nearest_entry(&self) -> f32 {
         let mut entries = [0; PACKET_SIZE];
@@ -95,7 +95,7 @@ fn hit_mask(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     simd.movemask(&met)
 }
 
-/// Largest end among all rays; negative if no ray is traced. Compares bits as in
+/// The largest ray end, or a negative number if no ray is traced. Compares bits as in
 /// [`SlabIntervals::nearest_entry`].
 #[inline(always)]
 fn largest_end(ends: &F32x16) -> f32 {
@@ -106,7 +106,7 @@ fn largest_end(ends: &F32x16) -> f32 {
     f32::from_bits(reduce!(all, >) as u32)
 }
 
-/// Traversal stack: lower bound on the entry distance, mask of the rays that may hit the child, and the
+/// Traversal stack: a lower bound on the entry distance, the mask of the rays that may hit the child, and the
 /// child.
 type PacketStack = ArrayVec<(f32, u32, ChildRef), DEEP_STACK>;
 

@@ -12,14 +12,14 @@ use crate::math::DVec3;
 /// Relative error bound for distances and hits, with a generous margin.
 const ROUNDING: f64 = 1e-6;
 
-/// Squared distance, relative to the squared outer radius, beyond which rounding errors make shells useless.
+/// Ratio of squared distance to squared outer radius beyond which rounding errors make shells useless.
 const FAR: f64 = 1e12;
 
 /// A region between two concentric spheres that contains the surfaces of some primitives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {
     center: DVec3,
-    /// Radius of a ball enclosed by every primitive; negative if there is none.
+    /// Radius of a ball that every primitive encloses. Negative if there is no such ball.
     inner: f64,
     outer: f64,
 }
@@ -37,19 +37,19 @@ impl Shell {
     /// The shell of an empty set.
     const EMPTY: Self = Self { center: DVec3::ZERO, inner: f64::INFINITY, outer: f64::NEG_INFINITY };
 
-    /// The shell of a full sphere.
+    /// The shell of a single sphere.
     pub fn sphere(center: DVec3, radius: f64) -> Self {
         Self { center, inner: radius, outer: radius }
     }
 
-    /// A shell around the bounding box of an arbitrary primitive. It has no inner ball.
+    /// The shell around the bounding box of an arbitrary primitive. It has no inner ball.
     pub fn around(bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let center = (min + max) * 0.5;
         Self { center, inner: f64::NEG_INFINITY, outer: (max - center).length() }
     }
 
-    /// A shell around two shells. It is centered on the shell with the smaller inner ball.
+    /// The shell around two shells. It is centered on the shell with the smaller inner ball.
     fn union(self, other: Self) -> Self {
         let (a, b) = if self.inner <= other.inner { (self, other) } else { (other, self) };
         let apart = a.center.distance(b.center);
@@ -65,7 +65,8 @@ impl Shell {
         Self { inner: self.inner - room, outer: self.outer + room, ..self }
     }
 
-    /// Lower bound on the distance at which a ray hits a surface in the shell. `None` if it misses the shell.
+    /// Lower bound on the distance at which a ray hits a surface in the shell. `None` if the ray misses the
+    /// shell.
     fn entry_distance(&self, ray: &RayF64) -> Option<f32> {
         let to_origin = ray.origin - self.center;
         let distance = to_origin.length_squared();
@@ -112,8 +113,8 @@ pub enum OverlappingItem {
 }
 
 impl Bvh {
-    /// Whether the tree has shells. Single rays use the shells. Packets use only the boxes, and are slow in
-    /// such trees.
+    /// Whether the tree has shells. If it does, single rays use them. Packets use only the boxes and are slow
+    /// in such trees.
     #[inline(always)]
     pub fn has_shells(&self) -> bool {
         self.shells.is_some()
@@ -203,8 +204,8 @@ impl Bvh {
         }
     }
 
-    /// [`Bvh::closest`] with shells. The callback is `dyn` because a separate copy of this function for every
-    /// caller would not be faster.
+    /// [`Bvh::closest`] with shells. The callback is `dyn` because compiling this function separately for
+    /// each caller would not make it faster.
     #[cold]
     #[inline(never)]
     pub(super) fn closest_nested(
@@ -265,7 +266,7 @@ impl Bvh {
     }
 }
 
-/// A ray preprocessed for boxes and shells.
+/// A ray preprocessed for box and shell tests.
 struct NestedRay {
     slabs: SlabRay,
     line: RayF64,

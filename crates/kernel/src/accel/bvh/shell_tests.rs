@@ -4,8 +4,8 @@ use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-/// `count` nested spheres in shuffled order, whose centers are up to `spread` apart, and the same number of
-/// small spheres around them.
+/// `count` nested spheres in shuffled order, surrounded by the same number of small spheres. The centers of
+/// the nested spheres are up to `spread` apart.
 fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
     let mut next = random(5);
     let mut vector = |size: f32| (Vec3::new(next(), next(), next()) * size).as_dvec3();
@@ -96,7 +96,7 @@ fn nested_box_queries_match_brute_force() {
                     assert!(visited.contains(&id), "{id} at {at}");
                 }
             }
-            // The last three enclosing primitives must be among those visited.
+            // The last three enclosing primitives must have been visited.
             let encloses = |id: &u32| spheres[*id as usize].contains(at.as_dvec3()) && id.is_multiple_of(2);
             let all = (0..spheres.len() as u32).rev().filter(encloses);
             let found: Vec<_> = visited.iter().chain(&enclosing).copied().filter(encloses).collect();
@@ -107,7 +107,7 @@ fn nested_box_queries_match_brute_force() {
 }
 
 #[test]
-fn nested_sphere_work_is_logarithmic() {
+fn nested_sphere_traversal_is_logarithmic() {
     let work = |count: u32| {
         let spheres = spheres(count, 0.0);
         let tree = tree(&spheres[..count as usize]);

@@ -13,8 +13,8 @@ use crate::geometry::aabb::SLAB_PAD;
 use crate::math::Vec3;
 use crate::math::lanes::{PortableSimd, Simd, TRUE};
 
-/// Up to [`PACKET_SIZE`] subtrees that contain all primitives and replace the upper levels. Small scenes fit
-/// entirely into the top node.
+/// Up to [`PACKET_SIZE`] subtrees that together contain all primitives. They replace the tree's upper levels.
+/// Small scenes fit entirely into the top node.
 #[derive(Clone, Debug)]
 pub(super) struct TopNode {
     min: [F32x16; 3],
@@ -33,8 +33,8 @@ impl TopNode {
         used: 0,
     };
 
-    /// Creates a top node. While slots are free, replaces the largest nodes, then the largest leaves, with
-    /// their children.
+    /// Creates a top node. While slots are free, replaces the largest inner nodes with their children, then
+    /// the largest leaves with their primitives.
     pub(super) fn new(
         root: (Aabb, ChildRef),
         nodes: &[BinaryNode],
@@ -118,7 +118,7 @@ impl TopNode {
     }
 }
 
-/// Index of the largest box that may be replaced with its children. `may_open` receives the child and the
+/// Index of the largest box that `may_open` accepts for replacement. `may_open` receives the child and the
 /// number of free slots.
 fn largest_replaceable(
     open: &[(Aabb, ChildRef)],
@@ -129,7 +129,7 @@ fn largest_replaceable(
     each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)
 }
 
-/// Intervals that contain the coordinates of several rays.
+/// Bounds on the coordinates of several rays.
 pub(super) struct PacketBounds {
     /// Minimum and maximum coordinates of the origins.
     origin: [[f32; 2]; 3],
@@ -174,7 +174,7 @@ mod tests {
     use crate::geometry::packet::{RayPacket, active_lanes, lanes};
     use crate::math::random::signed as random;
 
-    /// Records which primitives are tested for which rays.
+    /// Records which primitives are tested against which rays.
     struct TestLog(Vec<u32>);
 
     impl ClosestHitCallback for TestLog {
@@ -219,7 +219,7 @@ mod tests {
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray()).collect();
                 let (rows, mut ends) = RayPacket::new(&rays);
-                // Leave some rays untraced.
+                // Skip some rays.
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;
                 }

@@ -82,7 +82,7 @@ impl Bvh {
         }
     }
 
-    /// Whether any primitive on the ray's path satisfies `test`.
+    /// Whether any primitive in the leaves that the ray may hit satisfies `test`.
     #[inline]
     pub fn any(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         if let Some(shells) = &self.shells {
@@ -176,7 +176,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed;
 
-    /// Brute-force nearest hit that treats each box as a solid.
+    /// Finds the nearest hit by brute force, treating each box as a solid.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let hits = boxes

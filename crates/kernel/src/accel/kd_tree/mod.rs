@@ -25,7 +25,7 @@ pub struct KdTree {
     nodes: Vec<KdNode>,
     /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
-    /// Each triangle once, in the order in which the leaves first refer to it.
+    /// All triangles without duplicates, in the order in which the leaves first refer to them.
     triangles: Vec<LeafTriangle>,
     bounds: Aabb,
 }
@@ -57,7 +57,7 @@ impl KdTree {
             + size_of_val(self.triangles.as_slice())
     }
 
-    /// Expected number of nodes (including leaves) and triangles that a random line through the bounding box
+    /// Expected numbers of nodes (including leaves) and triangles that a random line through the bounding box
     /// visits, estimated from surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());

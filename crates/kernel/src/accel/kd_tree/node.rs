@@ -65,7 +65,8 @@ impl KdNode {
         }
     }
 
-    /// Offsets the node's indices by the numbers of preceding nodes and references.
+    /// Offsets the node's indices by the number of nodes and the number of references that precede its
+    /// subtree.
     pub fn offset_indices(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
             NodeKind::Inner { axis, at, right } => NodeKind::Inner { axis, at, right: right + nodes },

@@ -44,8 +44,8 @@ impl PlaneRay {
         }
     }
 
-    /// Lower and upper bounds on the ray's distance to a plane. If the ray is within the plane, up to
-    /// rounding, they include all distances. For other parallel rays, both are −∞ or both are ∞. NaN means
+    /// Lower and upper bounds on the ray's distance to a plane. If the ray is in the plane (up to rounding),
+    /// the bounds include all distances. For other parallel rays, both are −∞ or both are ∞. NaN means
     /// unbounded.
     #[inline(always)]
     fn plane_distance(&self, axis: usize, at: f32) -> (f32, f32) {
@@ -68,7 +68,7 @@ impl PlaneRay {
         (near <= far).then_some((near, far))
     }
 
-    /// Upper end, in the scaled parameter, of a ray that ends at `t_max`.
+    /// Scaled ray parameter at which a ray with end `t_max` ends.
     #[inline(always)]
     fn scaled_end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad

@@ -49,7 +49,7 @@ impl KdTree {
                 return Err(format!("node {place} has depth {depth}, which exceeds the limit"));
             }
             if place != reached {
-                return Err(format!("node {place} is in the wrong order"));
+                return Err(format!("node {place} is out of order"));
             }
             reached += 1;
             match self.nodes[place as usize].kind() {
@@ -77,7 +77,7 @@ impl KdTree {
             return Err("some nodes are unreachable".to_owned());
         }
         if let Some(triangle) = self.triangles.iter().find(|own| own.corners != corners(own.id)) {
-            return Err(format!("triangle {} has different corners", triangle.id));
+            return Err(format!("triangle {} differs from the triangle in the mesh", triangle.id));
         }
         named.check_complete()
     }
@@ -101,7 +101,7 @@ fn check_leaf(
     }
     let must = |id: &&u32| reaches_into(cell, corners(**id));
     match inside.iter().filter(must).find(|id| sorted.binary_search(id).is_err()) {
-        Some(id) => Err(format!("leaf {place} lacks triangle {id}")),
+        Some(id) => Err(format!("leaf {place} is missing triangle {id}")),
         None => Ok(()),
     }
 }
@@ -110,7 +110,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
-/// Whether a triangle extends into a cell, not counting parts of the triangle in a face of the cell.
+/// Whether a triangle extends into a cell, not counting parts of the triangle that are in a face of the cell.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     let (min, max) = ClippedTriangle::clipped(corners, cell).extent();
     (0..3).all(|axis| {

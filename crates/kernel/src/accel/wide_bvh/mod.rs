@@ -66,7 +66,7 @@ impl WideBvh {
         Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
     }
 
-    /// Sets the instruction set for traversal. Uses the fastest supported one if the processor lacks
+    /// Sets the instruction set for traversal. Falls back to the fastest supported one if the processor lacks
     /// `instructions`.
     pub fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions.available();
@@ -88,7 +88,7 @@ impl WideBvh {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
-    /// Expected number of nodes and triangle packs that a random line through the bounding box visits,
+    /// Expected numbers of nodes and triangle packs that a random line through the bounding box visits,
     /// estimated from surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
@@ -252,8 +252,8 @@ impl WideBvh {
     }
 }
 
-/// Groups with at least this many shadow rays are traced as packets. In smaller groups, tracing the rays one
-/// by one is faster.
+/// Minimum number of shadow rays in a group that is traced as a packet. In smaller groups, tracing the rays
+/// one by one is faster.
 const SMALL_GROUP: usize = 8;
 
 /// Groups the rays whose directions have the same signs and the same longest axis. Calls `take` with each

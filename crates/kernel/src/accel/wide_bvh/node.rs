@@ -19,7 +19,7 @@ const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
 
-/// All bits of an encoded leaf except the bits for its first pack's index.
+/// Mask of an encoded leaf's bits, except those that contain the index of the first pack.
 pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 
 /// A mesh has at most 1.3 references per triangle after splitting. Every pack and every node needs at least

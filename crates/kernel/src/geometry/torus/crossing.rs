@@ -20,10 +20,11 @@ use crate::math::DVec3;
 /// fewer.
 const MOST_STEPS: u32 = 200;
 
-/// Half the width of the neighborhood of the axis where the slope of g changes sign.
+/// Half-width of the neighborhood around the axis in which the slope of g changes sign.
 const KINK: f64 = 1e-9;
 
-/// Rounding error of g near 0, relative to the tube radius. Twice the error of the distance from the circle.
+/// Rounding error of g near 0, relative to the tube radius. It is twice the error of the distance from the
+/// circle.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A line near a torus around the z axis. The torus's circle has radius 1.
@@ -36,7 +37,7 @@ pub(super) struct UnitLine {
     pub(super) tube: f64,
 }
 
-/// Value and derivative of g at a point on the line.
+/// Value of g and its derivative at a point on the line.
 #[derive(Clone, Copy)]
 struct LineSample {
     s: f64,
@@ -144,7 +145,7 @@ impl UnitLine {
         (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
     }
 
-    /// First crossing in an interval. `is_inside` says whether the interval starts inside the torus.
+    /// First crossing in an interval. `is_inside` is true if the interval starts inside the torus.
     fn crossing_of_piece(
         &self,
         low: LineSample,
@@ -163,8 +164,8 @@ impl UnitLine {
             .flatten()
     }
 
-    /// The only crossing between two points. Uses Newton's method, and bisection when a Newton step would
-    /// leave the interval.
+    /// The only crossing between two points. Uses Newton's method, but bisects when a Newton step would leave
+    /// the interval.
     fn refine_crossing(&self, mut low: f64, mut high: f64, start: LineSample, is_inside: bool) -> f64 {
         let mut x = start;
         for _ in 0..MOST_STEPS {

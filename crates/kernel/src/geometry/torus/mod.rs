@@ -13,7 +13,7 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
-/// Margin around a torus, relative to the tube radius. It ensures that a line enters the searched interval
+/// Margin around a torus, relative to the tube radius. It ensures that the searched interval of a line starts
 /// outside the torus.
 const ROOM: f64 = 0.01;
 
@@ -147,7 +147,7 @@ impl Torus {
 
     /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
     /// (tube/radius)·cos ψ. The pdf values at ψ and at the mirrored angle π − ψ have a constant sum, so a
-    /// uniform ψ is chosen or mirrored in proportion to these values.
+    /// uniformly distributed ψ is either kept or mirrored, with probabilities proportional to these values.
     pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_list_each_entry_in_order() {
+    fn entries_are_complete_and_in_order() {
         let entries = |origin: Vec3, direction: Vec3| {
             ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
         };

@@ -10,13 +10,13 @@ use crate::math::{DVec3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxEmitter {
     center: DVec3,
-    /// Half the edge lengths.
+    /// Half of each edge length.
     half: [f32; 3],
-    /// Unit vectors of the axes.
+    /// Unit vectors along the axes.
     axes: [Vec3; 3],
 }
 
-/// A box seen from a point. It is mirrored to put the point on the positive side of each axis.
+/// A box seen from a point, mirrored to put the point on the positive side of each axis.
 struct BoxView {
     /// Signs of the point's coordinates.
     signs: [f32; 3],
@@ -34,8 +34,8 @@ struct BoxFace {
 }
 
 impl ShapeEmitter for BoxEmitter {
-    /// Chooses a face proportionally to its solid angle, then a point on the face uniformly over its solid
-    /// angle.
+    /// Chooses a face with a probability proportional to its solid angle, then samples the face uniformly
+    /// over this solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let BoxView { signs, faces } = self.seen_from(point);

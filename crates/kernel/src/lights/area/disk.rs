@@ -29,7 +29,7 @@ pub struct DiskView {
     q: f64,
     /// Height of the point above the front. Positive if the front is visible.
     height: f64,
-    /// Distance to the disk's farthest point.
+    /// Distance from the point to the farthest point on the disk.
     farthest: f64,
 }
 
@@ -111,7 +111,7 @@ impl DiskEmitter {
         }
     }
 
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     #[inline(always)]
     pub fn normal(&self) -> DVec3 {
         self.normal
@@ -131,7 +131,7 @@ impl DiskView {
         TAU * self.a * self.b / (self.p * self.q).sqrt()
     }
 
-    /// Samples a direction. Returns the direction, the distance to the plane, and the inverse pdf.
+    /// Samples a direction. Returns the direction, the distance to the disk's plane, and the inverse pdf.
     ///
     /// On the plane perpendicular to the axis at distance 1, the ellipse is (a·r·cos φ, b·r·sin φ) with r in
     /// [0, 1]. A slice dφ has the solid angle a·b/(Q + √Q) dφ with Q = 1 + a²cos²φ + b²sin²φ, and the cosine
@@ -155,7 +155,7 @@ impl DiskView {
         (direction, distance, self.inverse_pdf(cos * cos, q + root))
     }
 
-    /// Inverse pdf, given cos²φ and Q + √Q.
+    /// Computes the inverse pdf from cos²φ and Q + √Q.
     #[inline(always)]
     fn inverse_pdf(&self, cos2: f64, slice: f64) -> f64 {
         self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice

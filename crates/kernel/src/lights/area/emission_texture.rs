@@ -12,7 +12,7 @@ use crate::materials::texture::Texture;
 use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// A factor that is applied to a light's radiance and varies with position and direction.
+/// A factor on a light's radiance that varies with position and direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
@@ -30,7 +30,7 @@ pub enum UvChart {
     Triangles(Vec<UvTriangle>),
 }
 
-/// A triangle with UVs.
+/// A triangle with UV coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTriangle {
     /// Primitive index in its object.
@@ -82,8 +82,8 @@ impl EmissionTexture {
         }
     }
 
-    /// Number of texels per unit of u and v. If there are both a color texture and an opacity texture,
-    /// returns the maximum of both.
+    /// Number of texels per unit of u and v. If there is both a color texture and an opacity texture, returns
+    /// the larger number.
     pub fn texels_per_unit(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
@@ -92,8 +92,8 @@ impl EmissionTexture {
         across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
     }
 
-    /// The factor at a point on the light, for a ray with the given direction. `primitive` is the mesh
-    /// triangle that contains the point.
+    /// The factor at a point on the light, for a ray in a given direction. `primitive` is the mesh triangle
+    /// that contains the point.
     #[inline]
     pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
         self.at_position(point, primitive) * self.coat_transmittance(point, primitive, direction)
@@ -104,7 +104,7 @@ impl EmissionTexture {
         self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
-    /// Transmittance of the clear coat for a ray with the given direction.
+    /// The clear coat's transmittance for a ray in a given direction.
     pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
         let Some(coat) = &self.coat else { return 1.0 };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
@@ -115,12 +115,12 @@ impl EmissionTexture {
     }
 }
 
-/// Length of the probe ray that finds the normal at a point, relative to the light's size.
+/// Length of the probe ray that finds the normal at a point, as a fraction of the light's size.
 const PROBE: f64 = 1e-3;
 
 impl UvChart {
-    /// The unit normal at a point, for a viewing direction that may come from either side. `None` if the
-    /// probe ray misses the surface.
+    /// The unit normal at a point that is viewed from either side. `None` if the probe ray misses the
+    /// surface.
     fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {

@@ -62,7 +62,8 @@ impl InsideEmitter {
         })
     }
 
-    /// Samples a point by area. The sample is black if another part of the shape occludes it.
+    /// Samples a point uniformly by area. The sample is black if another part of the shape occludes the
+    /// point.
     fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
@@ -92,5 +93,5 @@ impl InsideEmitter {
     }
 }
 
-/// Relative difference up to which distances are considered equal.
+/// Relative difference below which two distances are considered equal.
 const SAME_DISTANCE: f32 = 1e-4;

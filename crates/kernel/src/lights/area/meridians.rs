@@ -1,9 +1,9 @@
-//! A distribution of angles around a pole, weighted by the visible part of a light in each half plane.
+//! A distribution of angles around a pole, weighted by how much of a light is visible in each half plane.
 
 use super::piecewise_linear::PiecewiseLinear;
 use crate::math::{DVec3, Vec3};
 
-/// Number of nodes on each side at which the weight is evaluated.
+/// Number of nodes at which the weight is evaluated, on each side of angle 0.
 const NODES: usize = 9;
 
 /// Distribution of angles around a pole, in the interval from −`reach` to `reach`. The density is piecewise
@@ -48,8 +48,8 @@ impl SinCos {
 }
 
 impl AzimuthDistribution {
-    /// A distribution over the angles from −`reach` to `reach` whose density is proportional to `weight`.
-    /// `reach` is in [0, π].
+    /// Creates a distribution over the angles from −`reach` to `reach` whose density is proportional to
+    /// `weight`. `reach` is in [0, π].
     pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {
         let step = reach.half_angle().half_angle().half_angle();
         let mut turn = SinCos { sin: 0.0, cos: 1.0 };
@@ -86,7 +86,7 @@ pub struct PolarFrame {
     pub pole: DVec3,
     /// Direction perpendicular to the pole, at angle 0.
     pub front: DVec3,
-    /// Direction perpendicular to both, at angle 90°.
+    /// Direction perpendicular to the other two, at angle 90°.
     pub side: DVec3,
 }
 

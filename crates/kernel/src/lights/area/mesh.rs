@@ -1,5 +1,5 @@
-//! Mesh lights. Two triangles that form a parallelogram are sampled as a quad. Otherwise, a small number of
-//! triangles is sampled by area and a large number with a light tree.
+//! Mesh lights. Two triangles that form a parallelogram are sampled as a quad. Other meshes are sampled by
+//! area if they have few triangles, and with a light tree if they have many.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
@@ -63,7 +63,7 @@ struct EmissiveTriangle {
     corner: DVec3,
     ab: Vec3,
     ac: Vec3,
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     normal: Vec3,
     /// Primitive index in the object.
     primitive: u32,
@@ -99,8 +99,8 @@ impl MeshEmitter {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
-    /// Samples a point uniformly on one triangle. Returns the point, the triangle's area, and its primitive
-    /// index.
+    /// Samples a point uniformly on the triangle at `index`. Returns the point, the triangle's area, and its
+    /// primitive index.
     pub fn sample_triangle(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();

@@ -1,7 +1,7 @@
 //! Emitting shapes, one file each.
 //!
 //! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
-//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add the bounds on its
+//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add bounds on its
 //! emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
@@ -50,7 +50,7 @@ pub trait ShapeEmitter {
     /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is a point on the front, hit by a ray from `from`.
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is a point on the front that a ray hits from `from`.
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centroid of the area.
@@ -60,7 +60,7 @@ pub trait ShapeEmitter {
 /// A surface that emits uniformly from one side. A two-sided emitter is represented by two lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// The emitting shape. Its front is the emitting side.
+    /// The emitting shape. The front is the side that emits.
     pub shape: Emitter,
     /// The side of the object that emits.
     pub side: Side,
@@ -76,12 +76,12 @@ pub struct AreaLight {
     pub bounds: LightBounds,
 }
 
-/// The part of an object that a light covers.
+/// The part of an object to which a light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightPart {
     /// The entire object.
     Whole,
-    /// The triangles listed by the emitter.
+    /// The triangles that the emitter lists.
     Listed,
 }
 
@@ -157,7 +157,8 @@ impl Emitter {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The quad to sample and, if it is made of two triangles, the triangle pair. `None` for other shapes.
+    /// The quad to sample, along with the triangle pair if the quad is made of two triangles. `None` for
+    /// other shapes.
     #[inline(always)]
     pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&TrianglePairQuad>)> {
         if let Self::Quad(quad) = self {
@@ -193,7 +194,7 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
 pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
-        // Seen from outside, the front covers each direction at most once.
+        // Seen from outside, the front is hit at most once in each direction.
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
         (Shape::Torus(_), _) => true,
@@ -226,9 +227,9 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// Bounds on a shape's emission. `None` if the shape is infinite. The emission of flat shapes has a cosine
-/// falloff. Other shapes are assumed to emit a quarter of their area times the radiance in every direction,
-/// which is the mean over all directions for convex shapes (Cauchy).
+/// Bounds on a shape's emission. `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
+/// Other shapes are assumed to emit a quarter of their area times the radiance in every direction, which is
+/// the mean over all directions for convex shapes (Cauchy).
 fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let normal = match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),

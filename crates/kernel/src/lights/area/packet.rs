@@ -1,4 +1,4 @@
-//! Samples of one area light for a packet of points.
+//! Samples one area light for a packet of points.
 
 use super::sample_point::LightSamplePoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
@@ -44,8 +44,8 @@ impl AreaLight {
         }
         // All quads share one loop, because compilers do not vectorize a second one.
         if let Some((quad, of_two)) = self.shape.as_quad() {
-            // Compute the differences separately because they need double precision. Otherwise, compilers
-            // would also compute everything else only eight lanes at a time.
+            // Compute the differences in a separate loop because they need double precision. Otherwise,
+            // compilers would also compute everything else only eight lanes at a time.
             let mut offsets = [[0.0; PACKET_SIZE]; 3];
             for i in 0..PACKET_SIZE {
                 set_lane(&mut offsets, i, quad.offset_to_corner(lane(points, i)));

@@ -1,6 +1,7 @@
 //! Piecewise linear densities.
 
-/// A density on [0, 1] that is proportional to the given values at evenly spaced nodes and linear in between.
+/// A density on [0, 1] that interpolates linearly between evenly spaced nodes. At the nodes, it is
+/// proportional to the values.
 #[derive(Clone, Copy, Debug)]
 pub struct PiecewiseLinear<const NODES: usize>(pub [f64; NODES]);
 
@@ -58,7 +59,7 @@ mod tests {
                 let (place, density) = linear.sample(share);
                 assert!((density - linear.pdf(place)).abs() < 1e-9, "{place}");
                 assert!(place >= before && place <= 1.0);
-                // Steps of the position times the density must equal steps of the share.
+                // Check that the density times each step in position equals the step in the random number.
                 if i > 0 && density > 0.05 {
                     let middle = linear.pdf(0.5 * (place + before));
                     assert!((middle * (place - before) * f64::from(n) - 1.0).abs() < 0.01, "{place}");

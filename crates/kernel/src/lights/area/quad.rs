@@ -18,7 +18,7 @@ pub struct QuadEmitter {
     corner: DVec3,
     u: Vec3,
     v: Vec3,
-    /// Unit normal of the emitting side.
+    /// Unit normal on the emitting side.
     normal: Vec3,
     area: f32,
     /// Lengths and unit directions of the edges, if they are perpendicular.
@@ -109,8 +109,8 @@ impl QuadEmitter {
         (offset, self.inverse_area_pdf(offset))
     }
 
-    /// Solid angle of the quad if its entire area were at this offset from the point. Not positive if the
-    /// point is behind the quad.
+    /// Solid angle that the quad would have if its entire area were at this offset from the point. Not
+    /// positive if the point is behind the quad.
     #[inline(always)]
     pub(super) fn inverse_area_pdf(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -141,11 +141,11 @@ pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
-    /// For the planes through the view point and the lower and upper sides, the z components of the unit
-    /// normals.
+    /// z components of the unit normals of two planes: through the view point and the lower side, and through
+    /// the view point and the upper side.
     lower: f32,
     upper: f32,
-    /// Start angle of the slices.
+    /// Angle at which the slices start.
     start: f32,
     solid_angle: f32,
 }
@@ -158,8 +158,8 @@ impl PlanarRectangle {
     }
 }
 
-/// Sine of the angle at which a side at coordinate `side` is seen. `d2` is the squared distance perpendicular
-/// to this coordinate.
+/// Sine of the angle at which a side appears. `side` is the side's coordinate, and `d2` is the squared
+/// distance perpendicular to the coordinate axis.
 #[inline(always)]
 fn side_sine(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
@@ -172,7 +172,7 @@ fn dihedral_angle(a: f32, b: f32) -> f32 {
 }
 
 impl SphericalRectangle {
-    /// A rectangle with these coordinate ranges in the plane at z.
+    /// Creates a rectangle from its coordinate ranges and the z coordinate of its plane.
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
@@ -235,7 +235,7 @@ impl SphericalRectangle {
     /// Samples a point uniformly over the solid angle.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> [f32; 2] {
-        // The part of the rectangle up to x has the fraction u₀ of the solid angle.
+        // The part of the rectangle up to x covers the fraction u₀ of the solid angle.
         let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
         // sin² of the lower plane's angle.
         let tilt = 1.0 - self.lower * self.lower;
@@ -244,7 +244,7 @@ impl SphericalRectangle {
         let sin = if slope < 0.0 { -sin } else { sin };
         let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
-        // For this x, heights on the unit circle are uniformly distributed.
+        // At this x, the heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
         let (h0, h1) = (side_sine(self.y[0], d2), side_sine(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);

@@ -6,7 +6,7 @@ use crate::geometry::{AreaPoint, Shape};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 
-/// One side of a shape, sampled by area. Shadow rays account for other parts of the shape in between.
+/// One side of a shape, sampled by area. Shadow rays account for other parts of the shape along the way.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeeThroughEmitter {
     shape: Shape,

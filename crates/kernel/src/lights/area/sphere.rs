@@ -27,7 +27,7 @@ impl ShapeEmitter for SphereEmitter {
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
         let one_minus_cos_max = one_minus_cos(sin2_max);
         let local = warp::cone(u, one_minus_cos_max);
-        // Near intersection along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
+        // Nearest intersection in a direction at the angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = local.x * local.x + local.y * local.y;
         let depth = (sin2_max - sin2).max(0.0).sqrt();
         let direction = Frame::from_normal(axis).to_world(local);
@@ -50,8 +50,8 @@ impl ShapeEmitter for SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Unit direction to the center, distance, and sin² of the half angle. `None` if the point is inside the
-    /// sphere.
+    /// Unit direction to the center, distance to the center, and sin² of the cone's half angle. `None` if the
+    /// point is inside the sphere.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }
@@ -66,7 +66,7 @@ impl SphereEmitter {
     }
 }
 
-/// 1 − cos of an angle up to 90°, from its sin².
+/// Computes 1 − cos of an angle of up to 90° from its sin².
 #[inline(always)]
 pub(crate) fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())

@@ -16,7 +16,7 @@ pub struct RevolutionEmitter<S> {
     middle: DVec3,
 }
 
-/// A light's curved side. It intersects every half plane around a pole in a single interval.
+/// A light's curved side. Its intersection with each half plane around a pole is a single interval.
 pub trait RevolutionSide {
     /// The side seen from a point.
     type View: RevolutionSideView;
@@ -33,12 +33,11 @@ pub trait RevolutionSideView {
     /// Largest angle around the pole at which the side is visible.
     fn max_angle(&self) -> SinCos;
 
-    /// Difference between the cosines at the ends of the visible interval, at the given angle around the
-    /// pole.
+    /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
     fn cosine_extent(&self, around: SinCos) -> f64;
 
-    /// The point at a fraction `share` of the cosine interval. Returns its angle from the pole and its
-    /// distance.
+    /// The point at a fraction `share` of the cosine interval. Returns the point's angle from the pole and
+    /// its distance.
     fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
@@ -46,13 +45,13 @@ pub trait RevolutionSideView {
 struct RevolutionView<V> {
     side: Option<(V, AzimuthDistribution)>,
     cap: Option<(super::disk::DiskView, DVec3)>,
-    /// Fraction of samples on the side.
+    /// Fraction of the samples that are on the side.
     share: f64,
 }
 
 impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
-    /// Samples nearly uniformly over the solid angle. The density varies between meridians, and by up to 20 %
-    /// on a cap.
+    /// Samples nearly uniformly over the solid angle. The density varies between meridians, and it varies by
+    /// up to 20 % on a cap.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.view(point);
         let share = view.share as f32;
@@ -121,8 +120,8 @@ pub struct CylinderSide {
     radius: f64,
 }
 
-/// A cylinder seen from a point. The pole is parallel to the cylinder's axis. Angles around the pole are the
-/// angles at which the cross-section circle is seen from the point.
+/// A cylinder seen from a point. The pole is parallel to the cylinder's axis. Angles around the pole are
+/// directions from the point to the cross-section circle.
 pub struct CylinderView {
     pole: PolarFrame,
     reach: SinCos,
@@ -217,7 +216,7 @@ pub struct ConeSide {
     axis: DVec3,
     /// Sine and cosine of the half angle at the tip.
     opening: (f64, f64),
-    /// Distance from the tip to the base's rim.
+    /// Distance from the tip to the rim of the base.
     slant: f64,
 }
 
@@ -226,7 +225,7 @@ pub struct ConeSide {
 pub struct ConeView {
     pole: PolarFrame,
     reach: SinCos,
-    /// Distance to the tip.
+    /// Distance from the point to the tip.
     distance: f64,
     /// Cosine and sine of the angle at the tip between the point and the axis.
     off_axis: (f64, f64),
@@ -278,14 +277,14 @@ impl RevolutionSide for ConeSide {
 }
 
 impl ConeView {
-    /// Angle at the tip between the direction to the point and the line in which a half plane intersects the
+    /// Angle at the tip between the direction to the point and the line where a half plane intersects the
     /// side.
     fn angle_at_tip(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
         let w = (square - c * c).max(0.0).sqrt();
-        // Choose the nearer of the two lines that have this angle to the axis.
+        // Two lines are at this angle to the axis. Choose the nearer one.
         let sin = if m > 0.0 { (c - m) * (c + m) / (q * c + m * w) } else { (q * c - m * w) / square };
         SinCos { sin, cos: (m * c + q * w) / square }
     }

@@ -8,15 +8,15 @@ use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 
-/// A parallelogram with an emission texture. A fraction of the samples is distributed according to the
-/// texture, the rest by solid angle. The pdf is a mixture of both (one-sample balance heuristic: Veach,
-/// *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4).
+/// A parallelogram with an emission texture. Some samples are distributed according to the texture, the
+/// others by solid angle. The pdf is a mixture of both pdfs (one-sample balance heuristic: Veach, *Robust
+/// Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedQuadEmitter {
     quad: QuadEmitter,
     /// Number of cells along each edge.
     size: [usize; 2],
-    /// Brightness of the cells.
+    /// Distribution of the cells' brightness.
     cells: PiecewiseConstant2D,
     /// Fraction of the samples distributed according to the texture.
     share: f32,
@@ -28,7 +28,7 @@ pub struct TexturedQuadEmitter {
 /// Maximum number of cells along an edge.
 const MAX_CELLS: usize = 256;
 
-/// Minimum and maximum number of texture lookups per cell along each axis.
+/// Minimum and maximum numbers of texture lookups per cell along each axis.
 const LOOKUPS: (usize, usize) = (2, 4);
 
 /// Maximum fraction of texture samples. It is below 1 because texture sampling does not account for
@@ -127,5 +127,6 @@ impl TexturedQuadEmitter {
     }
 }
 
-/// Minimum fraction of texture samples. Textures with less contrast are not worth the lookups.
+/// Minimum fraction of texture samples. If the texture has less contrast, texture samples are not worth the
+/// lookups.
 const MIN_TEXTURE_SHARE: f32 = 0.05;

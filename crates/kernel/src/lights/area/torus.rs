@@ -1,5 +1,5 @@
-//! Torus lights. Samples a slice around the axis, then a point on the part of the slice's circle that faces
-//! the shading point.
+//! Torus lights. First samples a slice around the axis, then a point on the part of the slice's circle that
+//! faces the shading point.
 
 use std::f64::consts::PI;
 
@@ -25,7 +25,7 @@ const SLICES: usize = 7;
 /// Number of points on a slice's circle at which the density is evaluated.
 const PLACES: usize = 5;
 
-/// Minimum closeness. Closeness would be 0 on the axis, where all slices look the same.
+/// Minimum closeness. Without it, closeness would be 0 on the axis, where all slices look the same.
 const MIN_CLOSENESS: f64 = 0.01;
 
 /// A torus seen from a point outside it.
@@ -58,19 +58,19 @@ struct TorusSlice {
     turn: SinCos,
     /// Distance from the axis to the foot.
     foot: f64,
-    /// Distance from the point to the slice's plane.
+    /// Distance from the point to the plane of the slice.
     off: f64,
     /// Direction from the foot to the circle's center, as (outward, along the axis).
     to_middle: [f64; 2],
-    /// Smallest distance from the foot to the circle, and the power of the foot (the product of both
-    /// distances along any line through it).
+    /// Smallest distance from the foot to the circle, and the power of the foot with respect to the circle
+    /// (the product of the two distances along any line through the foot).
     gap: f64,
     power: f64,
     /// Maximum sine of the elevation.
     sine: f64,
 }
 
-/// Relative difference up to which distances are considered equal.
+/// Relative difference below which two distances are considered equal.
 const SAME_DISTANCE: f64 = 1e-3;
 
 /// A point on a slice's circle.
@@ -78,13 +78,13 @@ struct SlicePoint {
     /// Offset from the foot, outward and along the axis.
     outwards: f64,
     upwards: f64,
-    /// Solid angle per unit of φ and per unit of the sine relative to its maximum.
+    /// Solid angle per unit of φ and per unit of the relative sine (the sine divided by its maximum).
     factor: f64,
 }
 
 impl ShapeEmitter for TorusEmitter {
-    /// Samples a direction toward the front of the torus. If the direction enters the torus twice, its pdf
-    /// includes both hits, and the sample is the nearer one, so it is never occluded by the torus.
+    /// Samples a direction toward the front of the torus. If a ray in this direction enters the torus twice,
+    /// the pdf includes both hits. The sample is the nearer hit, so the torus never occludes it.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
         let slices = view.slice_density();
@@ -153,7 +153,7 @@ impl TorusView {
             return None;
         }
         let closeness = ((distance * radius).sqrt() / gap).max(MIN_CLOSENESS);
-        // From outside the ring and between the planes of its top and bottom, only the near side of the ring
+        // From points outside the ring and between its top and bottom planes, only the near side of the ring
         // is visible, up to the angle `widest`.
         let is_beside = height.abs() < tube && beside > 0.0;
         let widest = if is_beside {
@@ -196,7 +196,7 @@ impl TorusView {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
-    /// The slice at an angle φ. `None` if none of it is visible.
+    /// The slice at an angle φ. `None` if the slice is not visible.
     fn slice(&self, turn: SinCos) -> Option<TorusSlice> {
         let foot = self.distance * turn.cos;
         let off = self.distance * turn.sin;
@@ -260,14 +260,14 @@ impl TorusView {
 }
 
 impl TorusSlice {
-    /// Computes the tangent of the angle to the circle's center from the elevation's relative sine.
+    /// Converts the relative sine of the elevation to the tangent of the angle to the circle's center.
     fn tangent(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
-    /// Computes the elevation's relative sine from the tangent of the angle to the circle's center.
+    /// Converts the tangent of the angle to the circle's center to the relative sine of the elevation.
     fn sine_of(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
@@ -279,7 +279,7 @@ impl TorusSlice {
         PiecewiseLinear(std::array::from_fn(|i| self.near_point(view, self.tangent(sine(i))).factor))
     }
 
-    /// Near point on the circle, given the tangent of the angle to the circle's center.
+    /// Finds the near point on the circle from the tangent of the angle to the circle's center.
     fn near_point(&self, view: &TorusView, tangent: f64) -> SlicePoint {
         let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
         let sin = tangent * cos;

@@ -1,4 +1,4 @@
-//! Triangle lights, sampled by solid angle or, if distant, by area.
+//! Triangle lights. They are sampled by solid angle, or by area if they are distant.
 
 use std::f64::consts::TAU;
 
@@ -11,14 +11,15 @@ use crate::sampling::warp;
 /// Minimum solid angle in sr for solid-angle sampling. For smaller triangles, area sampling is equally good.
 const MIN_SOLID_ANGLE: f64 = 1e-3;
 
-/// Difference from a hemisphere, in sr, below which the corners are considered to be on a great circle.
+/// The corners are considered to be on a great circle if the solid angle differs from a hemisphere by less
+/// than this, in sr.
 const ALMOST_HALF: f64 = 1e-4;
 
 /// A triangle that emits toward (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleEmitter {
     corners: [DVec3; 3],
-    /// Unit normal of the front.
+    /// Unit normal on the front side.
     normal: DVec3,
     area: f64,
 }
@@ -31,7 +32,7 @@ struct SphericalTriangle {
 }
 
 impl ShapeEmitter for TriangleEmitter {
-    /// Samples uniformly over the solid angle, or over the area.
+    /// Samples uniformly over the solid angle, or over the area for small solid angles.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else {
             return LightSamplePoint::NOTHING;

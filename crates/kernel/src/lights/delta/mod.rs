@@ -1,4 +1,4 @@
-//! Delta lights. Rays cannot hit them, and their light arrives from a single direction.
+//! Delta lights. Rays cannot hit these lights, and their light arrives at each point from a single direction.
 
 mod point;
 mod spot;
@@ -14,7 +14,7 @@ use crate::math::lanes::{Vec3x16, lane};
 
 /// A light without extent: a point light or a spotlight.
 pub trait DeltaLight {
-    /// The isotropic light with the same position, falloff, and peak intensity.
+    /// An isotropic light with the same position, falloff, and peak intensity.
     fn isotropic(&self) -> &PointLight;
 
     /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
@@ -23,7 +23,8 @@ pub trait DeltaLight {
     /// Power divided by the peak intensity, in sr: the integral of [`DeltaLight::relative_intensity`].
     fn solid_angle(&self) -> f64;
 
-    /// Samples a unit direction away from the light, proportionally to the intensity. `u` is in [0, 1)².
+    /// Samples a unit direction away from the light, with a pdf proportional to the intensity. `u` is in [0,
+    /// 1)².
     fn sample_direction(&self, u: [f32; 2]) -> Vec3;
 
     /// Bounds on the light's position and emission. Nothing is emitted outside the cone.

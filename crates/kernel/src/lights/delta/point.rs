@@ -13,7 +13,7 @@ use crate::sampling::warp;
 pub struct PointLight {
     /// Position.
     pub position: DVec3,
-    /// Intensity in W·sr⁻¹. Without falloff, irradiance at normal incidence.
+    /// Intensity in W·sr⁻¹, or the irradiance at normal incidence for lights without falloff.
     pub intensity: Vec3,
     /// Falloff with distance.
     pub falloff: Falloff,

@@ -12,11 +12,11 @@ use crate::sampling::warp;
 /// A point light that emits into a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// The same light, not restricted to a cone.
+    /// The same light without the cone.
     pub point: PointLight,
     /// Unit vector along the cone's axis, away from the light.
     pub axis: Vec3,
-    /// Half the cone's angle in radians, in (0, π].
+    /// Half angle of the cone in radians, in (0, π].
     pub half_angle: f32,
     /// Outer fraction of the half angle, in [0, 1], where the intensity fades linearly with the angle.
     pub blend: f32,
@@ -39,7 +39,7 @@ impl DeltaLight for SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// The solid angle of the inner cone with half angle (1 − blend)·H, plus the integral of (H −
+    /// The solid angle of the inner cone, whose half angle is (1 − blend)·H, plus the integral of (H −
     /// θ)/(blend·H) over the directions between the two cones.
     #[inline]
     fn solid_angle(&self) -> f64 {
@@ -93,7 +93,7 @@ struct SpotCone {
 }
 
 /// ∫ t·sin(H − t) dt from the edge of a cone (t = 0) inward to t = δ. For small angles, uses the first terms
-/// of the sine series, with a relative error below 1e-9.
+/// of the sine series. Their relative error is below 1e-9.
 fn edge_integral(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);

@@ -16,7 +16,7 @@ use crate::sampling::warp;
 pub struct DirectionalLight {
     /// Unit direction toward the light's center.
     pub to_light: Vec3,
-    /// Irradiance on a surface that faces the light.
+    /// Irradiance on a surface that directly faces the light.
     pub irradiance: Vec3,
     /// 1 − cos of half the angular diameter. 0 for a light without extent.
     one_minus_cos: f32,
@@ -100,7 +100,7 @@ impl InfiniteLight for DirectionalLight {
         LightBounds {
             space: DistanceFalloff::Beyond,
             center: self.to_light.as_dvec3(),
-            // Chord from the center to the edge.
+            // Chord from the center of the disk to its edge.
             radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
             power: mean_channel(self.irradiance),
             cone: EmissionCone::ALL,

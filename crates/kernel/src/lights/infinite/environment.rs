@@ -29,7 +29,7 @@ pub enum Environment {
     },
 }
 
-/// Sampling pdf of a constant environment, which is uniform over the hemisphere above the surface.
+/// Pdf for sampling a constant environment, uniformly over the hemisphere above the surface.
 const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
@@ -161,7 +161,8 @@ impl InfiniteLight for Environment {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 
-    /// Bounds that include all directions. The power is the irradiance on a surface due to the mean radiance.
+    /// Bounds that include all directions. The power is the irradiance that the mean radiance causes on a
+    /// surface.
     fn bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),

@@ -22,7 +22,7 @@ pub struct EnvironmentMap {
     cells: PiecewiseConstant2D,
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
-    /// Pdf in sr⁻¹ that each row would have if it were uniform.
+    /// Pdf in sr⁻¹ of each row, if it were constant within the row.
     pdfs: Vec<f32>,
     /// Mean luminance over all directions.
     mean_luminance: f64,
@@ -40,7 +40,7 @@ struct TexelPosition {
 }
 
 impl EnvironmentMap {
-    /// Creates a map from nonnegative texels. `None` if all are black.
+    /// Creates a map from nonnegative texels. Returns `None` if all texels are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
         let height = |row: usize| match row {
@@ -86,7 +86,7 @@ impl EnvironmentMap {
         let of_row = |row: u32| {
             let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
             let at = f64::from(row);
-            // Integrate sin θ times the row's interpolation weight, above and below the row.
+            // Integrate sin θ times the interpolation weight of the row, both above and below the row.
             let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
             let is_last = row + 1 == rows;
             let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
@@ -119,8 +119,8 @@ impl EnvironmentMap {
         (direction, color(&corners, [along[0], down]), density * relative_pdf(&luminances, along))
     }
 
-    /// Unit direction at the fractions `along` of a cell, in azimuth and height. Also returns the vertical
-    /// fraction, measured in angle.
+    /// Unit direction at a position in a cell. `along` contains the fractions of the cell's azimuth and
+    /// height. Also returns the vertical fraction, measured in angle.
     #[inline(always)]
     fn direction_in_cell(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
@@ -133,7 +133,7 @@ impl EnvironmentMap {
         )
     }
 
-    /// Unit direction at height `y` and at the fraction `along` of a cell's azimuth. Also returns the
+    /// Unit direction at the height `y` and at a fraction `along` of a cell's azimuth range. Also returns the
     /// vertical fraction, measured in angle.
     #[inline(always)]
     fn direction_at_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
@@ -224,11 +224,11 @@ impl EnvironmentMap {
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
     fn cell(&self, x: f32, y: f32) -> (u32, u32) {
-        // A coordinate just below 0 may have been rounded up to the width.
+        // Rounding may have moved a coordinate just below 0 to the full width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 
-    /// Fraction of a cell row's height that is above a direction.
+    /// Fraction of a row's height that is above a direction.
     #[inline(always)]
     fn height_fraction(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);

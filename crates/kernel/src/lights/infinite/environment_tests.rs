@@ -5,7 +5,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::DVec3;
 use crate::sampling::{Dimension, PixelSampler};
 
-/// A map with texels computed from the column and row.
+/// A map with texels that are computed from their column and row.
 fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
     let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     let data = TexelData::Float(places.map(|(column, row)| color(column, row)).collect());
@@ -32,7 +32,7 @@ fn random(i: u32) -> [f32; 2] {
     PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Dimension::Light(0)).to_array()
 }
 
-/// Double-precision reference implementation of the color in a direction.
+/// Computes the color in a direction in double precision, for reference.
 fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
     // Undo the rotation about +y.
     let (sin, cos) = (-degrees).to_radians().sin_cos();
@@ -70,7 +70,7 @@ fn lookups_match_the_reference() {
                 factor: Vec3::new(1.0, 2.0, 3.0),
                 turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
             };
-            // At the poles, every azimuth is correct.
+            // At the poles, any azimuth is correct.
             for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
                 let expected =
                     (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
@@ -158,7 +158,7 @@ fn sample_frequencies_match_the_pdf() {
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
         for i in 0..count {
-            // Use independent random numbers, because the samples of a single pixel are stratified.
+            // Use independent random numbers, because the samples for a single pixel would be stratified.
             let number = |salt: u32| {
                 let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
                 let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);

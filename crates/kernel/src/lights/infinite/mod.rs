@@ -11,16 +11,16 @@ pub use environment_map::EnvironmentMap;
 use super::tree::LightBounds;
 use crate::math::Vec3;
 
-/// A light at infinity. Sampling at a surface and evaluating the radiance along a ray are separate methods of
-/// each type, because sampling an [`Environment`] depends on the surface normal, and sampling a
-/// [`DirectionalLight`] does not.
+/// A light at infinity. Each type has its own methods for sampling at a surface and for evaluating the
+/// radiance along a ray, because sampling depends on the surface normal for an [`Environment`] but not for a
+/// [`DirectionalLight`].
 pub trait InfiniteLight {
     /// Samples a unit direction to the light, independently of a surface. Returns the direction and the
     /// radiance divided by the pdf, or the irradiance if the light has no extent. `u` is in [0, 1)².
     fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3);
 
-    /// Power in W through a disk with the given area, perpendicular to each direction. Equals the mean weight
-    /// of [`InfiniteLight::sample_direction`] times the area.
+    /// Power in W that passes through a disk of the given area. For each direction, the disk is perpendicular
+    /// to the direction. Equals the mean weight of [`InfiniteLight::sample_direction`] times the area.
     fn power_through(&self, area: f64) -> Vec3;
 
     /// Bounds on the light's directions and irradiance.

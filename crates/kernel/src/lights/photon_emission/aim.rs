@@ -12,8 +12,8 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
-/// Spheres at which photons are aimed. A sphere is chosen proportionally to the expected light that reaches
-/// it. Then a direction or a point is sampled uniformly over its visible part.
+/// Spheres at which photons are aimed. A sphere is chosen with a probability proportional to the light
+/// expected to reach it. Then a direction or a point is sampled uniformly over its visible part.
 #[derive(Clone, Debug)]
 pub struct PhotonTargets {
     balls: Vec<BoundingSphere>,
@@ -24,7 +24,7 @@ pub struct PhotonTargets {
 /// Maximum number of targets. If there are more, some are merged.
 pub const MAX_TARGETS: usize = 32;
 
-/// Directional distribution of light emitted from a point.
+/// Directional distribution of the light emitted from a point.
 pub enum EmissionProfile<'a> {
     /// A delta light's distribution.
     Light {
@@ -33,7 +33,7 @@ pub enum EmissionProfile<'a> {
         /// [`DeltaLight::solid_angle`], which is expensive to compute for some lights.
         spread: f64,
     },
-    /// A cosine distribution around the given unit normal.
+    /// A cosine distribution around this unit normal.
     Front(DVec3),
 }
 
@@ -54,8 +54,8 @@ impl EmissionProfile<'_> {
         }
     }
 
-    /// Upper bound on [`EmissionProfile::relative_intensity`] over a cone of directions with a half angle of
-    /// up to 90°, given its sine.
+    /// Upper bound on [`EmissionProfile::relative_intensity`] over a cone of directions. `sin` is the sine of
+    /// the cone's half angle, which is at most 90°.
     fn max_relative_intensity(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
         // Cosine of the smallest angle between a direction and the cone.
@@ -103,7 +103,8 @@ impl PhotonTargets {
     /// Area density at a point if points are sampled uniformly on the disks of
     /// [`PhotonTargets::pick_by_cross_section`]. `is_on` returns whether the point is on a disk.
     pub fn cross_section_pdf(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
-        // Disks are chosen proportionally to their area, so each one contributes the same density.
+        // Disks are chosen with probabilities proportional to their areas, so each one contributes the same
+        // density.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
     }
 
@@ -134,7 +135,7 @@ pub struct TargetView<'a> {
     total: f64,
 }
 
-/// A target seen from an emission point.
+/// A single target seen from an emission point.
 struct VisibleTarget {
     /// The cone of directions to the target. `None` if the point is inside the target.
     cone: Option<TargetCone>,
@@ -165,7 +166,7 @@ impl TargetView<'_> {
         Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
     }
 
-    /// Pdf of aimed directions divided by the pdf of emitted directions. ∞ if emission never generates
+    /// Pdf of aimed directions divided by the pdf of unaimed directions. ∞ if emission never generates
     /// `direction`. `made_for` is the target at which the direction was aimed, or `None` for an unaimed
     /// direction.
     pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
@@ -175,7 +176,7 @@ impl TargetView<'_> {
         let (mut by_cones, mut by_others) = (0.0, 0.0);
         for (number, VisibleTarget { cone, weight }) in self.seen.iter().enumerate() {
             match cone {
-                // At a cone's edge, the result of `contains` depends on rounding.
+                // At the edge of a cone, the result of `contains` depends on rounding.
                 Some(cone) if made_for == Some(number) || cone.contains(direction) => {
                     by_cones += weight / cone.solid_angle();
                 }
@@ -223,7 +224,7 @@ impl TargetCone {
     }
 }
 
-/// Merges spheres into at most [`MAX_TARGETS`] groups. Repeatedly splits the largest group in two along its
+/// Merges spheres into at most [`MAX_TARGETS`] groups. Repeatedly splits the largest group into two along its
 /// longest axis.
 fn merged(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
     if balls.len() <= MAX_TARGETS {

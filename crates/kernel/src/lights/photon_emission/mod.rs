@@ -42,7 +42,7 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// A sphere that contains all given spheres. It has the same center as their bounding box.
+    /// A sphere that contains all spheres in `balls`. Its center is the center of their bounding box.
     pub fn around(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
@@ -73,7 +73,7 @@ pub struct PhotonRandomNumbers {
     pub light: [f32; 2],
     /// Decides whether to aim, and picks the target.
     pub aim: [f32; 2],
-    /// Position on the light. For light from infinity, position on the disk that it passes through.
+    /// Position on the light. For lights at infinity, position on the disk that the light passes through.
     pub position: [f32; 2],
     /// Direction of the photon. For lights at infinity, direction to the light.
     pub direction: [f32; 2],
@@ -94,7 +94,7 @@ pub struct EmittedPhoton {
     pub is_aimed: bool,
 }
 
-/// A photon's starting point.
+/// The starting point of a photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotonOrigin {
     /// On a delta light.
@@ -152,7 +152,7 @@ struct LightEmission {
 #[derive(Clone, Debug)]
 struct PhotonAim {
     targets: PhotonTargets,
-    /// Fraction of photons to aim.
+    /// Fraction of the photons that are aimed.
     share: f32,
     /// Distribution of the lights, weighted by their estimated power toward the targets.
     by_light: DiscreteDistribution,
@@ -211,7 +211,7 @@ impl PhotonSource {
         self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
     }
 
-    /// Fraction of photons aimed at targets.
+    /// Fraction of the photons that are aimed at targets.
     pub fn aimed_share(&self) -> f32 {
         self.aim.as_ref().map_or(0.0, |aim| aim.share)
     }
@@ -236,7 +236,7 @@ impl PhotonSource {
         (flux != Vec3::ZERO).then_some(emitted)
     }
 
-    /// Generates a photon from one light. It is aimed if there are `targets`.
+    /// Generates a photon from one light. The photon is aimed if there are `targets`.
     fn sample_photon(
         &self,
         number: usize,
@@ -293,8 +293,8 @@ struct PhotonSample {
 }
 
 impl PhotonSource {
-    /// Samples a direction from a point. Returns the direction, and the pdf of aimed directions divided by
-    /// the pdf of unaimed directions.
+    /// Samples a direction from a point. Returns the direction and a ratio of pdfs: the pdf of aimed
+    /// directions divided by the pdf of unaimed directions.
     #[inline(always)]
     fn sample_direction_from(
         &self,
@@ -315,7 +315,7 @@ impl PhotonSource {
         }
     }
 
-    /// Creates a photon that arrives from a direction at infinity, given the irradiance at normal incidence.
+    /// Creates a photon from infinity, given its direction and the irradiance at normal incidence.
     fn photon_from_infinity(
         &self,
         to_light: Vec3,
@@ -379,7 +379,7 @@ impl PhotonSource {
     }
 }
 
-/// Number of points on an area light from which the power toward the targets is estimated.
+/// Number of points on an area light that are used to estimate the power toward the targets.
 const PLACES: u32 = 16;
 
 /// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom

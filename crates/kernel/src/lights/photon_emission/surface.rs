@@ -10,7 +10,7 @@ use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 
-/// A light's surface, divided into pieces that are chosen by power.
+/// A light's surface, divided into pieces. Each piece is chosen in proportion to its power.
 #[derive(Clone, Debug)]
 pub struct EmissiveSurface {
     pieces: DiscreteDistribution,
@@ -22,7 +22,7 @@ pub struct EmissiveSurface {
 /// Geometry of the pieces.
 #[derive(Clone, Debug)]
 enum PieceGeometry {
-    /// A shape. Each part is divided into side × side pieces of equal area.
+    /// An analytic shape. Each part is divided into side × side pieces of equal area.
     Shape {
         shape: Shape,
         side: u32,
@@ -48,7 +48,7 @@ pub struct EmissionPoint {
     /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the light's
     /// power in W.
     pub flux: Vec3,
-    /// Primitive index, for meshes.
+    /// Primitive index. Only for meshes.
     pub primitive: u32,
 }
 
@@ -56,7 +56,7 @@ pub struct EmissionPoint {
 struct PiecePoint {
     point: DVec3,
     normal: DVec3,
-    /// Area of the piece.
+    /// Area of the entire piece.
     area: f64,
     primitive: u32,
 }
@@ -71,7 +71,7 @@ const LOOKUPS_PER_SIDE: u32 = 4;
 const BY_AREA: f64 = 0.05;
 
 impl EmissiveSurface {
-    /// Divides a light's surface into pieces. Returns `None` if it has no area or emits nothing.
+    /// Divides a light's surface into pieces. Returns `None` if the surface has no area or emits nothing.
     pub fn new(light: &AreaLight, emitter_geometry: &EmitterGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
             EmitterGeometry::Shape(shape) => {
@@ -117,7 +117,7 @@ impl EmissiveSurface {
         Some(Self { pieces, on, power: power.as_vec3() })
     }
 
-    /// Power in W. For textured lights, this is an estimate from a dense grid of points.
+    /// Power in W. For textured lights, it is estimated from a dense grid of points.
     pub fn power(&self) -> Vec3 {
         self.power
     }

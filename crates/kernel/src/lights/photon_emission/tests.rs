@@ -119,7 +119,7 @@ impl MeanEstimate {
 
 const GROUPS: u32 = 32;
 
-/// The mean of a function over photons. Attempts that produce no photon count as 0.
+/// Computes the mean of a function over photons. Attempts that do not produce a photon count as 0.
 fn mean(source: &PhotonSource, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
@@ -176,7 +176,7 @@ fn disk_contribution(photon: &EmittedPhoton, shape: Option<&Shape>) -> f64 {
     if is_met && is_free() { f64::from(photon.flux.y) / area } else { 0.0 }
 }
 
-/// Irradiance on the disk, estimated with light samples.
+/// Estimates the irradiance on the disk with light samples.
 fn sampled(light: &Light, count: u32) -> MeanEstimate {
     let normal = disk_normal().as_vec3();
     let Frame { s, t, .. } = Frame::from_normal(normal);
@@ -245,7 +245,7 @@ fn photons_from_one_light_carry_its_power() {
         for _ in 0..1000 {
             let photon = source.emit(&next()).expect("a photon");
             let off = (photon.flux.as_dvec3() / power - 1.0).abs().max_element();
-            // Parts of a shape are chosen in proportion to their area.
+            // All photons have the same flux because parts of a shape are chosen in proportion to their area.
             assert!(off < 1e-5, "{light:?}: {}", photon.flux);
             assert!((photon.direction.length() - 1.0).abs() < 1e-6, "{light:?}");
         }
@@ -282,7 +282,7 @@ fn assert_even(name: &str, counts: &[u32]) {
     assert!(z.abs() < 4.5, "{name}: χ² {chi2} with {freedom} degrees of freedom, z {z}");
 }
 
-/// Index of the cell that contains a fraction, given `n` equal cells.
+/// Index of the cell that contains `share` if [0, 1] is divided into `n` equal cells.
 fn cell(share: f64, n: usize) -> usize {
     ((share * n as f64) as usize).min(n - 1)
 }
@@ -331,7 +331,7 @@ fn photon_directions_follow_the_intensity() {
             let turn = f64::from(y.atan2(x)) / TAU + 0.5;
             counts[cell(sum / sums[sums.len() - 1], 16) * 16 + cell(turn, 16)] += 1;
         }
-        assert_even(&format!("spot of {degrees}, {blend}"), &counts);
+        assert_even(&format!("spotlight with {degrees}°, blend {blend}"), &counts);
     }
 }
 
@@ -446,7 +446,7 @@ fn lights_without_falloff_emit_no_photons() {
 
 #[test]
 fn fully_aimed_photons_carry_the_target_power() {
-    // For the point light, `part` is the fraction of all directions covered by the target. For the sun, use
+    // For the point light, `part` is the fraction of all directions that the target covers. For the sun, use
     // the area of the target's disk.
     let ball = targets()[0];
     let of = |light: Light| {

@@ -14,7 +14,7 @@ pub struct LightBounds {
     pub center: DVec3,
     /// Radius of the bounding sphere.
     pub radius: f64,
-    /// Expected emission along the axes (positive), averaged over the color channels. In W·sr⁻¹, or as
+    /// Expected emission along the axes, averaged over the color channels. Always positive. In W·sr⁻¹, or an
     /// irradiance for lights without falloff.
     pub power: f64,
     /// Directions of emission.
@@ -113,7 +113,7 @@ impl LightBounds {
         ))
     }
 
-    /// Bounds that contain all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
+    /// The union of all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
     pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -146,8 +146,8 @@ fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     everywhere + 0.25 * (by_cosine + 3.0 * axes.length().min(by_cosine))
 }
 
-/// Reduces a color to a single number. All channels have the same weight because lights are chosen by their
-/// effect on all channels.
+/// Reduces a color to a single number. All channels have the same weight because the lights are picked for
+/// all channels together.
 pub fn mean_channel(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }

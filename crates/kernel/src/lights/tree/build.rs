@@ -52,8 +52,8 @@ impl LightLeaf {
 
 struct LightTreeBuilder<'a> {
     nodes: Vec<LightTreeNode>,
-    /// Unit of power. It is a power of two, so scaling by it is exact, and scaling the power of all lights by
-    /// a power of two does not affect picks.
+    /// Unit of power. It is a power of two, which makes scaling by it exact. Scaling the power of all lights
+    /// by a power of two therefore does not affect picks.
     unit: f64,
     /// Number of lights.
     leaves: u32,
@@ -88,7 +88,7 @@ impl LightTreeBuilder<'_> {
 }
 
 /// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
-/// possible to fill the nodes.
+/// possible, so that the nodes are full.
 fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
     token.check()?;
     if leaves.len() <= PACKET_SIZE {
@@ -134,7 +134,7 @@ impl LeafGroup {
     }
 }
 
-/// Sums over leaves, for computing the cost of a node.
+/// Sums over several leaves, used to compute the cost of a node.
 #[derive(Clone, Copy)]
 struct LeafSums {
     count: usize,

@@ -12,17 +12,17 @@ use super::{
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
 
-/// A cut for picking lights at successive points.
+/// A cut through a tree, for picking lights at successive points.
 pub struct LightTreeCut<'a> {
     tree: &'a LightTree,
-    /// Maximum number of nodes.
+    /// Maximum number of nodes in the cut.
     room: usize,
     receiver: Receiver,
-    /// Indices of the nodes.
+    /// Indices of the cut's nodes.
     nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
     /// Importance of each node's children. 0 for children that are also in the cut.
     importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
-    /// Cumulative importance up to and including each node.
+    /// Sum of the importance up to and including each node.
     sums: ArrayVec<f64, { LightTreeCut::MOST }>,
 }
 
@@ -49,7 +49,7 @@ impl<'a> LightTreeCut<'a> {
         }
     }
 
-    /// Moves the cut to a surface point.
+    /// Adapts the cut to a surface point.
     #[inline(always)]
     pub fn move_to(&mut self, receiver: &Receiver) {
         let tree = self.tree;
@@ -94,7 +94,7 @@ impl<'a> LightTreeCut<'a> {
     }
 
     /// Picks lights like [`LightTree::pick`], for numbers `u` in increasing order. `picked` receives the
-    /// index of each number, the light, and its probability.
+    /// index of each number, the picked light, and the light's probability.
     #[inline(always)]
     pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total();

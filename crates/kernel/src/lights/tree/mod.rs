@@ -42,7 +42,8 @@ pub struct LightPick {
     pub light: u32,
     /// Probability of picking the light.
     pub probability: f32,
-    /// Position of the random number within the light's subinterval of [0, 1), rescaled to [0, 1).
+    /// Random number in [0, 1) for further use: the position of the original number within the light's
+    /// subinterval.
     pub rest: f64,
 }
 
@@ -62,8 +63,8 @@ impl LightTree {
         }
     }
 
-    /// Picks a light below `node`. `pick` is the pick so far, and `way` caches the path of the previous pick
-    /// for the same point.
+    /// Picks a light from the subtree at `node`. `pick` is the pick so far, and `way` caches the path of the
+    /// previous pick for the same point.
     #[inline(always)]
     fn pick_below(
         &self,
@@ -96,7 +97,8 @@ impl LightTree {
         }
     }
 
-    /// Probability of the light at `place` in tree order, given the probability of an ancestor node.
+    /// Probability of picking the light at `place` in tree order, given the probability of reaching an
+    /// ancestor node.
     fn probability_below(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
@@ -133,7 +135,7 @@ impl LightTree {
     }
 }
 
-/// Number of levels of the previous path that are cached.
+/// Number of cached levels of the previous path.
 const LEVELS: usize = 3;
 
 /// The nodes on the previous pick's path, and the importance of their children. Successive picks for the same
@@ -154,7 +156,8 @@ struct CumulativeImportance([f64; PACKET_SIZE]);
 impl CumulativeImportance {
     const NONE: Self = Self([0.0; PACKET_SIZE]);
 
-    /// Computes prefix sums for all children at once, by adding the sums from 1, 2, 4, and 8 places earlier.
+    /// Computes prefix sums for all children at once, by repeatedly adding the sums that are 1, 2, 4, and 8
+    /// places earlier.
     #[inline(always)]
     fn new(importance: &F32x16) -> Self {
         let mut sums = [0.0; PACKET_SIZE];
@@ -198,7 +201,7 @@ impl CumulativeImportance {
     }
 }
 
-/// Adds to each number the number `STEP` places before it.
+/// To each number, adds the number that is `STEP` places before it.
 #[inline(always)]
 fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
     let mut before = [0.0; PACKET_SIZE];
@@ -209,8 +212,8 @@ fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZ
     before
 }
 
-/// Scales `u` in [0, 1) to a total. The result is always below the total, so rounding cannot go past the last
-/// interval.
+/// Scales `u` in [0, 1) to a total. The result is always below the total, so rounding never selects a
+/// position past the last interval.
 #[inline(always)]
 fn scale_to_total(u: f64, total: f64) -> f64 {
     clamp_below(u * total, total)

@@ -1,4 +1,4 @@
-//! Light tree nodes, which store the bounds on 16 children in SIMD form.
+//! Light tree nodes, which store bounds on their 16 children in SIMD layout.
 
 use super::bounds::{ConeEdge, DistanceFalloff, LightBounds};
 use crate::math::Vec3;
@@ -7,7 +7,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 /// A node with up to 16 children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightTreeNode {
-    /// Bounds of the children's positions and emission.
+    /// Bounds on the children's positions and emission.
     bounds: LightBoundsPacket,
     /// Whether all children have a position, inverse-square falloff, and emission in all directions (like
     /// point lights and spheres). If not, the general code path is used.
@@ -26,13 +26,13 @@ pub struct LightTreeNode {
 struct LightBoundsPacket {
     /// Centers of the bounding spheres.
     center: Vec3x16,
-    /// Radii of the bounding spheres, including rounding errors of the centers.
+    /// Radii of the bounding spheres, enlarged by the rounding errors of the centers.
     radius: F32x16,
     /// 1 if the sphere bounds positions, 0 if it bounds directions.
     is_place: F32x16,
     /// 1 for inverse-square falloff, otherwise 0.
     weakens: F32x16,
-    /// Power in units of approximately the entire tree's power. 0 in unused lanes.
+    /// Power as a fraction of approximately the entire tree's power. 0 in unused lanes.
     power: F32x16,
     /// 1 / (4 · radius).
     spread: F32x16,
@@ -41,7 +41,7 @@ struct LightBoundsPacket {
     /// Cosines of the cones' half angles.
     cos: F32x16,
     sin: F32x16,
-    /// Cosine of the angle between the cone and the direction where emission ends.
+    /// Cosine of the angle outside the cone at which emission ends.
     end: F32x16,
 }
 
@@ -91,10 +91,10 @@ pub enum NodeChild {
     LightTreeNode(u32),
 }
 
-/// Tolerance for rounding errors in cosine bounds, and minimum cosine in an importance.
+/// Tolerance for rounding errors in bounds on cosines. Also the minimum cosine used in an importance.
 const MIN_COSINE: f32 = 1e-3;
 
-/// Minimum and maximum importance of a child that may contribute.
+/// Minimum and maximum importance for a child that may contribute.
 const MIN_IMPORTANCE: f32 = 1e-36;
 const MAX_IMPORTANCE: f32 = 1e30;
 
@@ -126,7 +126,7 @@ pub struct ReceiverLobe {
 }
 
 impl Receiver {
-    /// A receiver with a known position and normal but an unknown glossy lobe.
+    /// Creates a receiver from its position and normal. The glossy lobe is unknown.
     #[inline(always)]
     pub fn without_lobe(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
@@ -155,7 +155,7 @@ struct LobePacket {
 }
 
 impl ReceiverPacket {
-    /// Receivers with known positions and normals but unknown glossy lobes.
+    /// Creates receivers from their positions and normals. The glossy lobes are unknown.
     #[inline(always)]
     pub fn without_lobe(point: &Vec3x16, normal: &Vec3x16) -> Self {
         Self { point: *point, normal: *normal, lobes: LobePacket::NONE }
@@ -210,7 +210,7 @@ impl LobePacket {
 /// Expected contributions of a node's children at a point.
 #[repr(align(64))]
 pub struct ExpectedContributions {
-    /// Importance in the tree's unit of power. 0 only if the child definitely contributes nothing.
+    /// Importance in the tree's unit of power. 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
     /// Squared sines of half the angles that the bounding spheres subtend. 1 for points inside a sphere.
     pub nearness: F32x16,
@@ -274,7 +274,7 @@ impl LightTreeNode {
     }
 }
 
-/// Importance of lights for receivers, one pair per lane.
+/// Importance of a light for a receiver in each lane.
 #[inline(always)]
 fn expected(
     bounds: &LightBoundsPacket,
@@ -366,8 +366,8 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     ExpectedContributions { importance, nearness }
 }
-/// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because square roots and
-/// divisions of 16 numbers would take longer than the rest of the node test.
+/// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
+/// divisions would take longer than the rest of the node test.
 #[inline(always)]
 fn inverse_roots(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {

@@ -76,7 +76,7 @@ impl SingleNodeImportance<'_> {
     pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> PacketPicks {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // Stay below the total to prevent rounding past the last child with nonzero importance.
+            // Stay below the total to avoid rounding past the last child with nonzero importance.
             let (target, last) = (u[i] * self.totals[i], largest_below(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
@@ -99,7 +99,7 @@ impl SingleNodeImportance<'_> {
         PacketPicks { children, lights, probabilities: self.shares(&values) }
     }
 
-    /// Probabilities of `picks`, given these importances.
+    /// Probabilities of `picks` with these importances.
     #[inline(always)]
     pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];

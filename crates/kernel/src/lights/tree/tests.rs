@@ -61,7 +61,7 @@ fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
     (vector(5.0), vector(1.0).normalize())
 }
 
-/// Cut size. Large enough for some of the trees, and too small for others.
+/// Size of the cuts, which is large enough for some of the trees and too small for others.
 const NODES: usize = 12;
 
 /// A cut for a point.
@@ -73,7 +73,7 @@ fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTr
     cut
 }
 
-/// Lights and probabilities from [`LightTreeCut::pick`], for each number.
+/// The light that [`LightTreeCut::pick`] picks for each number, and its probability.
 fn picks_of<const N: usize>(cut: &LightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
     cut.pick(u.iter().copied(), |place, light, probability| picks[place] = Some((light, probability)));
@@ -153,8 +153,8 @@ proptest! {
 
 #[test]
 fn spotlights_in_a_column_can_always_be_picked() {
-    // The lights form columns with one node each, and all point down. Points below some lights of a column
-    // may be above the center of the node.
+    // The lights form columns, and all of them point down. Each column is one node. Points below some lights
+    // in a column may be above the center of the node.
     let mut next = random::unit(8);
     let spot = |i: u32| {
         let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
@@ -237,7 +237,7 @@ fn pick_frequencies_match_probabilities() {
 
 #[test]
 fn noncontributing_lights_are_not_picked() {
-    // Lights below the floor, lights that face away, and spotlights that point away.
+    // Use lights below the floor, lights that face away, and spotlights that point away.
     let (point, normal) = (Vec3::ZERO, Vec3::Y);
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
     let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
@@ -265,13 +265,13 @@ fn noncontributing_lights_are_not_picked() {
         assert!(number % 5 > 2 || tree.probability(&Receiver::without_lobe(point, normal), number) == 0.0);
         sum += probability;
     }
-    // Nodes without contributing lights should have almost no probability.
+    // Nodes without contributing lights should be picked with almost no probability.
     assert!(sum > 0.7, "{sum}");
 }
 
 #[test]
 fn picks_are_proportional_to_irradiance() {
-    // Point lights directly above a floor: E = I/h².
+    // For point lights directly above a floor, E = I/h².
     let at = |height: f64, intensity: f32| {
         let position = DVec3::new(0.0, height, 0.0);
         Light::Point(PointLight { position, intensity: Vec3::splat(intensity), falloff: Falloff::Square })
@@ -413,7 +413,7 @@ fn packet_picks_match_single_picks() {
             }
         }
     }
-    assert!(picked > 3000, "only {picked} picks are equal");
+    assert!(picked > 3000, "only {picked} picks match");
     assert!(!tree_of(&lights_of(17, &mut next)).is_single_node());
 }
 

@@ -1,5 +1,5 @@
-//! Checks for microfacet lobes, used in the tests of each BSDF kind. Compares values with an `f64` reference,
-//! samples with pdfs, and albedos.
+//! Checks for microfacet lobes. The tests of each kind of BSDF use them. Compares values with an `f64`
+//! reference, samples with pdfs, and albedos.
 
 use crate::materials::bsdf::{LobeSet, ShownLobes, SideSamples};
 use crate::materials::bxdf::{Bxdf, SurfaceDirections};
@@ -10,23 +10,23 @@ use crate::math::{DVec3, Vec3};
 
 use std::f64::consts::{PI, TAU};
 
-/// The values of α to test.
+/// The tested values of α.
 pub const ALPHAS: [f32; 7] = [0.001, 0.004, 0.02, 0.05, 0.2, 0.5, 1.0];
 
-/// The view cosines to test.
+/// The tested view cosines.
 pub const COSINES: [f64; 5] = [0.05, 0.15, 0.4, 0.8, 1.0];
 
 /// Tangent of the test surfaces, along x.
 const TANGENT: Vec3 = Vec3::new(3.0, 0.0, 0.5);
 
-/// A unit direction from its cosine with z and its azimuth.
+/// Computes a unit direction from its cosine with the z axis and its azimuth.
 pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let (sin, cos) = libm::sincos(azimuth);
     DVec3::new(sine * cos, sine * sin, cosine)
 }
 
-/// D·G/(4 cosθᵢ cosθₒ) around z, with the formulas from the papers.
+/// D·G/(4 cosθᵢ cosθₒ) around the z axis, computed with the formulas from the papers.
 pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     let half = (one + other).normalize();
     let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
@@ -46,7 +46,7 @@ pub enum LitFrom {
     /// By refraction. Contains the index of refraction on the light's side divided by the index on the
     /// viewer's side.
     Refracted(f64),
-    /// Through the surface, in the mirrored direction of a reflection.
+    /// By transmission. The direction is that of a reflection, mirrored to the other side of the surface.
     Through,
 }
 
@@ -60,7 +60,7 @@ impl LitFrom {
     }
 }
 
-/// Packets of lobe choices and random numbers for `side` × `side` stratified samples.
+/// Returns packets of lobe choices and random numbers for `side` × `side` stratified samples.
 fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
     let mut next = random(5);
     (0..side * side).step_by(PACKET_SIZE).map(move |first| {
@@ -86,11 +86,11 @@ pub struct SideSample {
     pub density: f64,
     /// f·cosθ divided by the pdf.
     pub share: f64,
-    /// Whether the direction is on the opposite side from the packet's light.
+    /// Whether the direction and the packet's light are on opposite sides.
     pub is_beyond: bool,
 }
 
-/// A surface around z that is seen from a direction.
+/// A surface whose normal is the z axis, seen from a direction.
 pub struct Subject<B: Bxdf> {
     row: BxdfPacket<B>,
     to_eye: DVec3,
@@ -99,7 +99,7 @@ pub struct Subject<B: Bxdf> {
 }
 
 impl<B: Bxdf> Subject<B> {
-    /// A surface with the given material. `alphas` are the α values of its narrow lobe.
+    /// Creates a surface with a material. `alphas` are the α values of its narrow lobe.
     pub fn new(point: &B::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
         Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
     }
@@ -126,7 +126,7 @@ impl<B: Bxdf> Subject<B> {
         direction.z * self.light.side()
     }
 
-    /// f, the part of f from wide lobes, and the pdf, for light from the given directions.
+    /// f, the part of f from the wide lobes, and the pdf, for light from each direction.
     pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
@@ -254,8 +254,8 @@ impl<B: Bxdf> Subject<B> {
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
-    /// Directions above the surface and their solid angles, from half vectors in equal steps of y and
-    /// azimuth. (1 − y)² is the fraction of D outside a given angle, so the steps also cover the tail.
+    /// Directions above the surface and their solid angles, computed from half vectors with equal steps in y
+    /// and azimuth. (1 − y)² is the fraction of D outside a given angle, so the steps also cover the tail.
     fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
         (0..rings * steps).filter_map(move |i| {
             let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
@@ -308,7 +308,7 @@ impl<B: Bxdf> Subject<B> {
         [1.0 - 1.0 / (1.0 + slope2).sqrt(), libm::atan2(y, x).rem_euclid(TAU) / TAU]
     }
 
-    /// χ² test that compares samples with the pdf over cells of the half-vector map. The statistic must be at
+    /// χ² test that compares samples with the pdf in cells of the half-vector map. The statistic must be at
     /// most six standard deviations above its mean.
     pub fn check_samples(&self, what: &str, lobes: LobeSet) {
         const CELLS: u32 = 16;
@@ -329,7 +329,7 @@ impl<B: Bxdf> Subject<B> {
                 counts[number as usize] += 1.0;
             }
         }
-        // Integrate the pdf over each cell. The rest of the probability is below the surface.
+        // Integrate the pdf over each cell. The remaining probability is below the surface.
         let side = CELLS * fine;
         let part = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
         let places: Vec<(usize, DVec3, f64)> = (0..side * side)
@@ -459,8 +459,8 @@ pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
 }
 
 /// Checks that each lobe is bit-identical whether or not the other lobes are shown, and that the lobes add up
-/// to f. If they did not, the sum of the AOVs would differ from the beauty image, because rays in narrow
-/// lobes divide by small pdfs.
+/// to f. Otherwise, the sum of the AOVs would differ from the beauty image, because rays in narrow lobes
+/// divide by small pdfs.
 pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
     let mut next = random(7);
     for point in points {

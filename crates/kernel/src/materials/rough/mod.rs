@@ -30,7 +30,7 @@ use plastic::PlasticBxdf;
 use principled::PrincipledBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
-/// lists kinds that are entire materials. `parts` lists kinds that other materials use for a part of their
+/// lists kinds that are entire materials. `parts` lists kinds that other materials use for part of their
 /// light. `kept` is the type in which a [`BsdfRow`] stores a packet. The most common kind is stored inline.
 /// Others are boxed to keep packets small in scenes without them.
 macro_rules! kinds {
@@ -196,7 +196,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Changes the packet to a given kind, with unspecified contents.
+            /// Changes the packet to a different kind. Its contents are then unspecified.
             #[inline(always)]
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
@@ -381,7 +381,7 @@ kinds! {
     Principled(Box<Principled>, PrincipledBxdf<false>, kept: Box<BxdfPacket<PrincipledBxdf<false>>>),
     }
     parts {
-    /// Reflection at rough glass.
+    /// Reflection from rough glass.
     GlassReflection(DielectricBxdf<false>),
     /// Transmission through rough glass.
     GlassTransmission(DielectricBxdf<true>),
@@ -401,7 +401,7 @@ impl Rough {
 }
 
 impl RoughBsdf {
-    /// The BSDF for transmitted light, which has a different kind. `None` if no light is transmitted.
+    /// The BSDF for transmitted light. It has a different kind. `None` if no light is transmitted.
     #[inline(always)]
     pub fn behind(&self) -> Option<Self> {
         match self {
@@ -424,7 +424,7 @@ impl Default for BsdfRow {
 }
 
 impl BsdfRow {
-    /// Samples a direction for each surface, on either side, with the same random numbers as
+    /// Samples a direction on either side of each surface, using the same random numbers as
     /// [`BxdfPacket::sample`]. `None` for kinds that do not support this.
     #[inline(always)]
     pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {

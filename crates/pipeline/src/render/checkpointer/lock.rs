@@ -13,17 +13,19 @@ pub(crate) struct CheckpointLock {
     held: Option<File>,
     /// The checkpoint that was last written or reported as unused.
     told: Option<FileIdentity>,
-    /// The last request with a reported failure. Its later failures have the same cause and are not reported.
+    /// The last request for which a failure was reported. Later failures in the same request have the same
+    /// cause and are not reported.
     failed: Option<u64>,
 }
 
 impl CheckpointLock {
-    /// Keeps a file open that this process has written and locked.
+    /// Keeps a file open after this process has written and locked it.
     pub(super) fn keep_open(&mut self, path: &Path, file: Option<File>) {
         (self.held, self.told) = (file, FileIdentity::of(path));
     }
 
-    /// Locks a file left by a process that has ended. Does nothing if another process has locked it.
+    /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
+    /// file.
     pub(super) fn lock_abandoned(&mut self, path: &Path) {
         let Some(file) = open(path) else { return };
         match file.try_lock() {
@@ -50,7 +52,7 @@ impl CheckpointLock {
         !self.is_held_by_this_process(path) && open(path).is_some_and(is_locked)
     }
 
-    /// Records a failure. Returns whether it is the first failure of the request.
+    /// Records a failure. Returns whether it is the first one in the request.
     pub(super) fn record_first_failure(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
@@ -74,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn file_is_held_by_only_one_process() {
+    fn only_one_process_can_hold_a_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");

@@ -57,7 +57,7 @@ fn share_head(share: Option<&Shard>) -> PartShare {
     }
 }
 
-/// Extension appended when moving aside another render's checkpoint.
+/// Extension appended to another render's checkpoint when it is moved aside.
 const ASIDE: &str = ".before";
 
 /// Returns the checkpoint path for an output file.
@@ -67,7 +67,7 @@ pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
     name.into()
 }
 
-/// Context of a render with checkpoints.
+/// Context for rendering with checkpoints.
 #[derive(Clone, Copy)]
 pub(crate) struct CheckpointContext<'a> {
     pub(crate) finish: &'a DevelopSettings,
@@ -207,8 +207,8 @@ impl<'a> Checkpointer<'a> {
         Ok(true)
     }
 
-    /// Moves another render's checkpoint aside, unless this render includes all its samples. If another
-    /// checkpoint was moved aside before, keeps whichever has the longer render time.
+    /// Moves another render's checkpoint aside, unless this render includes all of its samples. If another
+    /// checkpoint was moved aside earlier, keeps the one with the longer render time.
     ///
     /// # Errors
     /// Returns why it cannot be moved, for example because another process holds it.
@@ -249,8 +249,7 @@ impl<'a> Checkpointer<'a> {
         self.move_aside(is_longer)
     }
 
-    /// Moves the checkpoint aside, unless `is_longer` returns true for a checkpoint that was moved aside
-    /// before.
+    /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
@@ -349,7 +348,7 @@ impl<'a> Checkpointer<'a> {
         is_kept && state.has_samples() && self.write(state, rays, seconds, Durability::Process)
     }
 
-    /// Checks whether this process has already saved a checkpoint of this render for an earlier request.
+    /// Checks whether this process has already saved a checkpoint of this render during an earlier request.
     pub(crate) fn check_already_saved(&self, state: &FilmState) {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         let is_own = is_held
@@ -358,7 +357,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Removes the checkpoint once the image has been written, or saves a final one if checkpoints are kept.
-    /// Also saves one if the image was not written, but the render was long or the process is being
+    /// If the image was not written, saves a checkpoint if the render was long or the process is being
     /// terminated.
     pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
@@ -375,7 +374,8 @@ impl<'a> Checkpointer<'a> {
             }
             (true, false) => {}
         }
-        // Keep the checkpoint if it belongs to another image or running process, or has more samples.
+        // Keep the checkpoint if it belongs to another image or to another running process, or if it has more
+        // samples.
         let is_done = |(head, there)| self.is_superseded(&head, &there, state, rays);
         let mut lock = self.around.lock.borrow_mut();
         let is_own = self.is_own.get() && lock.is_held_by_this_process(&self.path);
@@ -384,7 +384,7 @@ impl<'a> Checkpointer<'a> {
                 && read_valid_checkpoint(&self.path).is_some_and(is_done)
         {
             lock.release();
-            // It does not matter if the checkpoint cannot be removed.
+            // A failure to remove the checkpoint is harmless.
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -472,7 +472,7 @@ fn held_by_another_message(path: &Path) -> String {
     format!("another running glimt uses {}; name another file with -o", path.display())
 }
 
-/// Returns why a file is not used, without the file name.
+/// Returns the reason for not using a file, without the file name.
 fn rejection_reason(error: &PartError) -> String {
     match error {
         PartError::Other { differences, .. } => differences.join("; "),

@@ -10,7 +10,7 @@ use crate::render::film_state::{EarlierWork, FilmState};
 pub(super) struct State {
     /// Sample goals decided for both halves of each cell.
     goals: Vec<[u32; 2]>,
-    /// Sample count at which each tile's noise was last judged.
+    /// Sample count at which each tile's noise was last evaluated.
     judged: Vec<u32>,
     /// Reference brightness for relative noise.
     brightness: Option<f64>,
@@ -52,7 +52,7 @@ impl State {
         camera_rays
     }
 
-    /// Whether the numbers are plausible. Implausible numbers could overflow sums or keep a render from
+    /// Whether the numbers are plausible. Implausible numbers could overflow sums or prevent a render from
     /// ending.
     pub(super) fn is_plausible(&self) -> bool {
         /// Maximum plausible time: about 30,000 years.
@@ -75,7 +75,7 @@ impl State {
             && self.judged.len() == state.film.tile_count()
     }
 
-    /// Restores a film's state. Returns `None` and changes nothing if the size does not match.
+    /// Restores a film's state. If the size does not match, returns `None` without changing anything.
     pub(super) fn restore_into(self, state: &mut FilmState) -> Option<()> {
         if !self.fits(state) {
             return None;

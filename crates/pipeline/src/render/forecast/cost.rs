@@ -1,10 +1,10 @@
 //! Sample costs, predicted from earlier samples.
 
-/// Cost of the jobs in a cell. It consists of a cost per sample and an overhead per pixel and job.
+/// Cost of the jobs in a cell, consisting of a cost per sample and an overhead for each pixel in each job.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CellCost {
     seconds: f64,
-    /// Sum of pixels times samples.
+    /// Number of samples, summed over all pixels.
     units: f64,
     /// Total number of pixels in all jobs.
     pixels: f64,
@@ -42,7 +42,7 @@ impl CellCost {
         self.seconds
     }
 
-    /// The cell's cost expressed in samples, including the pixel overhead.
+    /// The cell's cost as an equivalent number of samples, including the pixel overhead.
     pub(crate) fn equivalent_samples(&self, share: PixelOverhead) -> f64 {
         share.equivalent_samples(self.units, self.pixels)
     }
@@ -51,15 +51,16 @@ impl CellCost {
 /// Per-pixel overhead of a job, in addition to the cost of its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelOverhead {
-    /// Sum of the numerators of b, the overhead of a pixel in samples. If a cell takes s' seconds for n'
-    /// samples, then s seconds for n > n' samples, s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s − s').
+    /// Sum of the numerators for estimating b, the overhead per pixel in samples. If n' samples in a cell
+    /// take s' seconds and n > n' samples take s seconds, then s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s
+    /// − s').
     of_pixels: f64,
-    /// Sum of the denominators of b. See `of_pixels` for its definition.
+    /// Sum of the denominators for estimating b, which is defined at `of_pixels`.
     of_samples: f64,
 }
 
 impl PixelOverhead {
-    /// Maximum overhead of a pixel, in samples.
+    /// Maximum overhead per pixel, in samples.
     const MOST: f64 = 4.0;
 
     fn record(&mut self, before: Option<JobCost>, now: JobCost) {
@@ -117,7 +118,7 @@ mod tests {
     #[test]
     fn jobs_of_different_sizes_are_not_compared() {
         let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
-        // A cell, then half of it with twice the samples.
+        // The first job covers a cell, and the second covers half of it with twice the samples.
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
             cell.record(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
         }

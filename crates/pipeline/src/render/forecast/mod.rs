@@ -29,17 +29,17 @@ use crate::scene::description::Render;
 use crate::stages::photons::PhotonStore;
 use crate::trace::remaining_jobs;
 
-/// Estimating the remaining work, which is a sum over all cells, may take at most `1/EXPECTATION_SHARE` of
-/// the time.
+/// Estimating the remaining work requires a sum over all cells, which may take at most `1/EXPECTATION_SHARE`
+/// of the time.
 const EXPECTATION_SHARE: u32 = 100;
 
 /// The most recent estimate of the total work.
 struct WorkEstimate {
-    /// When to compute the next estimate.
+    /// Time of the next estimate.
     due: Instant,
     /// CPU seconds for the whole render. `None` while the end is unknown.
     total: Option<f64>,
-    /// Photon passes so far and in total.
+    /// Current and total number of photon passes.
     passes: [u32; 2],
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct Forecast {
     expectation: WorkEstimate,
     /// Last reported fraction.
     fraction: f64,
-    /// Expected total number of pixels times samples.
+    /// Expected final number of samples, summed over all pixels.
     total_units: u64,
     /// Seconds spent on photons.
     photon_seconds: f64,
@@ -65,9 +65,9 @@ pub(crate) struct RenderSnapshot<'a> {
     pub(crate) photons: Option<&'a PhotonStore>,
     /// Seconds since the render stage started, excluding pauses.
     pub(crate) elapsed_seconds: f64,
-    /// Number of pixels times samples so far.
+    /// Number of samples so far, summed over all pixels.
     pub(crate) units: u64,
-    /// Whether some pixels have no sample.
+    /// Whether any pixels lack samples.
     pub(crate) is_first: bool,
     /// Whether the render is over.
     pub(crate) is_last: bool,
@@ -142,8 +142,8 @@ impl Forecast {
         }
     }
 
-    /// Returns the work done so far and the total work. With a noise target, the total is unknown until the
-    /// noise has been judged.
+    /// Returns the current and the total amount of work. With a noise target, the total is unknown until the
+    /// noise has been evaluated.
     fn work(&mut self, moment: &RenderSnapshot<'_>) -> Work {
         if Instant::now() >= self.expectation.due {
             self.expectation = estimate_work(moment);

@@ -7,7 +7,8 @@ use crate::film::{Film, ImageNoise};
 use crate::protocol::NoiseProgress;
 use crate::render::noise_goals::LEAST;
 
-/// Minimum time before the first measurement and between measurements. Each measurement is a sum over all pixels.
+/// Minimum time before the first measurement and between measurements, each of which requires a sum over all
+/// pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Minimum ratio of the current noise to the next reported level.
 const STEP: f64 = 1.5;
@@ -23,7 +24,7 @@ pub(crate) struct NoiseForecast {
 #[derive(Clone, Copy, Debug)]
 struct NoiseMeasurement {
     noise: ImageNoise,
-    /// Work done when the noise was measured.
+    /// Amount of work done when the noise was measured.
     done: f64,
     /// Seconds from the start of the stage to the measurement.
     seconds: f64,
@@ -43,8 +44,8 @@ impl NoiseForecast {
         self.due = Instant::now() + INTERVAL;
     }
 
-    /// Returns the last measured noise and its predicted decrease. `rate` is the work per second, and `left`
-    /// the seconds until the end. Returns `None` before the first measurement.
+    /// Returns the last measured noise and its predicted decrease. `rate` is the work done per second, and
+    /// `left` is the number of seconds until the end. Returns `None` before the first measurement.
     pub(crate) fn progress(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
         let NoiseMeasurement { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
         // Returns the fraction of the noise that remains with `times` times as many samples.
@@ -55,8 +56,8 @@ impl NoiseForecast {
     }
 }
 
-/// Returns the next lower round noise level and the seconds until it is reached. Returns `None` if the render
-/// ends before that.
+/// Returns the next lower round noise level and the number of seconds until it is reached. Returns `None` if
+/// the render ends before that.
 fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Option<(f64, f64)> {
     let Work { done, aside: [aside, _], .. } = work;
     let level = level_below(by_now / STEP);
@@ -66,7 +67,7 @@ fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Opti
     (level > 0.0 && seconds <= left).then_some((level, seconds))
 }
 
-/// Returns the largest value of the series …, 1, 2, 5, 10, … % that does not exceed `most`.
+/// Returns the largest value in the series …, 1, 2, 5, 10, … % that does not exceed `most`.
 fn level_below(most: f64) -> f64 {
     if !(most > 0.0) {
         return 0.0;

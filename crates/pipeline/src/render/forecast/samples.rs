@@ -1,10 +1,10 @@
-//! Predicts how many samples each part of the image needs to reach the noise target. Predictions are needed
-//! only until a part's goal is decided.
+//! Predicts how many samples each part of the image needs to reach the noise target. Each prediction is
+//! needed only until the part's goal is decided.
 
 use crate::film::{CELLS, Convergence, samples_to_reduce_error};
 use crate::render::noise_goals::{AIM, LEAST, MOST, NoiseMeasurements, SampleGoals, TileNoise};
 
-/// Factor by which the variance is assumed to decrease from two to four samples and from four to eight. This
+/// Assumed factor by which the variance decreases from two to four samples and again from four to eight. This
 /// is the median over all tiles in the bundled scenes.
 const EARLY_FALL: f64 = 4.0;
 /// Range to which measured decreases in variance are clamped.
@@ -25,7 +25,7 @@ impl ExpectedSamples {
         self.0[cell][half]
     }
 
-    /// Memory used, in bytes.
+    /// Returns the memory used, in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.0.as_slice())
     }
@@ -69,11 +69,11 @@ impl ExpectedSamples {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct NoiseDecay {
     samples: u32,
-    /// Number of sample doublings that each reduce the variance by a factor of `fall`. After these, `power`
+    /// Number of sample doublings that each reduce the variance by a factor of `fall`. After them, `power`
     /// applies.
     doublings: u32,
-    /// Ratio of variances before and after the last doubling of samples, for all tiles. `None` below
-    /// [`LEAST`] samples, in which case each tile uses its own ratio.
+    /// Ratio of the variances before and after the last doubling of samples, for all tiles. `None` below
+    /// [`LEAST`] samples, where each tile uses its own ratio.
     fall: Option<f64>,
     /// Exponent p. After the doublings, the variance is proportional to the number of samples to the power
     /// −p.
@@ -149,9 +149,9 @@ mod tests {
 
     #[test]
     fn few_samples_suffice_for_a_prediction() {
-        // The target takes 833 independent samples with a standard deviation of √(1/12). Two samples do not
-        // show that the noise decreases slowly, but each doubling improves the prediction. The expected
-        // predictions are 80, 190 and 260. With 64 pixels, their error is about 20 %.
+        // Reaching the target takes 833 independent samples with a standard deviation of √(1/12). After two
+        // samples, the slow decrease in noise is not yet apparent, but each doubling improves the prediction.
+        // The expected predictions are 80, 190 and 260. With 64 pixels, their error is about 20 %.
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
             let (goals, expected_samples) = judged([(1.0, 1.0); 2], samples, 0.01);
             assert_eq!(goals.of(0, 0), u32::MAX, "no goal should be decided");
@@ -176,9 +176,9 @@ mod tests {
                 "{falls:?}"
             );
         }
-        // Predict the sample counts at which noise is half or a quarter of its value at 64 samples. The
-        // variance decreases by a factor of 4 in the first doubling and 2.7 in later ones, or as with
-        // independent samples.
+        // Predict the sample counts at which the noise is a half and a quarter of its value at 64 samples.
+        // The variance decreases either by a factor of 4 in the first doubling and 2.7 in later ones, or as
+        // it does with independent samples.
         let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
         assert!(near(of(&[4.0]).samples_to_reach(0.5, 1.0, None), 128.0));
         assert!(near(of(&[4.0]).samples_to_reach(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));

@@ -19,7 +19,7 @@ pub(crate) struct Work {
     pub(crate) done: f64,
     /// Total work. `None` if unknown.
     pub(crate) total: Option<f64>,
-    /// Seconds spent on other activities so far, and expected further seconds.
+    /// Seconds spent on other activities so far, and seconds expected to be spent on them in the future.
     pub(crate) aside: [f64; 2],
 }
 
@@ -34,7 +34,7 @@ impl WorkRate {
         self.rate
     }
 
-    /// Returns the fraction done, which never decreases, and the remaining seconds if the rate is known.
+    /// Returns the completed fraction, which never decreases, and the remaining seconds if the rate is known.
     pub(crate) fn at(&mut self, seconds: f64, work: Work) -> (f64, Option<f64>) {
         let Work { done, total, aside: [aside, aside_to_come] } = work;
         let seconds = seconds - aside;
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn time_for_other_activities_is_separate() {
+    fn eta_includes_time_for_other_activities() {
         // Two seconds are spent on other activities and one second on the first 100 of 400 units of work.
         let mut pace = WorkRate::new(0.0);
         let work = Work { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };

@@ -28,7 +28,7 @@ impl TableKey<'_> {
         self.color_f64(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
 
-    /// Reads a color in double precision, for values that `f32` would round to 0 or 1.
+    /// Reads a color in double precision, because `f32` would round some values to 0 or 1.
     pub(in super::super) fn color_f64(&self, limits: Limits) -> Option<DVec3> {
         self.color_in_limits(limits, COLOR)
     }
@@ -54,7 +54,7 @@ impl TableKey<'_> {
         texture
     }
 
-    /// Reads emitted radiance: a non-negative color, or a texture with a scale.
+    /// Reads emitted radiance: a non-negative color, or a texture with a scale factor.
     pub(in super::super) fn emission(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
@@ -106,8 +106,8 @@ impl TableKey<'_> {
         None
     }
 
-    /// Whether the value looks like a color in 0–255. If so, reports `issue` at the value's span and suggests
-    /// the equivalent `#rrggbb`.
+    /// If the value looks like a color with components from 0 to 255, reports `issue` at the value's span and
+    /// suggests the equivalent `#rrggbb`. Returns whether it does.
     pub(in super::super) fn rejects_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
         let (Some(span), Some(color)) = (self.span(), self.suggested_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
@@ -115,7 +115,8 @@ impl TableKey<'_> {
         true
     }
 
-    /// Converts one or three integers up to 255 to `#rrggbb` if any is too large for a linear component.
+    /// Converts one or three integers up to 255 to `#rrggbb`, if any of them is too large for a linear
+    /// component.
     fn suggested_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
             TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),

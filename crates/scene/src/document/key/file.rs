@@ -16,11 +16,11 @@ impl TableKey<'_> {
     /// Reads the path of an existing file and resolves it against the scene's folder. The file must have one
     /// of the extensions `endings`, unless the list is empty.
     pub(in super::super) fn file(&self, endings: &[&str]) -> Option<Located<PathBuf>> {
-        let text = self.text("the path of a file")?;
+        let text = self.text("a file path")?;
         let span = self.span()?;
         if text.is_empty() {
             self.context
-                .report(Issue::error(span, format!("`{}` is empty; expected the path of a file", self.name)));
+                .report(Issue::error(span, format!("`{}` is empty; expected a file path", self.name)));
             return None;
         }
         if !endings.is_empty() && !self.check_extension(text, endings) {
@@ -44,7 +44,7 @@ impl TableKey<'_> {
         Some(Located { value: path, span })
     }
 
-    /// Checks the extension of a path, and reports an error if it is wrong.
+    /// Checks a path's extension and reports an error if it is wrong.
     pub(in super::super) fn check_extension(&self, text: &str, endings: &[&str]) -> bool {
         let ending = lowercase_extension(text);
         if endings.contains(&ending.as_str()) {
@@ -66,18 +66,19 @@ impl TableKey<'_> {
     }
 }
 
-/// The path of a suggested file in the form used in the scene, relative to the scene's folder.
+/// Returns a suggested file's path as written in scenes: relative to the scene's folder.
 fn relative_to_scene(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
 
-/// The extension of a path in lower case, possibly empty.
+/// Returns a path's extension in lowercase, or an empty string.
 fn lowercase_extension(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// Checks that a file is a regular file. The error contains a message and whether the file is missing.
+/// Checks that a file is a regular file. The error contains a message, and a flag that is set if the file is
+/// missing.
 fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {

@@ -43,7 +43,7 @@ pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Sha
     Some(Shape::Mesh(Mesh { file: files.add_file(file?, part?), placed: placed?, smooth, vertex_colors }))
 }
 
-/// Reads the index of a part in a glTF file.
+/// Reads the index of a glTF part.
 fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
@@ -56,7 +56,7 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> 
     number
 }
 
-/// Reads `matrix`, or `scale`, `rotate` and `translate`.
+/// Reads either `matrix`, or `scale`, `rotate` and `translate`.
 fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     let (matrix, steps) =
         (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
@@ -77,8 +77,8 @@ fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     })
 }
 
-/// Minimum ratio of a matrix's determinant to the product of its column lengths. Below this ratio, the matrix
-/// is singular up to rounding.
+/// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
+/// ratio is singular up to rounding.
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 /// Reads an invertible affine transform in row-major order.

@@ -1,4 +1,4 @@
-//! Reads shapes, with one file per kind.
+//! Reads shapes. Each kind has its own module.
 
 mod boxes;
 mod cone;
@@ -22,10 +22,10 @@ use super::table::TableReader;
 use crate::math::DVec3;
 use mesh::MeshFiles;
 
-/// Function that reads a shape's table. Only meshes use the list of files.
+/// A function that reads a shape's table. Only meshes use the list of mesh files.
 type ShapeReader = fn(&TableReader<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// Table name and reader of each kind of shape. [`read`] sorts the objects into file order.
+/// Table name and reader for each kind of shape. [`read`] sorts the objects into file order.
 const KINDS: [(&str, ShapeReader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -90,7 +90,7 @@ fn read_object(
     Some(Object { shape, material, name: name?, span: table.span.clone() })
 }
 
-/// Reads a direction with any nonzero length. Errors refer to the shape or light as `what`.
+/// Reads a direction of any nonzero length. Error messages call the shape or light `what`.
 pub(super) fn read_direction(
     table: &TableReader<'_>,
     name: &'static str,
@@ -139,8 +139,8 @@ fn read_length(table: &TableReader<'_>, name: &'static str, default: f64) -> Opt
     if key.is_present() { key.number(table.limits(name)) } else { Some(default) }
 }
 
-/// Whether two edges span an area: both are nonzero, and the sine of the angle between them exceeds rounding
-/// errors.
+/// Whether two edges span an area: both are nonzero, and the sine of the angle between them is larger than
+/// rounding errors.
 fn edges_span_area(u: DVec3, v: DVec3) -> bool {
     const MIN_SINE: f64 = 1e-10;
     match (u.try_normalize(), v.try_normalize()) {

@@ -22,7 +22,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
         let span = wrong.or(u_key.span())?;
         let issue = Issue::error(span, format!("the quad {NO_AREA}"))
             .label("`u` and `v` are parallel, or one of them is 0")
-            .help("give two edges in different directions");
+            .help("use two edges in different directions");
         table.context.report(issue);
         return None;
     }

@@ -17,7 +17,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     if tube >= radius {
         let issue = Issue::error(table.optional("tube").span()?, "the torus intersects itself")
             .label(format!("`tube` must be less than `radius` = {radius}"))
-            .help("`radius` is measured to the middle of the tube, `tube` from there to the surface");
+            .help("`radius` is measured to the middle of the tube, and `tube` from there to the surface");
         table.context.report(issue);
         return None;
     }

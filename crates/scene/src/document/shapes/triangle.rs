@@ -27,7 +27,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
         let span = keys.iter().rev().find_map(TableKey::span)?;
         let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
             .label("`a`, `b` and `c` are collinear")
-            .help("give three points that are not collinear");
+            .help("use three points that are not collinear");
         table.context.report(issue);
         return None;
     }

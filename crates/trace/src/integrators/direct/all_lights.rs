@@ -64,7 +64,7 @@ pub struct ReflectedLight {
 pub struct LightSums {
     /// Unoccluded reflected light.
     pub light: Vec3x16,
-    /// Reflected light ignoring occlusion.
+    /// Reflected light, ignoring occlusion.
     pub total: F32x16,
     pub rays: LightRayCounts,
 }
@@ -126,7 +126,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 Shadows::Hard => light.center().is_some(),
                 Shadows::Off => true,
             };
-            // Take one sample if only one is possible, and otherwise the requested number of samples.
+            // If only one sample is possible, take one. Otherwise, take the requested number.
             let is_single = light.is_single_direction();
             let count = if is_single { 1 } else { render.shadow_samples };
             if !is_single && sampler.is_none() {

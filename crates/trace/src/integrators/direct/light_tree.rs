@@ -36,7 +36,7 @@ struct LightPicks {
     lights: [u32; PACKET_SIZE],
     /// Reciprocal of the expected sample count for each vertex's light, or 0 if no light was picked.
     shares: F32x16,
-    /// Like `shares` but ignoring glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
+    /// Like `shares`, but without glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
     /// when a ray hits the light.
     weighed: F32x16,
 }
@@ -98,8 +98,8 @@ impl LightPicks {
         }
     }
 
-    /// Returns the lights and the mask of vertices that picked a light. The light of any other vertex is
-    /// arbitrary and has no effect.
+    /// Returns the lights and the mask of vertices that picked a light. Lights in the other lanes are
+    /// arbitrary and have no effect.
     #[inline(always)]
     fn lights(&self) -> ([u32; PACKET_SIZE], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
@@ -114,12 +114,12 @@ impl LightPicks {
     }
 }
 
-/// Scale factor for the second random number in a pair. It appends the second number's digits to the first
-/// number's digits.
+/// Scale factor for the second random number in a pair. With this factor, the second number's digits are
+/// appended to the first number's digits.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
-    /// Picks lights at each vertex for the given samples.
+    /// Picks lights at each vertex for a range of samples.
     #[inline(always)]
     fn pick_lights(
         &self,
@@ -236,7 +236,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Narrow lobe of a vertex, relative to the wide lobes.
+    /// Narrow lobe at a vertex, with its strength relative to the wide lobes.
     #[inline(always)]
     fn receiver_lobe(&self, i: usize) -> Option<ReceiverLobe> {
         let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
@@ -277,7 +277,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (mut values, active, response) = self.contributions(&samples, 1.0, simd);
         let active = active & used;
         if MIS {
-            // Each group of picks has its own pdf, and each group competes with all requested BSDF samples.
+            // Each group of picks has its own pdf and competes with all requested BSDF samples.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
             values = self.competing.apply_mis_weights(

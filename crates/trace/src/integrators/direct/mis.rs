@@ -26,7 +26,7 @@ pub enum CompetingTechnique {
 }
 
 impl CompetingTechnique {
-    /// Lobe rays at the vertices in `sharp`, or no technique if the mask is 0.
+    /// Lobe rays at the vertices in `sharp`. No technique if the mask is 0.
     pub fn lobes(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
@@ -133,7 +133,8 @@ impl TileContext<'_> {
         )
     }
 
-    /// Like [`TileContext::infinite_light`], given the environment's radiance and light-sampling pdf.
+    /// Like [`TileContext::infinite_light`], with the environment's radiance and light-sampling pdf already
+    /// evaluated.
     pub fn infinite_light_with_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
@@ -151,7 +152,7 @@ impl TileContext<'_> {
         self.infinite_radiance_of(None, ray, normal, pdf)
     }
 
-    /// Like [`TileContext::infinite_radiance`], but restricted to light `number` if it is not `None`.
+    /// Like [`TileContext::infinite_radiance`], but restricted to light `number`, unless it is `None`.
     pub fn infinite_radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
         let sky =
             self.world.lights.environment().map(|environment| environment.radiance_and_pdf(ray.direction));
@@ -160,8 +161,8 @@ impl TileContext<'_> {
         self.weighted_infinite_light((number, sky), ray, normal, |of_light| power_heuristic(of_light / pdf))
     }
 
-    /// Weighted radiance of infinite lights along a ray that leaves the scene from a surface with this
-    /// normal. `only` restricts the result to one light. `sky` contains the environment's radiance and
+    /// Weighted radiance of infinite lights along a ray from a surface with this normal that leaves the
+    /// scene. `only` restricts the result to one light. `sky` contains the environment's radiance and
     /// light-sampling pdf. `share` maps each light's sampling pdf to its weight.
     fn weighted_infinite_light(
         &self,

@@ -2,10 +2,10 @@
 //! samples.
 //!
 //! - `queue`: packets of vertices that await direct lighting, and the light they reflect.
-//! - `all_lights`: samples of every light. `light_tree`: samples of lights picked from a tree. `shadow_rays`:
-//!   shadow rays to the picked lights, grouped by light.
+//! - `all_lights`: sampling of every light. `light_tree`: sampling of lights picked from a tree.
+//!   `shadow_rays`: shadow rays to the picked lights, grouped by light.
 //! - `lobe_rays`: rays in narrow lobes. `unshadowed`: lobe rays without soft shadows.
-//! - `mis`: MIS weights of light samples, lobe rays and paths.
+//! - `mis`: MIS weights for light samples, lobe rays and paths.
 
 pub mod all_lights;
 pub mod light_tree;

@@ -34,16 +34,16 @@ pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
     /// Number of packets in use. The remaining packets are kept for reuse.
     count: usize,
-    /// Index of the packet to which single vertices are added, for each combination of BSDF kind, dark or
-    /// lit, and one-sided or two-sided. The packet may be full or unused.
+    /// Index of the packet to which single vertices are added, for each combination of BSDF kind, darkness,
+    /// and number of sides. The packet may be full or unused.
     open: [[usize; RoughKind::ALL.len()]; 4],
     /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
-    /// Media of the vertices.
+    /// Media at the vertices.
     interior_lists: InteriorLists,
     /// Shadow rays of several packets.
     pool: ShadowRayQueue,
-    /// Ray cones at the vertices of this bounce's paths, if they are used.
+    /// Ray cones at the vertices of this bounce's paths. Empty if ray cones are not used.
     cones: Vec<RayCone>,
 }
 
@@ -146,7 +146,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// Queues a vertex for direct lighting.
+    /// Adds a vertex to the queue for direct lighting.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -203,8 +203,8 @@ impl DirectLightQueue {
 
     /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
     /// traced. `gather` returns the light that another technique adds at a packet. Rays of continuing paths
-    /// are added to `next`. `continuation` determines how paths continue. Without it, they continue only in
-    /// microfacet lobes. `depth` is the number of bounces so far.
+    /// are added to `next`. `continuation` determines how paths continue. Without `continuation`, they
+    /// continue only in microfacet lobes. `depth` is the number of bounces so far.
     pub fn compute_direct_light(
         &mut self,
         tile: &TileContext<'_>,
@@ -300,7 +300,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// The media of a packet's vertices. `None` if all are in air.
+    /// Media at a packet's vertices. `None` if all vertices are in air.
     fn interiors_of(&self, row: &VertexBatch) -> Option<&InteriorLists> {
         (!self.interior_lists.are_air() && row.is_in_glass()).then_some(&self.interior_lists)
     }
@@ -405,7 +405,7 @@ fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
 /// Request to compute direct lighting at a packet of vertices.
 #[derive(Clone, Copy)]
 struct DirectLightRequest {
-    /// The index of the packet.
+    /// Index of the packet.
     number: usize,
     /// Mask of vertices for which to compute direct lighting.
     used: u32,
@@ -413,7 +413,7 @@ struct DirectLightRequest {
     shares_with_paths: bool,
 }
 
-/// Moves a packet's shadow-ray origins above their facets if the segments from the facets are unoccluded.
+/// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
 struct LiftOrigins<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,

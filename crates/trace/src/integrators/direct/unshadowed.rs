@@ -1,6 +1,6 @@
 //! Light reflected by narrow lobes without soft shadows: the light from every emitter along a lobe ray,
-//! ignoring occluders. For hard shadows, one ray to the center of each light determines the light's
-//! transmittance.
+//! ignoring occluders. For hard shadows, one ray to the center of each light determines the transmittance to
+//! the light.
 
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
@@ -60,7 +60,7 @@ impl UnshadowedLobeRay<'_> {
         sum
     }
 
-    /// The fraction of a light that is not occluded.
+    /// Unoccluded fraction of a light.
     fn unoccluded_fraction(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
             Shadows::Off => return Vec3::ONE,

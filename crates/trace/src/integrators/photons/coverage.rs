@@ -1,6 +1,7 @@
-//! Closed form for the coverage p of a kernel: the fraction of the kernel that receives photons. Surfaces are
+//! Closed form for a kernel's coverage p: the fraction of the kernel that receives photons. Surfaces are
 //! included if they have about the same normal as the center and are not occluded from it. The closed form
-//! exists for a few flat pieces. All other cases are estimated by trials.
+//! exists if these surfaces are a few flat pieces. In all other cases, the coverage is estimated with random
+//! trials.
 
 use arrayvec::ArrayVec;
 
@@ -16,7 +17,7 @@ use crate::world::{Hit, MeshInstance, Object, World};
 /// Coverage of a kernel, which is reduced by edges and walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KernelCoverage {
-    /// Fraction of the kernel's weight, if there is no occlusion within the kernel.
+    /// The covered fraction of the kernel's weight. Nothing is occluded within the kernel.
     Fraction(f32),
     /// Unknown because edges or walls are nearby.
     Clipped,
@@ -139,7 +140,7 @@ impl KernelNeighborhood {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
 
-    /// Computes the kernel's weight over the pieces, or `None` if a wall separates the pieces or if they
+    /// Returns the kernel's weight over the pieces, or `None` if a wall separates the pieces or if they
     /// overlap.
     fn coverage(&self) -> Option<f64> {
         if !self.walls.is_empty() && self.whole > 0 {
@@ -190,8 +191,8 @@ impl KernelNeighborhood {
         is_crowded: &mut bool,
     ) -> bool {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
-        // Trees visit some triangles twice, and also triangles that are close but outside the box. Skip both
-        // so that the result does not depend on the tree.
+        // Trees may visit a triangle twice, and may also visit nearby triangles outside the box. Skip both so
+        // that the result does not depend on the tree.
         let is_exact = mesh.visit_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known

@@ -46,7 +46,7 @@ pub struct PhotonTracing<'a> {
     pub tile: &'a TileContext<'a>,
     /// Photon source, which represents all lights.
     pub emission: &'a PhotonSource,
-    /// Closed glass shapes that may contain lights, and the materials of these shapes.
+    /// Closed glass shapes that may contain lights, with their materials.
     pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
     pub bodies: &'a [CompoundSolid],
@@ -68,7 +68,7 @@ pub struct PhotonChunk {
 }
 
 impl PhotonTracing<'_> {
-    /// Traces the photons.
+    /// Traces this chunk's photons.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
@@ -338,8 +338,8 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is `Some`, a
-    /// caustic photon is also scattered, with its flux multiplied by this number.
+    /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is
+    /// `Some(factor)`, a caustic photon is also scattered, with its flux multiplied by the factor.
     fn shade_rough(
         &mut self,
         path: &PathRay,
@@ -354,7 +354,7 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Like [`PhotonWavefront::shade_rough`], given the BSDF.
+    /// Like [`PhotonWavefront::shade_rough`], with the BSDF already evaluated.
     fn store_and_scatter(
         &mut self,
         path: &PathRay,

@@ -20,7 +20,7 @@ use crate::world::SimdKernel;
 /// photon lookups at them contribute little noise.
 const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
-/// Probability of looking up bounced photons at a vertex that the camera sees. Their light is weak and
+/// Probability of looking up bounced photons at a vertex that the camera sees. Bounced light is weak and
 /// smooth.
 const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
@@ -30,7 +30,7 @@ pub struct GatherPhotons<'a> {
     pub tile: &'a TileContext<'a>,
     /// The vertices.
     pub row: &'a VertexBatch,
-    /// Photon maps of the samples.
+    /// Photon maps for the samples.
     pub maps: &'a PhotonMaps,
     /// Number of path bounces before the vertices.
     pub depth: u32,
@@ -87,8 +87,9 @@ impl SimdKernel for GatherPhotons<'_> {
     }
 }
 
-/// Factor for the light in a kernel, given one of the kernel's photons. If the coverage p is known, the
-/// factor is 1/p. Otherwise, it is 0 if the photon is occluded and an estimate of 1/p if not.
+/// Coverage correction factor for the light in a kernel. `photon` is one of the kernel's photons. If the
+/// coverage p is known, the factor is 1/p. Otherwise, it is 0 if the photon is occluded and an estimate of
+/// 1/p if it is not.
 #[inline(never)]
 fn coverage_factor(
     tile: &TileContext<'_>,
@@ -113,7 +114,7 @@ fn coverage_factor(
     }
 }
 
-/// Light that a vertex reflects from a map's photons toward the viewer, and one of these photons.
+/// Light from a map's photons that a vertex reflects toward the viewer, and one of these photons.
 #[inline(always)]
 fn kernel_sum(
     (row, i): (&VertexBatch, usize),

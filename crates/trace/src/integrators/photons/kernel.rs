@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_2_PI;
 use crate::math::elementary::atan2;
 use crate::math::{DVec2, Vec2};
 
-/// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon, given its corners in order. It is 1 if the
-/// polygon contains the disk.
+/// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon whose corners are specified in order. It is 1
+/// if the polygon contains the disk.
 pub fn polygon_weight(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
@@ -85,7 +85,7 @@ mod tests {
             let exact = 8.0 / (3.0 * std::f64::consts::PI) * (0..steps).map(at).sum::<f64>() * step;
             let far = [(d, -9.0), (40.0, -9.0), (40.0, 9.0), (d, 9.0)].map(|(x, y)| DVec2::new(x, y));
             let weight = polygon_weight(&far);
-            assert!((weight - exact).abs() < 1e-6, "{d}: got {weight}, expected {exact}");
+            assert!((weight - exact).abs() < 1e-6, "distance {d}: got {weight}, expected {exact}");
             let mut mirrored = far;
             mirrored.reverse();
             assert_eq!(polygon_weight(&mirrored), weight, "for either orientation");

@@ -58,7 +58,7 @@ pub struct PhotonMap {
     count: usize,
     blocks: Vec<PhotonBlock>,
     depths: Vec<[u32; PACKET_SIZE]>,
-    /// Maximum depth of the photons.
+    /// Maximum number of bounces of any stored photon.
     most_depth: u32,
 }
 
@@ -388,7 +388,7 @@ impl PhotonBlock {
     }
 }
 
-/// Blocks of a nonempty range.
+/// Blocks that contain a nonempty range of photons.
 #[inline(always)]
 fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn kernel_sums_to_one_and_limits_depth() {
+    fn kernel_sums_to_one_and_excludes_deep_photons() {
         // Each photon on a fine grid represents one cell's area.
         let step = 0.01_f32;
         let at = |i: i32| (i as f32 + 0.3) * step;

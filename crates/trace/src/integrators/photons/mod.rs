@@ -88,7 +88,7 @@ pub struct Photons {
     glasses: Vec<u32>,
     /// Other glass solids that may contain lights.
     bodies: Vec<CompoundSolid>,
-    /// Kernel radii of the first pass, for caustic and for bounced photons.
+    /// First-pass kernel radii for caustic and bounced photons.
     radii: [f32; 2],
 }
 
@@ -170,7 +170,7 @@ impl Photons {
         Ok((own, first))
     }
 
-    /// Kernel radii of the first pass, for caustic and for bounced photons.
+    /// First-pass kernel radii for caustic and bounced photons.
     pub fn radii(&self) -> [f32; 2] {
         self.radii
     }
@@ -318,7 +318,7 @@ fn radius_for_count(
     const LOOKS: usize = 256;
     /// Number of neighbors to find among the examined photons.
     const NEAR: f32 = 12.0;
-    /// Maximum radius, and the default radius if there are too few photons, relative to the scene's radius.
+    /// Maximum radius, and default radius for too few photons, both relative to the scene's radius.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
     let step = photons.len().div_ceil(MOST).max(1);
@@ -381,8 +381,8 @@ impl GlassObjects {
         Self(each.collect())
     }
 
-    /// Whether an object's surface may leave light unchanged. True if its index of refraction is 1, or if it
-    /// may touch or overlap glass with the same index.
+    /// Whether light may pass through an object's surface unchanged. True if its index of refraction is 1, or
+    /// if it may touch or overlap glass with the same index.
     fn may_have_no_effect(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));

@@ -1,5 +1,5 @@
-//! Chooses one photon in a kernel in proportion to its contribution. The whole kernel is treated as occluded
-//! if this photon is occluded, which yields the correct expected value.
+//! Chooses one photon in a kernel, with a probability proportional to its contribution. The whole kernel is
+//! treated as occluded if this photon is occluded, which yields the correct expected value.
 
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE};

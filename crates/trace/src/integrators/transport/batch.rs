@@ -22,16 +22,17 @@ soa! {
         pub from: Vec3 = Vec3::ZERO,
         /// Triangle at the origin; see [`VertexBatch::starts`].
         pub start: u32 = Ray::NO_TRIANGLE,
-        /// Normal of the horizon, if `has_horizon`. Light from behind it is occluded.
+        /// Horizon normal, if `has_horizon`. Light from behind it is occluded.
         pub horizon: Vec3 = Vec3::ZERO,
         pub has_horizon: bool = false,
-        /// Origin lifted above the facet, from which lights in all directions are visible, and `t_max` of the
-        /// ray from the facet to it. Only valid if `may_lift` and if this ray is unoccluded.
+        /// Origin lifted above the facet, from which lights in all directions are visible. Only valid if
+        /// `may_lift` and if the ray from the facet to this point is unoccluded.
         pub lifted: Vec3 = Vec3::ZERO,
+        /// `t_max` of the ray from the facet to `lifted`.
         pub lift_end: f32 = 0.0,
         pub may_lift: bool = false,
-        /// Surface point, and geometric normal on the viewer's side, if `has_facet`. Otherwise, `from` and
-        /// `normal` are used instead.
+        /// The surface point and the geometric normal on the viewer's side, if `has_facet`. Otherwise, `from`
+        /// and `normal` are used instead.
         pub point: Vec3 = Vec3::ZERO,
         pub facet: Vec3 = Vec3::ZERO,
         pub has_facet: bool = false,
@@ -221,8 +222,8 @@ impl VertexBatch {
     }
 
     /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side in lanes where
-    /// `sides` is 1 and on the other side where it is −1. Not positive if the light is on the wrong side of a
-    /// normal.
+    /// `sides` is 1 and on the other side where it is −1. The factor is not positive if the light is on the
+    /// wrong side of a normal.
     #[inline(always)]
     pub fn terminator_factors(&self, wi: &Vec3x16, sides: &F32x16) -> F32x16 {
         let mut left = [1.0; PACKET_SIZE];
@@ -237,8 +238,8 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays that
-    /// leave behind their facet.
+    /// [`Ray::start`] values for rays from the vertices in the directions `wi`. [`Ray::NO_TRIANGLE`] for rays
+    /// directed behind their facet.
     #[inline(always)]
     pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
@@ -293,7 +294,7 @@ impl VertexBatch {
         if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
 
-    /// Multiplies light at the vertices by the path throughputs.
+    /// Multiplies the light at each vertex by the path's throughput.
     #[inline(always)]
     pub fn times_throughput(&self, light: &Vec3x16) -> Vec3x16 {
         let mut radiance = *light;
@@ -335,7 +336,7 @@ impl VertexBatch {
     }
 }
 
-/// BSDF values and cosines of a packet of vertices, for one direction per vertex.
+/// BSDF values and cosines for a packet of vertices and one direction per vertex.
 #[repr(align(64))]
 pub struct BsdfResponse {
     /// BSDF values.

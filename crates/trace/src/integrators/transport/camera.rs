@@ -27,7 +27,7 @@ pub struct CameraRayPacket {
 }
 
 impl TileContext<'_> {
-    /// Replaces the queue's content with camera rays for the given slots, and reports the rays with a
+    /// Replaces the queue's content with camera rays for a range of slots, and reports the rays with a
     /// negative filter weight.
     pub fn camera_rays(
         &self,

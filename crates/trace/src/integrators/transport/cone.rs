@@ -5,7 +5,7 @@
 /// A beam around a ray. A negative width means that the beam is past its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RayCone {
-    /// Width at the origin of the ray.
+    /// Width at the ray's origin.
     pub width: f32,
     /// Width increase per unit distance.
     pub spread: f32,
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_surfaces_refract_beams_by_snells_law() {
+    fn flat_surfaces_refract_beams_as_snells_law_predicts() {
         let spreading = RayCone { width: 0.1, spread: 0.3 };
         assert_eq!(spreading.after_specular(SpecularEvent::Reflected, 0.0, 0.3), spreading);
         assert!(

@@ -26,7 +26,7 @@ pub struct GlassBoundary {
     /// Material of the glass at this point.
     pub material: u32,
     /// Hit on the glass surface, along the ray between the two origins. `None` if the path itself hits this
-    /// surface, or if the glass is only known to enclose the far origin.
+    /// surface, or if the glass was found only because it encloses the far origin.
     pub hit: Option<Hit>,
 }
 
@@ -59,10 +59,10 @@ impl TileContext<'_> {
 
     /// Media before and beyond the coincident surfaces. The near medium is the medium recorded for the ray.
     /// For closed shapes, the far medium is determined by their geometry. A ray that leaves a solid must have
-    /// been inside it, even if the record differs. Open solids are considered only if the ray enters or
-    /// leaves them here, because it is unknown whether the ray is inside other open solids. A ray and its
-    /// reverse therefore see the same media. The returned pair contains the medium that the ray traversed and
-    /// the medium on the near side. It is `None` if both match the record.
+    /// been inside it, even if it was not recorded as inside. Open solids are considered only if the ray
+    /// enters or leaves them here, because it is unknown whether the ray is inside other open solids. A ray
+    /// and its reverse therefore see the same media. The returned pair contains the medium that the ray
+    /// traversed and the medium on the near side. It is `None` if both match the record.
     fn crossing_interiors(
         &self,
         known: &InteriorList,

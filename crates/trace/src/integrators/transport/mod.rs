@@ -1,5 +1,5 @@
-//! Transport: a tile's rays, their hits, and packets of sixteen vertices. Depends on the world, but not on
-//! integrators or photons.
+//! Light transport: a tile's rays, their hits, and packets of sixteen vertices. Depends on the world, but not
+//! on integrators or photons.
 //!
 //! - `tile`: the context shared by all rays of a tile. `ray`, `cone`, `interiors`: a path's ray, its ray
 //!   cone, and the glass around it.

@@ -28,7 +28,7 @@ pub enum PacketSource<'a> {
     Camera(&'a CameraRayPacket, u32, usize, u32),
     /// Consecutive rays in a queue, and the queue index of the first ray.
     Paths(&'a [PathRay], u32),
-    /// Rays at the given queue indices whose hits have already been found.
+    /// Rays whose hits have already been found, at these queue indices.
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
@@ -352,7 +352,7 @@ fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32
     (index, simd.movemask(&of) & left)
 }
 
-/// Gathers previously found hits at the given queue indices into a packet.
+/// Gathers the previously found hits at these queue indices into a packet.
 #[inline(always)]
 fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
     let (mut hits, mut object) = (HitPacket::without_hits(), [u32::MAX; PACKET_SIZE]);
@@ -413,7 +413,8 @@ impl TileContext<'_> {
 enum LiftMode {
     /// All vertices.
     All,
-    /// Vertices whose bits are set, if the segment to the lifted point is unoccluded.
+    /// Only the vertices whose bits are set, and only if the segment to the vertex's lifted point is
+    /// unoccluded.
     IfFree(u32),
 }
 

@@ -28,8 +28,8 @@ pub struct PathRay {
 /// Summary of a path's earlier vertices, which determines how light found by the path is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
-    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 after the camera, a mirror or glass,
-    /// or if the path has passed through glass since then, because light samples cannot find this light.
+    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 if light samples cannot find the
+    /// light: after the camera, a mirror or glass, or if the path has since passed through glass.
     pub pdf: f32,
     /// Normal used by light samples at the last vertex. Valid if `pdf` > 0.
     pub normal: Vec3,
@@ -74,7 +74,7 @@ impl PathState {
         }
     }
 
-    /// Returns the state after passing a surface inside glass. Such a surface does not change the ray, but
+    /// Returns the state after crossing a surface inside glass. Such a surface does not change the ray, but
     /// blocks light samples.
     pub fn hidden_from_lights(self) -> Self {
         self.after_specular(1.0)
@@ -84,8 +84,8 @@ impl PathState {
 impl PathRay {
     /// Path number for a continuation of this path. Each continuation has a different `branch`.
     pub fn continuation_path_number(&self, branch: u32) -> u32 {
-        // With XOR, the path number 1 would remain 1 after each reflection, and all random choices along the
-        // path would be the same.
+        // With XOR, path number 1 would remain 1 after each reflection, so all random choices along the path
+        // would be the same.
         self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
     }
 }

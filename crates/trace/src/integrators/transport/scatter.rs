@@ -63,7 +63,7 @@ impl Continuation {
     }
 }
 
-/// Samples the BSDFs of a packet of vertices to continue their paths.
+/// Samples the BSDFs of a packet of vertices to continue the paths.
 pub struct SampleBsdf<'a> {
     /// Tile context.
     pub tile: &'a TileContext<'a>,
@@ -97,7 +97,7 @@ pub struct ScatteredDirections {
 }
 
 impl SampleBsdf<'_> {
-    /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media of the vertices.
+    /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media at the vertices.
     /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index.
     pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
         // Sample the BSDFs of all vertices in the packet.

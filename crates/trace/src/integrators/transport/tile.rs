@@ -13,7 +13,7 @@ use crate::sampling::PixelSampler;
 use crate::scene::description::Shadows;
 use crate::world::{PACKET_SIZE, World};
 
-/// Context of a tile: the world, the settings, and the samples to render.
+/// Tile context: the world, the settings, and the samples to render.
 pub struct TileContext<'a> {
     /// The world to render.
     pub world: &'a World,
@@ -60,7 +60,7 @@ impl<'a> TileContext<'a> {
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
-    /// Sampler of a slot.
+    /// Sampler for a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
         let (x, y, sample) = self.block.sample_of(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
@@ -164,8 +164,8 @@ impl Divisor {
         Self { inverse: 1.0 / f64::from(divisor) }
     }
 
-    /// ⌊n/d⌋, computed as (n + ½)/d − ½ and rounded by adding 3·2⁵¹. Exact for d ≤ 2¹⁹ and n < 2³¹, where
-    /// rounding errors are less than ½/d.
+    /// ⌊n/d⌋, computed by adding 3·2⁵¹ to (n + ½)/d − ½, which rounds it to an integer. Exact for d ≤ 2¹⁹ and
+    /// n < 2³¹, where rounding errors are less than ½/d.
     #[inline(always)]
     fn quotient(self, number: u32) -> u32 {
         const LARGE: f64 = (3_u64 << 51) as f64;

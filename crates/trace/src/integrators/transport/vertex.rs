@@ -14,16 +14,16 @@ use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, OffsetPoints};
 
-/// A path's vertex on a surface.
+/// A path vertex on a surface.
 pub struct Vertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
     /// Material of the surface.
     pub material: &'a Material,
-    /// [`Ray::start`] of rays that leave the vertex.
+    /// [`Ray::start`] for rays that leave the vertex.
     start: u32,
-    /// Origins for rays on either side. `None` if they are not known more precisely than the surface's error
-    /// bound.
+    /// Origins for rays on either side. `None` unless they are known more precisely than the surface's error
+    /// bound allows.
     sides: Option<OffsetPoints>,
     /// Whether the path hits the front face.
     pub is_front: bool,
@@ -39,7 +39,7 @@ pub struct Vertex<'a> {
     pub texture_point: TexturePoint,
     /// The path's ray cone at the surface.
     pub cone: RayCone,
-    /// Vertex color, multiplied with the material's color. `None` if there is no vertex color.
+    /// Vertex color, by which the material's color is multiplied. `None` if there is no vertex color.
     pub color: Option<Vec3>,
     /// Mean curvature, positive if the surface bulges toward the viewer. Computed only for specular surfaces.
     pub curvature: f32,
@@ -56,13 +56,13 @@ impl<'a> Vertex<'a> {
         Self::shaded(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
-    /// Creates the vertex at a hit, given its surface.
+    /// Creates the vertex at a hit whose surface has already been computed.
     pub fn with_surface(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
-    /// Creates the vertex on a surface that coincides with the surface hit at this distance. `hit` is along
-    /// the segment between the two origins.
+    /// Creates the vertex on a surface that coincides with the surface hit at this distance. `hit` is a hit
+    /// along the segment between the two origins.
     pub fn at_coincident_surface(
         tile: &TileContext<'a>,
         path: &PathRay,
@@ -233,7 +233,7 @@ impl<'a> Vertex<'a> {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 
-    /// Origin for rays on the far side, if origins are known on both sides.
+    /// Origin for rays on the far side. `None` unless the origins on both sides are known.
     pub fn far_origin(&self) -> Option<Vec3> {
         self.sides.map(|sides| sides.beyond)
     }
@@ -251,9 +251,9 @@ impl<'a> Vertex<'a> {
 
     /// Origin of shadow rays. On a smooth mesh, lights are sampled from a point above the facet if the
     /// segment to this point is unoccluded. Neighboring facets then do not shadow areas that are lit
-    /// according to the shading normals. Light that reaches the point also reaches the facet without passing
-    /// around a corner of a closed surface. Otherwise, the origin is on the facet, and nothing behind the
-    /// facet is visible. Vertices that the camera does not see also use the facet, because testing the
+    /// according to the shading normals. Light that reaches this point also reaches the facet, without
+    /// leaking around a corner of a closed surface. Otherwise, the origin is on the facet, and nothing behind
+    /// the facet is visible. Vertices that the camera does not see also use the facet, because testing the
     /// segment would cost a ray without a visible difference.
     pub fn shadow_origin(&self, tile: &TileContext<'_>, only_specular_before: bool) -> ShadowOrigin {
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
@@ -275,8 +275,8 @@ impl<'a> Vertex<'a> {
     }
 }
 
-/// Whether the distance from a facet to the lifted point `to` is significant, and the segment's `t_max`: 1 at
-/// the point, plus a margin for the error.
+/// Returns whether the distance from a facet to the lifted point `to` is significant. Also returns the
+/// segment's `t_max`: 1 at the point, plus a margin for the error.
 #[inline(always)]
 pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };

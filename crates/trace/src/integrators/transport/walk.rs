@@ -41,7 +41,7 @@ pub struct Interface<'v> {
     pub rough: Option<GlassPoint>,
 }
 
-/// Handles the interactions of paths. Implemented by the wavefronts of camera paths and photons.
+/// Handles the interactions of paths. Implemented by the camera path and photon wavefronts.
 pub trait PathStepper<'a> {
     /// Tile context.
     fn tile(&self) -> &'a TileContext<'a>;
@@ -49,11 +49,11 @@ pub trait PathStepper<'a> {
     /// Buffers for the search for coincident surfaces.
     fn crossing(&mut self) -> &mut CrossingMemory;
 
-    /// Records that the path passed a surface. `next` is the next hit behind the surface.
+    /// Records that the path crossed a surface. `next` is the next hit behind the surface.
     fn record_pass(&mut self, path: &PathRay, next: Option<Hit>);
 
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
-    /// surface, and its throughput includes absorption. `has_passed` is true if the walk passed any surface
+    /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
     /// inside glass.
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
@@ -123,7 +123,7 @@ pub enum OpaqueHit {
     Touching(Hit),
 }
 
-/// Walks from the hit of a path's ray to the next interaction, updating the path. `surface` is the surface at
+/// Walks a path from its ray's hit to the next interaction, updating the path. `surface` is the surface at
 /// the hit, if known. Paths and vertices are large, so they are not moved.
 #[inline(always)]
 pub fn walk<'a, W: PathStepper<'a>>(
@@ -139,7 +139,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             Some(surface) => Vertex::with_surface(tile, path, &hit, surface),
             None => Vertex::for_shading(tile, path, &hit),
         };
-        // Stop at an opaque surface, or pass the surface as a null interaction.
+        // Stop if the surface is opaque. Otherwise, cross it as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
             path.throughput *= medium_transmittance(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
@@ -220,7 +220,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
                 has_passed,
             );
         }
-        // Otherwise pass the surface.
+        // Otherwise, cross the surface.
         (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden_from_lights();
         path.cone = path.cone.at_distance(hit.shape.t);

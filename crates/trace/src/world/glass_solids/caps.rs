@@ -57,7 +57,7 @@ pub(super) fn covered_rim_fractions(
     Ok(examined.into_iter().map(part).collect())
 }
 
-/// Returns a uniform selection of a hole's edges.
+/// Returns evenly spaced edges of a hole, at most `MAX_RIM_EDGES`.
 fn select_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
     let step = rims.len().div_ceil(MAX_RIM_EDGES).max(1);
     rims.iter().step_by(step).collect()

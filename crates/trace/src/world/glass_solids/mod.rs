@@ -1,4 +1,4 @@
-//! Glass solids: determines which surfaces together enclose one volume of glass.
+//! Glass solids: groups of surfaces that together enclose one volume of glass.
 //!
 //! A ray that enters glass through one object and leaves through another was inside one solid only if both
 //! objects bound the same solid. Glass objects that do not enclose a volume individually (meshes, quads,
@@ -12,8 +12,8 @@
 //! glass. A hollow sphere consisting of two meshes is therefore one solid, just as if both were in one file.
 //!
 //! A solid with a hole is open, unless the hole is surrounded by opaque surfaces. It is unknown whether a ray
-//! is inside open glass. The surface of open glass therefore only affects the medium of rays that hit the
-//! surface or leave it (`integrators::transport::crossing`).
+//! is inside open glass. The surface of open glass therefore only affects the medium of rays that hit or
+//! leave the surface (`integrators::transport::crossing`).
 
 mod caps;
 mod cavities;

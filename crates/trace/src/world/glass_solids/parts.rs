@@ -209,7 +209,7 @@ fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
-/// The set of an object's triangles that are glass.
+/// Which of an object's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshGlass {
     /// All triangles, or the whole object if it is not a mesh.
@@ -244,8 +244,8 @@ fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassI
     }
 }
 
-/// Returns the mesh's open edges as pairs of triangle and edge number. Two edges with equal endpoints and
-/// opposite directions close each other.
+/// Returns the mesh's open edges as (triangle, edge number) pairs. Two edges with equal endpoints and
+/// opposite directions are not open.
 fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
     let open = unmatched_edges(mesh, all, |vertex| vertex);

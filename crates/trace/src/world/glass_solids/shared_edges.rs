@@ -105,8 +105,8 @@ impl SharedEdges {
     }
 }
 
-/// Returns pairs of edges with glass between them. In angular order around the common edge, a surface whose
-/// back faces forward is paired with the next surface if that surface's back faces backward.
+/// Returns pairs of edges with glass between them. Two surfaces that are neighbors in angular order around
+/// the common edge are paired if their backs face each other.
 fn pairs_with_glass_between(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     let ends =
         |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };

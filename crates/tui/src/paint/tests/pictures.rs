@@ -1,4 +1,4 @@
-//! Tests of byte counts for whole previews and edits, and of text drawn over previews.
+//! Tests byte counts for whole previews and edits, and text drawn over previews.
 
 use super::*;
 
@@ -51,11 +51,11 @@ fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
 }
 
 #[test]
-fn first_preview_takes_12_bytes_per_cell() {
+fn first_preview_fits_in_12_bytes_per_cell() {
     for (grain, most) in [(0, 16), (5, 30), (20, 120), (60, 255), (255, 255)] {
         let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, grain));
         let test = showing(&buffer, picture, Fidelity::First);
-        // Bytes for clearing the screen and drawing the text.
+        // Allow for clearing the screen and drawing the text.
         let others = 40;
         assert!(test.sent <= 12 * CELLS + others, "grain {grain}: {} bytes per cell", test.sent / CELLS);
         let largest = test.difference(&buffer, ColorDepth::TrueColor);
@@ -64,7 +64,7 @@ fn first_preview_takes_12_bytes_per_cell() {
 }
 
 #[test]
-fn noise_below_the_threshold_is_not_sent() {
+fn noise_below_threshold_causes_no_output() {
     let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 0));
     let mut test = showing(&buffer, picture, Fidelity::Still);
     for seed in 2..6 {
@@ -139,7 +139,7 @@ fn all_rows_are_drawn_despite_frequent_targets() {
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
         test.painter.set_target(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
-        // About three rows at this noise level.
+        // Enough bytes for about three rows at this noise level.
         test.slice(3 * 40 * usize::from(SIDE.0));
     }
     let contents = on_screen(&test, Rect::new(1, 0, SIDE.0, SIDE.1));

@@ -1,4 +1,4 @@
-//! Converts images whose alpha channel is the opacity of the same surface.
+//! Converts cutout textures: images whose alpha channel is the opacity of the surface they color.
 
 use ::image::DynamicImage;
 

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 use crate::math::limits::LARGEST;
 
-/// Evaluates an expression on an image's samples, for any sample type.
+/// Evaluates an expression on an image's samples, whatever their type.
 macro_rules! with_samples {
     ($image:expr, $samples:ident => $body:expr) => {
         match $image {
@@ -43,12 +43,12 @@ trait Sample: Copy + PartialEq {
     /// Converts the sample to a float. The largest integer becomes 1.
     fn to_unit_float(self) -> f32;
 
-    /// Linear values of all integers in this color space. `None` for floats, which are linear.
+    /// Tables that map every integer to its linear value. `None` for floats, which are already linear.
     fn tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
         None
     }
 
-    /// Table index of an integer sample.
+    /// Index of an integer sample in the table.
     fn index(self) -> usize {
         0
     }
@@ -107,7 +107,7 @@ fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
     }
 }
 
-/// Whether channel `index` has the same `value` in all pixels.
+/// Whether channel `index` equals `value` in every pixel.
 fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
     fn all<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
         samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)
@@ -189,7 +189,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
     Texels { width, height, data, unusable }
 }
 
-/// Red, green and blue of a pixel with 1 (gray), 2 (gray, alpha), 3 or 4 samples.
+/// Returns a pixel's red, green and blue. A pixel has 1 (gray), 2 (gray and alpha), 3 or 4 samples.
 fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     match *pixel {
         [red, green, blue, ..] => [red, green, blue],

@@ -9,10 +9,10 @@ use crate::materials::{Channel, PixelValue};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
-/// Samples of a pixel that are used to compute its scalar.
+/// Samples from which a pixel's scalar is computed.
 #[derive(Clone, Copy)]
 enum ScalarSamples {
-    /// Index of a sample, and whether it is sRGB.
+    /// One sample: its index, and whether it is sRGB.
     Sample(usize, bool),
     /// Luminance of red, green and blue.
     Luminance,
@@ -94,7 +94,7 @@ pub(super) fn scalar_texels(
     Texels { width, height, data, unusable }
 }
 
-/// Counts the pixels in which a used sample is negative, too large or not finite.
+/// Counts the pixels in which any used sample is negative, too large or not finite.
 fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamples) -> u64 {
     let used = match samples {
         ScalarSamples::Sample(place, _) => place..place + 1,

@@ -1,4 +1,4 @@
-//! Selects the color channels of an EXR file.
+//! Selects the color channels in an EXR file.
 
 use std::collections::BTreeMap;
 
@@ -104,8 +104,8 @@ impl LayerChannels {
 type LayerMap = BTreeMap<String, LayerChannels>;
 
 /// Selects the channels to decode. Prefers unnamed layers to named ones, then RGB to gray, then layers in a
-/// single part to layers across parts, then earlier layers to later ones. Falls back to a part's only channel,
-/// whatever its name.
+/// single part to layers across parts, then earlier layers to later ones. Falls back to a part's only
+/// channel, whatever its name.
 pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     let mut parts: Vec<LayerMap> =
         headers.iter().enumerate().map(|(part, header)| layers_by_name(part, header)).collect();
@@ -128,7 +128,7 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     unnamed.or_else(named).or_else(|| sole_channel(headers))
 }
 
-/// Layers of a part, keyed by name. The layer name is the channel name up to its last dot.
+/// Returns a part's layers, keyed by name. A layer name is the part of a channel name before its last dot.
 fn layers_by_name(part: usize, header: &Header) -> LayerMap {
     let mut layers = LayerMap::new();
     if !header.deep {
@@ -145,7 +145,7 @@ fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
     }
 }
 
-/// Layers assembled from single-channel parts.
+/// Assembles layers from single-channel parts.
 fn layers_across_parts(headers: &[Header]) -> LayerMap {
     let mut layers = LayerMap::new();
     for (part, header) in single_channel_parts(headers) {
@@ -160,8 +160,8 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
     headers.filter(|(_, header)| !header.deep && header.channels.list.len() == 1)
 }
 
-/// Channel of the first single-channel part. `None` if single-channel parts contain the components of a color
-/// or vector.
+/// Returns the channel of the first single-channel part. `None` if the single-channel parts are components of
+/// a color or vector.
 fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
@@ -187,7 +187,7 @@ pub(super) fn no_color(headers: &[Header]) -> String {
     no_usable_channels(&format!("{}{more}", shown.join(", ")))
 }
 
-/// Error message for an image with only these channels.
+/// Error message for an image without usable channels. `names` lists the channels.
 pub(in crate::assets::image) fn no_usable_channels(names: &str) -> String {
     format!("no usable channels among {names}; expected R, G and B, or Y for gray")
 }

@@ -8,10 +8,11 @@ use super::channels::ChannelIndex;
 use super::{ChannelRow, SAMPLE_BYTES, description};
 use crate::math::DVec3;
 
-/// Interpolation weights of the samples on either side of a pixel, from nearest to farthest (`ImfRgbaYca.cpp`).
+/// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
+/// (`ImfRgbaYca.cpp`).
 const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_597, -0.007_540, 0.002_128];
 
-/// Luminance and chroma planes of the data window.
+/// Luminance and chroma planes for the data window.
 pub(super) struct LuminanceChroma {
     /// Y, RY and BY.
     channels: [ChannelIndex; 3],
@@ -31,7 +32,7 @@ impl LuminanceChroma {
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
 
-    /// Memory size of the planes after interpolating chroma along rows.
+    /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
         let rows = size.height() / description(headers, ry).sampling.y();
@@ -39,7 +40,7 @@ impl LuminanceChroma {
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
 
-    /// Stores a row of samples if the channel is one of the planes.
+    /// Stores a row of samples if its channel belongs to one of the planes.
     pub(super) fn add(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
         let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
         let [ry, by] = &mut self.chroma;
@@ -52,8 +53,8 @@ impl LuminanceChroma {
         }
     }
 
-    /// Calls `put` with the column, row and color of each pixel. `weights` are the luminance weights of red, green and
-    /// blue.
+    /// Calls `put` with the column, row and color of each pixel. `weights` are the luminance weights of red,
+    /// green and blue.
     pub(super) fn for_each_color(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
         let (width, height) = (self.size.width(), self.size.height());
         let is_filtered = self.step == Vec2(2, 2);
@@ -87,7 +88,7 @@ impl LuminanceChroma {
         self.chroma = chroma;
     }
 
-    /// Colors of a row. Rows outside the image repeat rows near the edge.
+    /// Returns the colors in a row. Rows outside the image repeat rows near the edge.
     fn row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
         let (width, height) = (self.size.width(), self.size.height() as i64);
         let inside = if y >= height { height - 2 } else { y.max(0) } as usize;

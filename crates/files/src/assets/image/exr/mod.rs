@@ -1,5 +1,5 @@
-//! EXR decoder based on the `exr` crate. The `image` crate supports only R, G and B channels without a layer
-//! name.
+//! EXR decoder based on the `exr` crate. The `image` crate supports only R, G and B channels that are not in
+//! a named layer.
 
 pub(super) mod channels;
 mod chroma;
@@ -173,7 +173,7 @@ struct PartialImage<'a> {
 }
 
 impl PartialImage<'_> {
-    /// Adds the samples of a decompressed block.
+    /// Adds the samples from a decompressed block.
     fn add(&mut self, block: &UncompressedBlock, samples: &mut [u8]) {
         let part = block.index.layer;
         let header = &self.headers[part];
@@ -198,8 +198,8 @@ impl PartialImage<'_> {
         }
     }
 
-    /// Copies a row of a channel to the pixel components that use the channel. `left` and `row` are relative to
-    /// the data window.
+    /// Copies a row of a channel to the pixel components that use the channel. `left` and `row` are relative
+    /// to the data window.
     fn copy_channel_row(
         &self,
         channel: ChannelIndex,
@@ -255,7 +255,7 @@ fn pixel_bytes(channels: ChosenChannels) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
 }
 
-/// Consecutive samples of one channel.
+/// Consecutive samples from one channel.
 #[derive(Clone, Copy)]
 struct ChannelRow<'a> {
     sample_type: SampleType,
@@ -263,7 +263,7 @@ struct ChannelRow<'a> {
 }
 
 impl ChannelRow<'_> {
-    /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item of
+    /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item from
     /// `targets`.
     fn for_each_value<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
         fn each<const N: usize, T>(

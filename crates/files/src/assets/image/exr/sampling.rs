@@ -1,5 +1,5 @@
-//! Support for subsampled channels, which `exr` rejects. The file is presented to `exr` as if no channel were
-//! subsampled, and its blocks are decompressed with the actual sampling.
+//! Support for subsampled channels, which `exr` rejects. The headers are patched so that `exr` sees no
+//! subsampling, and the blocks are decompressed with the actual sampling.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -16,7 +16,7 @@ const HEADER_BYTES: u64 = 1 << 20;
 /// Offset of the first header, after the magic number and version.
 const START: usize = 8;
 
-/// Subsampling factors of a channel, and the file offset of the two integers that store them.
+/// A channel's subsampling factors, and the file offset of the two integers that store them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelSampling {
     at: u64,
@@ -159,7 +159,7 @@ impl BlockDecompressor {
         let top = usize::try_from(pixels.position.y()).unwrap_or_default();
         let rows = top..top + pixels.size.height();
         let bytes: usize = rows.map(|row| row_bytes(header, row, pixels.size.width())).sum();
-        // `exr` expects the block size to be the pixel size times the number of pixels.
+        // `exr` expects the block size to be a multiple of the number of pixels.
         if !bytes.is_multiple_of(pixels.size.area()) {
             return Err(Error::NotSupported("this channel subsampling".into()));
         }
@@ -168,7 +168,7 @@ impl BlockDecompressor {
             CompressedBlock::Tile(block) => block.compressed_pixels_le.len(),
             CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => bytes,
         };
-        // `exr` decodes subsampled channels in B44 blocks with the wrong size.
+        // In B44 blocks, `exr` assumes the wrong size for subsampled channels.
         if matches!(header.compression, Compression::B44 | Compression::B44A) && packed != bytes {
             let reason = "B44 compression of subsampled channels; save it with ZIP or PIZ";
             return Err(Error::NotSupported(reason.into()));

@@ -1,4 +1,4 @@
-//! Tests of color spaces declared by files.
+//! Tests for color spaces declared by files.
 
 use std::borrow::Cow;
 
@@ -27,7 +27,7 @@ fn profile(bytes: Vec<u8>) -> impl FnOnce(&mut Info<'static>) {
     move |info| info.icc_profile = Some(Cow::Owned(bytes))
 }
 
-/// An ICC profile with these tags.
+/// An ICC profile with the specified tags.
 fn icc(space: &[u8; 4], connection: &[u8; 4], tags: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
     let mut header = vec![0; 128];
     header[16..20].copy_from_slice(space);
@@ -104,7 +104,7 @@ fn p3() -> SourceChromaticities {
     SourceChromaticities::new((0.3127, 0.329), (0.68, 0.32), (0.265, 0.69), (0.15, 0.06))
 }
 
-/// The pixel's color in linear Rec. 709 if it is stored in Display P3.
+/// Linear Rec. 709 color of the pixel, if its stored values are Display P3.
 const P3: Vec3 = Vec3::new(0.5675, 0.2038, 0.0294);
 
 #[test]
@@ -114,7 +114,7 @@ fn png_gamma_and_primaries_are_applied() {
     assert!(is_near(color(&png(gamma(1.0 / 1.8))), power(1.8)));
     let wide = png(|info| info.source_chromaticities = Some(p3()));
     assert!(is_near(color(&wide), P3), "{}", color(&wide));
-    // The usual values of sRGB files do not change the texels.
+    // The values commonly found in sRGB files do not change the texels.
     let usual = SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06));
     assert!(
         is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual)))
@@ -139,7 +139,8 @@ fn color_chunks_have_a_fixed_precedence() {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
     assert!(is_plain(&srgb));
-    // The encoder writes only an sRGB chunk. Insert a gAMA chunk, including its checksum, before the sRGB chunk.
+    // The encoder writes only an sRGB chunk. Insert a gAMA chunk, including its checksum, before the sRGB
+    // chunk.
     let at = srgb.windows(4).position(|name| name == b"sRGB").expect("a chunk") - 4;
     let other = png(gamma(1.0));
     let from = other.windows(4).position(|name| name == b"gAMA").expect("a chunk") - 4;
@@ -224,7 +225,7 @@ fn code_points_have_the_highest_precedence() {
     }
 }
 
-/// Offset of the end of a PNG's first chunk.
+/// Offset at which a PNG's first chunk ends.
 const HEADER_END: usize = 33;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Tests of cutout textures and opacity masks.
+//! Tests for cutout textures and opacity masks.
 
 use ::image::{DynamicImage, ImageBuffer, Rgba};
 

@@ -1,4 +1,4 @@
-//! Tests of EXR files: gray, layers, parts, tiles, sample types.
+//! Tests for EXR files: gray, layers, parts, tiles, sample types.
 
 use std::io::Cursor;
 
@@ -260,7 +260,7 @@ fn subsampled(window: [i32; 4]) -> Vec<u8> {
     .concat();
     let floats =
         |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
-    // The first row has BY, RY and Y, the second only Y.
+    // The first row has BY, RY and Y. The second has only Y.
     let rows = [floats(&[0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0]), floats(&[2.0; 4])];
     let start = header.len() + 16;
     let offsets = [start, start + 8 + rows[0].len()].map(|offset| (offset as u64).to_le_bytes()).concat();

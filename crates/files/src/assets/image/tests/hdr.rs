@@ -1,4 +1,4 @@
-//! Tests of Radiance HDR files from various programs.
+//! Tests for Radiance HDR files from various programs.
 
 use super::*;
 use crate::assets::image::hdr::{RUN_TOO_LONG, WRONG_LENGTH, line_ignored, unsupported_encoding};

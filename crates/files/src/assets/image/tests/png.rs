@@ -1,4 +1,4 @@
-//! Tests of PNG files of all pixel types.
+//! Tests for PNG files with all pixel types.
 
 use std::borrow::Cow;
 
@@ -51,7 +51,7 @@ fn all_pixel_types_are_read() {
 #[test]
 fn exif_orientation_is_applied() {
     let mut turned = info(ColorType::Grayscale, BitDepth::Eight, 3, 1);
-    // A single entry: Orientation (0x0112), a short, 6 (rotated clockwise by 90°).
+    // One entry: Orientation (0x0112), type SHORT, value 6 (rotated clockwise by 90°).
     let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
     turned.exif_metadata = Some(Cow::Borrowed(exif));
     let texels = load_bytes("a.png", &encoded(turned, &[1, 2, 3]), ImageEncoding::Linear).expect("a PNG");

@@ -1,9 +1,9 @@
-//! Tests of alpha in TGA and BMP files.
+//! Tests for alpha in TGA and BMP files.
 
 use super::*;
 
-/// A file with one 32-bit pixel in BGRA order. `alpha_bits` is stored in the header, `kind` in the extension
-/// area.
+/// A file with one 32-bit pixel in BGRA order. `alpha_bits` is stored in the header, and `kind` in the
+/// extension area.
 fn file(alpha_bits: u8, pixel: [u8; 4], kind: Option<u8>) -> Vec<u8> {
     let mut file = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 0x20 | alpha_bits];
     file.extend(pixel);
@@ -38,7 +38,7 @@ fn tga_alpha_is_set_by_header_or_extension() {
     ] {
         assert!((opacity(&file(bits, white, kind)) - expected).abs() < 1e-6, "{bits} {kind:?}");
     }
-    // Premultiplied colors are divided by alpha in cutouts.
+    // In cutouts, premultiplied colors are divided by alpha.
     let cut_out = |file: &[u8]| {
         let texels = load_bytes("a.tga", file, ImageEncoding::CutOut(ColorCurve::Linear)).expect("a TGA");
         texels.get(0, 0)
@@ -53,8 +53,7 @@ fn tga_alpha_is_set_by_header_or_extension() {
     assert!((opacity(&broken) - 0.2).abs() < 1e-6);
 }
 
-/// A TGA file with one row of pixels. The header contains the given image type, bits per pixel and alpha
-/// bits.
+/// A TGA file with one row of pixels and the specified image type, bits per pixel and alpha bits.
 fn row([kind, bits, alpha_bits]: [u8; 3], pixels: &[u8]) -> Vec<u8> {
     let width = pixels.len() as u8 / bits.div_ceil(8).max(1);
     [&[0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, 1, 0, bits, 0x20 | alpha_bits], pixels].concat()
@@ -72,7 +71,7 @@ fn sixteen_bit_gray_has_alpha() {
         }] {
             let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
             assert_eq!(texels.data, TexelData::Linear8(vec![[51; 3], [255; 3]]));
-            // If the header declares no alpha bits, opacity is the luminance.
+            // If the header declares no alpha bits, the luminance is the opacity.
             let expected = if alpha_bits == 0 { 0.2 } else { 1.0 };
             assert!((opacity(&file) - expected).abs() < 1e-6, "{alpha_bits}");
         }

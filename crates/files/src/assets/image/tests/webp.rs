@@ -1,10 +1,10 @@
-//! Tests of Exif data and animations in WebP files.
+//! Tests for Exif data and animations in WebP files.
 
 use ::image_webp::{ColorType, WebPEncoder};
 
 use super::*;
 
-/// A chunk of a RIFF file.
+/// A chunk in a RIFF file.
 fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let padding = vec![0; data.len() % 2];
     [name.as_slice(), &(data.len() as u32).to_le_bytes(), data, &padding].concat()

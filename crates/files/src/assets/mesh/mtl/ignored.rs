@@ -9,7 +9,7 @@ use super::{MtlMaterial, WithLine};
 use crate::assets::{FileMaterial, FileMaterialKind};
 use crate::math::Vec3;
 
-/// A statement that is ignored or approximated.
+/// An MTL statement that is ignored or approximated.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::assets::mesh) struct IgnoredStatement {
     pub(super) line: usize,
@@ -62,15 +62,15 @@ pub(super) const UNKNOWN_MODEL: &str = "unknown illumination model; `illum 2` is
 pub(super) const INVISIBLE_GLASS: &str = "glass without an index of refraction `Ni` above 1 is invisible";
 pub(super) const IOR_CLAMPED: &str = "`Ni` is clamped to 10";
 const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for an invisible surface";
-const TR_IGNORED: &str = "`Tr` is ignored because `d` has priority";
+const TR_IGNORED: &str = "`Tr` is ignored because `d` takes precedence";
 const OPACITY_MAP: &str = "the opacity map replaces `d`";
 pub(super) const FILTER_IGNORED: &str = "`Tf` is ignored; use `tint` in a material of the scene";
-const NO_HIGHLIGHT: &str = "`Ks` has no effect without `Ns` above 0";
+const NO_HIGHLIGHT: &str = "`Ks` has no effect unless `Ns` is above 0";
 pub(super) const GAINS_ENERGY: &str =
     "the material reflects more light than it receives; keep `Kd` and `Ks` at or below 1";
 const BRIGHT_DIFFUSE: &str = "`Kd` is clamped to 1";
-const BRIGHT_COAT: &str = "`Ks` of a mirror over a diffuse color is clamped to 0.66";
-pub(super) const BRIGHT_MIRROR: &str = "`Ks` of a mirror is clamped to 1";
+const BRIGHT_COAT: &str = "`Ks` is clamped to 0.66 for a mirror over a diffuse color";
+pub(super) const BRIGHT_MIRROR: &str = "`Ks` is clamped to 1 for a mirror";
 pub(super) const DIFFUSE_UNDER_MIRROR: &str =
     "`Kd` is ignored because the mirror reflection `Ks` is stronger";
 const LOW_IOR: &str = "`Ni` is ignored because it is not above 1; 1.5 is used";
@@ -99,7 +99,7 @@ fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
     at.map(|at| at.line)
 }
 
-/// Whether a number is above 1, except for rounding errors.
+/// Whether a number is above 1 by more than rounding errors.
 fn is_above_one(number: f32) -> bool {
     number > 1.0 + 1e-5
 }
@@ -140,7 +140,7 @@ fn warn_about_illumination(
     }
 }
 
-/// Warns about opacities and transmission filters that are ignored. Glass has no opacity.
+/// Warns about ignored opacities and transmission filters. Glass has no opacity.
 fn warn_about_opacity(
     found: &MtlMaterial,
     converted: &FileMaterial,
@@ -196,7 +196,7 @@ fn warn_about_reflectance(
     }
 }
 
-/// Warns about a missing highlight and about energy gain.
+/// Warns about missing highlights and about surfaces that reflect more light than they receive.
 fn warn_about_phong(
     found: &MtlMaterial,
     converted: &FileMaterial,
@@ -266,7 +266,7 @@ fn warn_about_map(
     };
     if texture.is_none() {
         match converted.kind() {
-            // The warning about a missing highlight covers the only such map.
+            // Only specular maps may lack an effect here. The warning about a missing highlight covers them.
             FileMaterialKind::Phong => {}
             FileMaterialKind::Principled(_)
             | FileMaterialKind::Coated

@@ -1,4 +1,4 @@
-//! Maps of an MTL file: options followed by a file name.
+//! Maps in an MTL file: options followed by a file name.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
@@ -59,7 +59,7 @@ impl MapKind {
         })
     }
 
-    /// Keyword of the statement. One of them if there are several.
+    /// Keyword of the statement. If there are several, returns one of them.
     pub(super) fn keyword(self) -> &'static str {
         match self {
             Self::Diffuse => "map_Kd",
@@ -100,7 +100,7 @@ impl MapKind {
     }
 }
 
-/// A map with its options, exactly as in the file.
+/// A map and its options, unmodified from the file.
 #[derive(Clone, Debug)]
 pub(super) struct Map {
     pub(super) line: usize,
@@ -149,7 +149,7 @@ impl Map {
         (!map.name.is_empty()).then_some(map)
     }
 
-    /// Parses the arguments of an option. Returns whether all of them can be used.
+    /// Parses an option's arguments. Returns whether all of them are usable.
     fn add(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
         match option {
             "-s" => {
@@ -181,7 +181,7 @@ impl Map {
         }
     }
 
-    /// Warnings about options that cannot be used or have no effect on this kind of map.
+    /// Warnings about options that are unusable or have no effect on this kind of map.
     pub(super) fn option_warnings(&self, kind: MapKind) -> impl Iterator<Item = String> {
         let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then_some("-imfchan");
         let range = (self.range != [0.0, 1.0] && kind.is_normal()).then_some("-mm");
@@ -190,14 +190,14 @@ impl Map {
         self.warnings.iter().cloned().chain(unused)
     }
 
-    /// Candidate paths of the image file, relative to the MTL file's folder: the whole name, then the name
-    /// with possible comments removed.
+    /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
+    /// name without what may be a comment.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
         without_trailing_comments(&self.name).flat_map(|name| decoded_paths(&name.replace('\\', "/")))
     }
 
-    /// Texture for this map of the MTL file at `library`. Its path is the first candidate that exists, or the
-    /// first candidate if none exists.
+    /// Returns the texture for this map in the MTL file at `library`. Its path is the first candidate that
+    /// exists, or the first candidate if none exists.
     pub(super) fn texture(&self, library: &Path) -> Option<FileTexture> {
         let folder = library.parent().unwrap_or(Path::new(""));
         let statement = FileLine { path: library.to_owned(), line: self.line };
@@ -223,7 +223,7 @@ fn set<T>(field: &mut T, value: Option<T>) -> bool {
     is_set
 }
 
-/// Channel that `-imfchan` selects.
+/// Returns the channel that `-imfchan` selects.
 fn channel(letter: &str) -> Option<PixelValue> {
     match letter.to_ascii_lowercase().as_str() {
         "r" => Some(PixelValue::Channel(Channel::Red)),
@@ -240,7 +240,7 @@ fn is_zero(scale: f64) -> bool {
     scale == 0.0 || is_too_short(scale)
 }
 
-/// Whether a word has the form of an option: a dash and letters.
+/// Whether a word looks like an option: a dash followed by letters.
 fn is_like_option(word: &str) -> bool {
     word.strip_prefix('-')
         .is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()))
@@ -254,13 +254,13 @@ pub(super) fn not_an_option(word: &str) -> String {
     format!("`{word}` is not a map option; it is read as part of the file name")
 }
 
-/// Arguments of a map statement. The last one is the file name.
+/// Arguments to a map statement. The last one is the file name.
 #[derive(Clone, Copy)]
 struct MapArguments<'a>(&'a str);
 
 impl<'a> MapArguments<'a> {
-    /// Consumes an option and returns it in lowercase. An unknown option must have a number or a switch as an
-    /// argument. Any other word starts the file name, even if it begins with a dash.
+    /// Consumes an option and returns it in lowercase. An unknown option is recognized only if a number or a
+    /// switch follows it. Any other word starts the file name, even if it begins with a dash.
     fn option(&mut self) -> Option<String> {
         const OPTIONS: [&str; 14] = [
             "-s",
@@ -287,7 +287,7 @@ impl<'a> MapArguments<'a> {
         })
     }
 
-    /// Returns the next word and the text after it. `None` if it is the last word.
+    /// Returns the next word and the text after it. `None` if the next word is the last one.
     fn peek(&self) -> Option<(&'a str, &'a str)> {
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         Some((word, rest.trim_start()))
@@ -300,13 +300,13 @@ impl<'a> MapArguments<'a> {
         Some(word)
     }
 
-    /// Whether the next word is a number or a switch, and not the last word.
+    /// Whether the next word is a number or a switch but not the last word.
     fn next_is_value(&self) -> bool {
         self.peek().is_some_and(|(word, _)| word.parse::<f32>().is_ok() || parse_switch(word).is_some())
     }
 
-    /// Consumes up to `N` numbers. Missing numbers keep their defaults. `None` if there are no numbers or one
-    /// of them is not finite or too large.
+    /// Consumes up to `N` numbers. Missing numbers keep their defaults. Returns `None` if there are no
+    /// numbers, or if one of them is too large or not finite.
     fn numbers<const N: usize>(&mut self, default: [f64; N]) -> Option<[f64; N]> {
         let mut numbers = default;
         let mut are_usable = false;

@@ -8,8 +8,8 @@ use super::statements::{MtlColor, MtlNumber};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
-/// Converts a material of the MTL file at `path`. The default diffuse color is the same as in other MTL
-/// readers: 0.6 without a texture, 1 with a texture, and 0 for mirrors. Textures without effect are dropped.
+/// Converts a material from the MTL file at `path`. As in other MTL readers, the default diffuse color is 0.6
+/// without a texture, 1 with a texture, and 0 for mirrors. Textures that have no effect are dropped.
 pub(in crate::assets::mesh) fn material(found: &MtlMaterial, path: &Path) -> FileMaterial {
     let texture = |kind| found.map(kind).and_then(|map| map.texture(path));
     let specular = color(found, MtlColor::Specular, 0.0);
@@ -50,15 +50,14 @@ fn color(found: &MtlMaterial, color: MtlColor, default: f32) -> Vec3 {
     color.map_or(Vec3::splat(default), |at| DVec3::from_array(at.value).as_vec3())
 }
 
-/// Opacity: `d`, or else 1 − `Tr`. Opaque if `Tr` is 1 and there is no `d`.
+/// Returns the opacity: `d` if present, otherwise 1 − `Tr`. `Tr 1` without `d` means opaque.
 fn opacity(found: &MtlMaterial) -> f32 {
     let transparency = found.number(MtlNumber::Transparency).map(|part| 1.0 - part);
     let opacity = found.number(MtlNumber::Dissolve).or(transparency);
     if is_opaque_despite_tr(found) { 1.0 } else { opacity.unwrap_or(1.0) as f32 }
 }
 
-/// Whether the material has `Tr` 1 but no `d`, which is how MeshLab and other programs write opaque
-/// materials.
+/// Whether the material has `Tr 1` but no `d`. MeshLab and other programs write opaque materials this way.
 pub(super) fn is_opaque_despite_tr(found: &MtlMaterial) -> bool {
     let transparency = found.number(MtlNumber::Transparency);
     found.number(MtlNumber::Dissolve).is_none() && transparency.is_some_and(|part| part >= 1.0)

@@ -21,17 +21,17 @@ pub(super) const FILE_LIMIT: u64 = 64 << 20;
 /// Contents of an MTL file.
 pub(super) struct MtlLibrary {
     pub(super) materials: Vec<MtlMaterial>,
-    /// Ignored statements that do not belong to a material.
+    /// Ignored statements outside any material.
     pub(super) ignored: Vec<IgnoredStatement>,
     /// Hash of the file.
     pub(super) hash: FileHash,
 }
 
-/// Statements of a material. If a statement is repeated, the last one is used.
+/// A material's statements. If a statement is repeated, the last one is used.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MtlMaterial {
     pub(super) name: String,
-    /// Line of its `newmtl`.
+    /// Line of the `newmtl` statement.
     line: usize,
     colors: [Option<WithLine<[f64; 3]>>; MtlColor::ALL.len()],
     numbers: [Option<WithLine<f64>>; MtlNumber::ALL.len()],
@@ -41,7 +41,7 @@ pub(super) struct MtlMaterial {
     ignored: Vec<IgnoredStatement>,
 }
 
-/// A value, and the line that defines it.
+/// A value and the line that defines it.
 #[derive(Clone, Copy, Debug)]
 struct WithLine<T> {
     value: T,
@@ -66,7 +66,7 @@ impl MtlMaterial {
         self.maps.iter().rev().find(|(found, _)| *found == kind).map(|(_, map)| map)
     }
 
-    /// Files of all maps, including unsupported ones.
+    /// Candidate image paths for all maps, including unsupported ones.
     pub(super) fn image_paths(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
         self.maps.iter().flat_map(|(_, map)| map.candidate_paths()).map(move |file| folder.join(file))
     }
@@ -93,8 +93,8 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     Ok(library)
 }
 
-/// Candidate paths of the image in a line of the MTL file at `path`. Empty for all other statements, and for
-/// invalid ones.
+/// Returns the candidate image paths for a map statement in the MTL file at `path`. Empty for all other
+/// statements, and if the map statement is invalid.
 pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     match statements::parse(&decoded(line), &mut Vec::new()) {
@@ -112,7 +112,7 @@ pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
 }
 
 impl MtlLibrary {
-    /// Adds a statement and the warnings about it.
+    /// Adds a statement and any warnings about it.
     fn add(&mut self, statement: Statement, line: usize, warnings: Vec<String>) {
         if let Statement::New(name) = statement {
             self.materials.push(MtlMaterial { name, line, ..MtlMaterial::default() });

@@ -1,4 +1,4 @@
-//! Parses lines of an MTL file. Keywords are case-insensitive.
+//! Parses lines from an MTL file. Keywords are case-insensitive.
 
 use super::map::{Map, MapKind, option_ignored};
 use crate::math::limits::LARGEST;
@@ -15,7 +15,7 @@ pub(super) enum MtlColor {
 }
 
 impl MtlColor {
-    /// All colors and their keywords, in enum order.
+    /// All colors with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Ambient, "Ka"),
         (Self::Diffuse, "Kd"),
@@ -42,7 +42,7 @@ pub(super) enum MtlNumber {
 }
 
 impl MtlNumber {
-    /// All numbers and their keywords, in enum order.
+    /// All numbers with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 11] = [
         (Self::Shininess, "Ns"),
         (Self::Ior, "Ni"),
@@ -62,7 +62,8 @@ impl MtlNumber {
         Self::ALL[self as usize].1
     }
 
-    /// Smallest and largest value. `None` if a value has no effect or its effect depends on the material.
+    /// Smallest and largest valid value. `None` if the number has no effect, or if its effect depends on the
+    /// material.
     fn range(self) -> Option<[f64; 2]> {
         match self {
             Self::Shininess => Some([0.0, LARGEST]),
@@ -90,7 +91,7 @@ pub(super) enum Statement {
     Map(MapKind, Map),
 }
 
-/// Parses a line. Adds a warning for each part that cannot be used.
+/// Parses a line. Adds a warning for each unusable part.
 pub(super) fn parse(line: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let line = line.trim();
     let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -143,7 +144,7 @@ pub(super) fn spectrum_unsupported(keyword: &str) -> String {
     format!("the spectrum of `{keyword}` is not supported; the default color is used")
 }
 
-/// The first 20 characters of a word.
+/// Truncates a word to its first 20 characters.
 fn truncate_word(word: &str) -> String {
     word.chars().take(20).collect()
 }
@@ -157,7 +158,7 @@ fn finite(word: &str) -> Option<f64> {
     word.parse::<f32>().ok().map(f64::from).filter(|number| number.is_finite())
 }
 
-/// Clamps the value of a word to a range, with a warning.
+/// Clamps a value to a range. Adds a warning that quotes `word` if the value changes.
 fn clamp(word: &str, value: f64, [least, most]: [f64; 2], keyword: &str, warnings: &mut Vec<String>) -> f64 {
     let clamped = value.clamp(least, most);
     if clamped != value {
@@ -171,7 +172,7 @@ pub(super) fn value_clamped(word: &str, keyword: &str, limit: f64) -> String {
     format!("{word} in `{keyword}` is clamped to {limit}")
 }
 
-/// Warns about words after the first `count`.
+/// Warns if there are more than `count` words.
 fn warn_about_excess(words: &[&str], count: usize, keyword: &str, warnings: &mut Vec<String>) {
     if words.len() > count {
         warnings.push(excess_words(keyword));
@@ -179,7 +180,7 @@ fn warn_about_excess(words: &[&str], count: usize, keyword: &str, warnings: &mut
 }
 
 pub(super) fn excess_words(keyword: &str) -> String {
-    format!("words after the values of `{keyword}` are ignored")
+    format!("extra words in `{keyword}` are ignored")
 }
 
 pub(super) fn outside_gamut(keyword: &str) -> String {
@@ -213,7 +214,7 @@ fn parse_color(
         // These colors have no effect.
         (MtlColor::Ambient | MtlColor::Filter, _) => values,
         (MtlColor::Diffuse | MtlColor::Specular | MtlColor::Emission, true) => {
-            /// Rounding error of colors on the edge of the gamut.
+            /// Maximum rounding error for colors at the edge of the gamut.
             const TINY: f64 = 1e-3;
             let rgb = xyz_to_rgb(values);
             if rgb.iter().any(|part| *part < -TINY) {
@@ -270,7 +271,7 @@ fn parse_number(
     Ok(Statement::Number(number, value))
 }
 
-/// Parses an illumination model. Numbers that are not models become 255.
+/// Parses an illumination model. Unknown models become 255.
 fn illumination(rest: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let words = words_before_comment(rest);
     let number = words.first().and_then(|word| word.parse::<i64>().ok());

@@ -1,4 +1,4 @@
-//! Tests of MTL statements and their conversion to materials.
+//! Tests for MTL statements and their conversion to materials.
 
 use super::ignored::{
     AMBIENT_MAP, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY, INVISIBLE_GLASS,
@@ -17,7 +17,7 @@ use crate::math::{DVec2, Vec2, Vec3};
 /// Path of the MTL file whose materials are converted.
 const LIBRARY: &str = "models/a.mtl";
 
-/// A texture without options, defined on a line of [`LIBRARY`].
+/// A texture without options, defined on a line in [`LIBRARY`].
 fn texture_of(name: &str, line: usize) -> FileTexture {
     let statement = FileLine { path: PathBuf::from(LIBRARY), line };
     FileTexture::new(Path::new("models").join(name), statement)
@@ -27,7 +27,7 @@ fn path(texture: &Option<FileTexture>) -> Option<&Path> {
     texture.as_ref().map(|texture| texture.path.as_path())
 }
 
-/// Warnings about all materials in a text.
+/// Returns the warnings about all materials in an MTL text.
 fn warnings_of(text: &[u8]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.mtl");
@@ -47,7 +47,7 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     Ok(found.iter().map(|found| material(found, Path::new(LIBRARY))).collect())
 }
 
-/// Asserts that `line` is rejected because `expected` is missing after `keyword`.
+/// Asserts that `text` is rejected on `line` because `expected` is missing after `keyword`.
 #[track_caller]
 fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
     assert_eq!(rejection(read(text)), (Some(line), expected_after(keyword, expected)), "{text}");
@@ -171,7 +171,7 @@ fn pbr_statements_are_converted() {
 }
 
 #[test]
-fn image_paths_of_all_maps_are_listed() {
+fn all_map_images_are_listed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.mtl");
     let maps =
@@ -369,16 +369,16 @@ fn unusable_values_are_reported_with_line() {
         ("Pc 1.5", "1.5 in `Pc` is clamped to 1"),
         ("Pcr -1", "-1 in `Pcr` is clamped to 0"),
         ("d -halo 0.5", "option `-halo` is ignored"),
-        ("Kd 1 0 0 1", "words after the values of `Kd` are ignored"),
-        ("Ns 5 6", "words after the values of `Ns` are ignored"),
-        ("illum 2 3", "words after the values of `illum` are ignored"),
+        ("Kd 1 0 0 1", "extra words in `Kd` are ignored"),
+        ("Ns 5 6", "extra words in `Ns` are ignored"),
+        ("illum 2 3", "extra words in `illum` are ignored"),
         ("illum -1", UNKNOWN_MODEL),
         ("illum 300", UNKNOWN_MODEL),
-        ("d 1\nTr 0.5", "`Tr` is ignored because `d` has priority"),
+        ("d 1\nTr 0.5", "`Tr` is ignored because `d` takes precedence"),
         ("Pr .5\nNi 0.9", "`Ni` is ignored because it is not above 1; 1.5 is used"),
         ("illum 7\nNi 20", "`Ni` is clamped to 10"),
         ("Pr .5\nKd 255 0 0", "`Kd` is clamped to 1"),
-        ("illum 3\nKd .95 .95 .95\nKs .9 .9 .9", "`Ks` of a mirror over a diffuse color is clamped to 0.66"),
+        ("illum 3\nKd .95 .95 .95\nKs .9 .9 .9", "`Ks` is clamped to 0.66 for a mirror over a diffuse color"),
         ("illum 7\nNi 1.5\nKe 1 1 1", "`Ke` has no effect on glass"),
         ("illum 7\nNi 1.5\nPr 0\nPm 1", "`Pm` has no effect on glass"),
         ("illum 3\nKs 1 1 1\nKe 1 1 1", "`Ke` has no effect on mirrors"),
@@ -432,7 +432,7 @@ fn unusable_map_options_are_reported_with_line() {
 }
 
 #[test]
-fn maps_without_effect_are_reported_with_line() {
+fn ineffective_maps_are_reported_with_line() {
     let of = |statements: &str| warnings_of(format!("newmtl a\n{statements}\n").as_bytes());
     for (statements, line, words) in [
         ("illum 7\nNi 1.5\nmap_Kd t.png", 4, "`map_Kd` has no effect on glass"),
@@ -443,7 +443,7 @@ fn maps_without_effect_are_reported_with_line() {
         ("Pr 0.5\nmap_Ks t.png", 3, "`map_Ks` has no effect on materials with PBR statements"),
         ("bump h.png\nnorm n.png", 2, "`bump` has no effect because the material has a normal map"),
         ("d 0.5\nmap_d t.png", 2, "the opacity map replaces `d`"),
-        ("illum 5\nmap_Ks t.png", 3, "`Ks` has no effect without `Ns` above 0"),
+        ("illum 5\nmap_Ks t.png", 3, "`Ks` has no effect unless `Ns` is above 0"),
     ] {
         assert_eq!(of(statements), [format!("a.mtl:{line}: {words}")], "{statements}");
     }

@@ -1,4 +1,4 @@
-//! Builds single-index vertices from the statements of an OBJ file.
+//! Builds single-index vertices from the statements in an OBJ file.
 
 use std::collections::HashMap;
 
@@ -13,11 +13,12 @@ pub(super) struct FaceRun {
     pub(super) faces: usize,
     pub(super) material: u32,
     pub(super) smoothing: Smoothing,
-    /// Whether an object, group or material starts here. If so, no vertices are shared with earlier runs.
+    /// Whether an object, group or material starts at this run. If so, it shares no vertices with earlier
+    /// runs.
     pub(super) is_object: bool,
 }
 
-/// Adds the faces of all runs. In each object, every distinct combination of indices becomes a vertex.
+/// Adds the faces from all runs. Within an object, every distinct combination of indices becomes a vertex.
 pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
     let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
@@ -37,7 +38,7 @@ pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut Pars
     runs.iter().for_each(|run| builder.run(run));
 }
 
-/// Smoothing group of a vertex. For flat shading, also the face number, starting at 1.
+/// Smoothing group of a vertex and, for flat shading, the face number, starting at 1.
 type SmoothingTag = (u32, u32);
 
 struct VertexBuilder<'a> {

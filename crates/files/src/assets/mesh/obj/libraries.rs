@@ -1,4 +1,4 @@
-//! Loads the material libraries of an OBJ file.
+//! Loads the material libraries for an OBJ file.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -30,8 +30,8 @@ pub(super) struct LibraryContents {
 }
 
 impl MtlLibraries<'_> {
-    /// Loads the libraries in a statement and returns the material index of each used name they define.
-    /// Missing files only cause warnings.
+    /// Loads the libraries named in a statement. Maps each used material name that they define to its
+    /// material index. Missing files only cause warnings.
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
         let mut indices = HashMap::new();
         for path in library_paths(self.source.path, statement) {
@@ -41,8 +41,8 @@ impl MtlLibraries<'_> {
         Ok(indices)
     }
 
-    /// Returns the material index of each used name. In both OBJ and MTL files, a name may contain `#`
-    /// (`Material #25`) or be followed by a comment, so the longest match is used.
+    /// Maps each used material name to its index in `names`. In both OBJ and MTL files, a name may contain
+    /// `#` (`Material #25`) or be followed by a comment, so the longest match is used.
     fn resolve<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
@@ -85,8 +85,8 @@ impl MtlLibraries<'_> {
     }
 }
 
-/// Returns the libraries in an `mtllib` statement of the OBJ file at `obj`. The names may contain blanks, and
-/// comments may follow.
+/// Returns the libraries named in an `mtllib` statement from the OBJ file at `obj`. The names may contain
+/// blanks and may be followed by a comment.
 pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =

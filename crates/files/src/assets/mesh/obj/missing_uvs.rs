@@ -11,9 +11,10 @@ use crate::assets::FileMaterial;
 /// Faces that have corners without texture coordinates.
 #[derive(Default)]
 pub(super) struct MissingUvs {
-    /// Index of the first face in objects that have some texture coordinates, and the number of such faces.
+    /// Index of the first face that lacks texture coordinates in an object that has some, and the number of
+    /// such faces.
     partial: Option<(usize, usize)>,
-    /// Index of the first face in objects without texture coordinates, for each material with textures.
+    /// For each textured material, the index of its first face in objects without texture coordinates.
     textured: BTreeMap<u32, usize>,
 }
 
@@ -24,7 +25,7 @@ impl MissingUvs {
         let mut found = Self::default();
         let (mut face, mut corner) = (0, 0);
         for object in runs.chunk_by(|_, next| !next.is_object) {
-            // The faces that lack coordinates, with their materials.
+            // Collect the faces that lack coordinates, with their materials.
             let (mut lacking, mut has_some) = (Vec::new(), false);
             for material in object.iter().flat_map(|run| std::iter::repeat_n(run.material, run.faces)) {
                 let end = corner + statements.arities[face] as usize;
@@ -71,19 +72,19 @@ pub(super) fn uvs_missing(first: usize, count: usize) -> String {
         1 => format!("line {first}: a face has"),
         _ => format!("line {first} and {} more faces have", count - 1),
     };
-    format!("{faces} corners without texture coordinates; these are set to (0, 0)")
+    format!("{faces} corners without texture coordinates; (0, 0) is used instead")
 }
 
 /// Warning about a material with textures in a file without texture coordinates.
 pub(super) fn half_of_texture(line: usize, material: &str) -> String {
     format!(
-        "line {line}: the file has no texture coordinates: each triangle shows half of every texture of \"{material}\""
+        "line {line}: the file has no texture coordinates, so each triangle shows half of every texture in \"{material}\""
     )
 }
 
 /// Warning about faces without texture coordinates in a file that has some.
 pub(super) fn corner_of_texture(line: usize, material: &str) -> String {
     format!(
-        "line {line}: faces without texture coordinates show only the point (0, 0) of every texture of \"{material}\""
+        "line {line}: faces without texture coordinates show only the point (0, 0) of every texture in \"{material}\""
     )
 }

@@ -46,7 +46,7 @@ fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     assemble_text(source, parsed, |face| Some(face_start(source, face)))
 }
 
-/// Materials of an OBJ file.
+/// Materials for an OBJ file.
 struct ObjMaterials {
     all: Vec<FileMaterial>,
     /// Material index of each `usemtl` statement, or [`NONE`].
@@ -57,7 +57,7 @@ struct ObjMaterials {
 
 impl ObjMaterials {
     /// Loads the libraries and resolves the materials. A library applies to all later `usemtl` statements,
-    /// and to earlier ones whose material no preceding library defines.
+    /// and to earlier ones that name a material no earlier library defines.
     fn load(source: &MeshSource<'_>, changes: &[(usize, StateChange)]) -> Result<Self, AssetError> {
         let name_of = |change: &StateChange| match change {
             StateChange::Material(name) if !name.is_empty() => Some(name.clone()),

@@ -1,4 +1,4 @@
-//! Lists the files that an OBJ file references without loading it.
+//! Lists the files that an OBJ file references. Does not parse its faces or vertices.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use super::libraries::library_paths;
 use super::words::Words;
 use crate::control::{CancelToken, Cancelled};
 
-/// Lists the libraries of an OBJ file and their images. See [`super::super::referenced_files`].
+/// Lists an OBJ file's material libraries and their images. See [`super::super::referenced_files`].
 pub(in crate::assets::mesh) fn referenced_files(
     path: &Path,
     token: &CancelToken,
@@ -30,7 +30,7 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
     let mut libraries = BTreeSet::new();
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
-        // Most lines are numbers.
+        // Most lines contain only numbers.
         lines.skip_lines_without(b'm');
         let Some(line) = lines.next(token)? else { return Ok(libraries) };
         if !is_library_statement(line) {
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn files_with_errors_are_listed() {
+    fn references_in_malformed_files_are_listed() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::write(at("a.mtl"), "Kd one\nmap_Kd a.png\nnewmtl\nmap_Ks b.png\n").expect("written");

@@ -1,4 +1,4 @@
-//! Parses the statements of an OBJ file.
+//! Parses the statements in an OBJ file.
 
 use super::super::parsed::{alpha_ignored, face_of_corner};
 use super::super::text::expected;
@@ -7,16 +7,16 @@ use super::vertex::Vertices;
 use super::words::{Words, integer, number, too_few};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// Number of statements between two polls of the cancel token.
+/// Number of statements between polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
 /// Index used for an attribute that a corner lacks.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Position, texture coordinate and normal index of a corner, starting at 0.
+/// Position index, texture coordinate index and normal index of a corner, all starting at 0.
 pub(super) type CornerIndices = [u32; 3];
 
-/// Smoothing of faces without normals.
+/// Smoothing for faces without normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smoothing {
     /// No `s` statement precedes the face.
@@ -57,7 +57,7 @@ pub(super) struct Statements {
     pub(super) corners: Vec<CornerIndices>,
     /// Number of corners of each face.
     pub(super) arities: Vec<u32>,
-    /// State changes, each with the number of faces before it.
+    /// State changes, each with the number of faces that precede it.
     pub(super) changes: Vec<(usize, StateChange)>,
     pub(super) warnings: Vec<String>,
     /// Byte offset and keyword of the first free-form curve or surface.
@@ -151,7 +151,7 @@ impl Statements {
         Ok(())
     }
 
-    /// If the file has no texture coordinates or no normals, drops their indices from all corners, with a
+    /// If the file lacks texture coordinates or normals, drops their indices from all corners and adds a
     /// warning.
     fn drop_missing_attributes(&mut self, source: &MeshSource<'_>) {
         for (part, count, name) in
@@ -210,11 +210,11 @@ pub(super) fn invalid_smoothing(line: usize, found: &[u8]) -> String {
 }
 
 pub(super) fn attribute_missing(line: usize, attribute: &str) -> String {
-    format!("line {line}: faces reference {attribute}, but the file has none; ignored")
+    format!("line {line}: faces reference {attribute}, but the file has none; the references are ignored")
 }
 
 pub(super) fn excess_words(line: usize) -> String {
-    format!("line {line}: ignored words after the coordinates and color of a vertex")
+    format!("line {line}: ignored extra words after a vertex's coordinates and color")
 }
 
 pub(super) fn free_form(line: usize, keyword: &str) -> String {
@@ -239,7 +239,7 @@ pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
     0
 }
 
-/// Parses between `min` and `max` numbers in a statement. Missing numbers are 0.
+/// Parses `min` to `max` numbers in a statement. Missing numbers are 0.
 fn parse_numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;

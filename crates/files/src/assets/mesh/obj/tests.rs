@@ -31,7 +31,7 @@ fn error(text: &str) -> (Option<usize>, String) {
     rejection(read(text))
 }
 
-/// Error for a vertex index out of range.
+/// Error for an out-of-range vertex index.
 fn vertex_error(line: usize, index: i64, count: usize) -> (Option<usize>, String) {
     (Some(line), out_of_range(0, index, count))
 }
@@ -64,7 +64,7 @@ fn quads_and_relative_indices_are_read() {
 }
 
 #[test]
-fn triangles_have_their_materials() {
+fn triangles_use_their_assigned_materials() {
     let text = format!("mtllib my one.mtl\n{SQUARE}f 1 2 3\nusemtl b\nf 1 3 4\nusemtl none\nf 2 3 4\n");
     let mtl = b"newmtl a\nKd 1 0 0\nnewmtl b\nKe 5 5 5\n";
     let loaded = read_with(&[("a.obj", text.as_bytes()), ("my one.mtl", mtl)]).expect("whole");
@@ -95,7 +95,7 @@ fn only_malformed_libraries_are_errors() {
 }
 
 #[test]
-fn missing_normals_in_objects_are_computed() {
+fn objects_without_normals_get_computed_normals() {
     let text = format!("{SQUARE}vn 0 0 -1\no one\nf 1//1 2//1 3//1\no two\nf 1 3 4\n");
     let mesh = read(&text).expect("whole").mesh;
     assert_eq!(mesh.normals, [Vec3::NEG_Z, Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z, Vec3::Z, Vec3::Z]);
@@ -224,7 +224,7 @@ fn keywords_are_case_insensitive() {
     let lower = lower.expect("whole");
     assert_eq!(loaded.mesh, lower.mesh);
     assert_eq!((loaded.materials.len(), loaded.warnings.len()), (1, 1));
-    // Error line numbers include the lines of uppercase statements.
+    // Uppercase statements also count as lines in error messages.
     assert_eq!(error("V 0 0 0\nF 1 1 1\nF 1 2 3\n"), vertex_error(3, 2, 1));
 }
 
@@ -237,7 +237,7 @@ fn self_intersections_are_reported_with_line() {
 }
 
 #[test]
-fn colors_are_allowed_in_only_some_objects() {
+fn some_objects_may_lack_colors() {
     let text = "o a\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\no b\nv 0 0 1\nf 2 3 4\no a\nf 1 2 3\n";
     let mesh = read(text).expect("whole").mesh;
     let red = [255, 0, 0];
@@ -259,7 +259,7 @@ fn zbrush_paint_comments_set_vertex_colors() {
 /// Two squares that meet at a right angle along the edge from (1, 0, 0) to (1, 1, 0).
 const CORNER: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 -1\nv 1 1 -1\n";
 
-/// Normals at the corners of two faces.
+/// Returns the normals at the corners of two faces.
 fn shaded(text: &str) -> Vec<Vec3> {
     let mesh = read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
     let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("not cancelled");
@@ -299,7 +299,7 @@ fn smoothing_groups_define_hard_edges() {
 
 #[test]
 fn flat_faces_stay_flat_at_shallow_folds() {
-    // Vertices of smooth faces share normals across this fold of 11 degrees.
+    // Vertices of smooth faces share normals across this 11-degree fold.
     let fold = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\n";
     let normals = shaded(&format!("{fold}s off\nf 1 2 3 4\nf 2 5 3\n"));
     assert_eq!(normals[..6], [Vec3::Z; 6]);
@@ -335,7 +335,7 @@ fn each_corner_keeps_its_texture_coordinates() {
     assert_eq!(warnings, [uvs_missing(8, 2)]);
     let (found, warnings) = uvs("f 1/1 2/2 3\n");
     assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![uvs_missing(8, 1)]));
-    // No warning is emitted for objects without any texture coordinates.
+    // Objects without any texture coordinates do not cause a warning.
     let (found, warnings) = uvs("o one\nf 1 2 3\no two\nf 1/1 3/2 4/3\n");
     assert_eq!((found, warnings), ([none, [a, b, c]].concat(), vec![]));
 }
@@ -576,7 +576,7 @@ fn triangles_match_tobj() {
             let is_part = candidates.iter().any(|face| corners.iter().all(|corner| has(*face, corner)));
             assert!(is_part, "{name}: {corners:?}");
         }
-        // A face with coincident corners at a pole has fewer triangles.
+        // A face whose corners coincide at a pole has fewer triangles.
         let places =
             |face: &Vec<CornerBits>| face.iter().map(|((at, _), _)| *at).collect::<BTreeSet<_>>().len();
         let count: usize = faces.iter().map(|face| places(face) - 2).sum();

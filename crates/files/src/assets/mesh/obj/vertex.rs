@@ -1,4 +1,4 @@
-//! Vertices of an OBJ file, with the color extensions of several programs.
+//! Vertices in an OBJ file, including color extensions from several programs.
 
 use super::super::parsed::ColorRange;
 use super::super::text::expected;
@@ -14,9 +14,9 @@ pub(super) struct Vertices {
     range: ColorRange,
     /// Colors from ZBrush's `#MRGB` comments, in the order of the positions.
     painted: Vec<[u8; 3]>,
-    /// Minimum alpha, and the byte offset of its statement.
+    /// Minimum alpha and the byte offset of its statement.
     least_alpha: Option<(f64, usize)>,
-    /// Byte offset of the first statement with unknown words.
+    /// Byte offset of the first statement with extra words.
     pub(super) first_excess: Option<usize>,
 }
 
@@ -73,7 +73,7 @@ impl Vertices {
         Ok(())
     }
 
-    /// Adds the color of the next position.
+    /// Adds a color for the next position.
     fn add_color(&mut self, color: [f64; 3], start: usize) -> Result<(), String> {
         if !color.iter().all(|part| part.is_finite()) {
             return Err(NONFINITE_COLOR.to_owned());
@@ -100,13 +100,13 @@ impl Vertices {
         !self.colors.is_empty() || !self.painted.is_empty()
     }
 
-    /// Byte offset of the vertex with the minimum alpha. `None` if all alphas are 1. Alpha has the same range
-    /// as the colors.
+    /// Byte offset of the vertex with the minimum alpha. `None` if every alpha is at its maximum. Alpha has
+    /// the same range as the colors.
     pub(super) fn most_transparent_vertex(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
-    /// A color outside of its range: the byte offset of its vertex, and a warning.
+    /// Returns the byte offset of a vertex whose color is out of range, and a warning.
     pub(super) fn color_outside_range(&self) -> Option<(usize, String)> {
         self.range.outside()
     }

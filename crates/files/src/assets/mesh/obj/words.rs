@@ -4,7 +4,7 @@ use fast_float2::parse;
 
 use super::super::text::decoded;
 
-/// A cursor in the text of an OBJ file.
+/// A cursor in an OBJ file's text.
 pub(super) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -27,7 +27,7 @@ impl<'a> Words<'a> {
         self.at < self.bytes.len()
     }
 
-    /// Consumes the next word of this statement. A statement ends at a comment or at the end of the line,
+    /// Consumes the next word in this statement. A statement ends at a comment or at the end of the line,
     /// unless the line ends with a backslash.
     pub(super) fn word(&mut self) -> Option<&'a [u8]> {
         loop {
@@ -76,7 +76,7 @@ impl<'a> Words<'a> {
         line
     }
 
-    /// Offset of the next line if only blanks follow the backslash at `at`.
+    /// Returns the offset of the next line if only blanks follow the backslash at `at`.
     fn continuation_line(&self, at: usize) -> Option<usize> {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace() && **byte != b'\n').count();

@@ -9,7 +9,7 @@ pub(super) trait NumberReader: Clone {
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
 
-    /// Ends an item of an element, such as a vertex or a face.
+    /// Ends an item, such as a vertex or a face.
     fn end_item(&mut self) {}
 
     /// Byte offset in the file.
@@ -31,13 +31,13 @@ pub(super) const END_OF_FILE: &str = "unexpected end of file";
 #[derive(Clone)]
 pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEndMode);
 
-/// Interpretation of line ends in text files.
+/// How line ends in text files are interpreted.
 #[derive(Clone, Copy)]
 pub(super) enum LineEndMode {
     /// As whitespace.
     Blank,
-    /// A line end is the end of an item, and extra values on a line are skipped. Contains the number of lines
-    /// with extra values, and the byte offset of the first of these lines.
+    /// Each line end ends an item, and extra values on a line are skipped. Contains the number of lines with
+    /// extra values, and the byte offset of the first such line.
     EndItems(u64, Option<usize>),
 }
 

@@ -1,4 +1,4 @@
-//! Colors of a PLY file. Their range depends on their type and largest value.
+//! Colors in a PLY file. Their range depends on their type and on the largest value.
 
 use super::super::parsed::{ALPHA_IGNORED, ColorRange, Extremes, color_bytes};
 use super::header::Scalar;
@@ -9,12 +9,12 @@ pub(super) struct PlyColors {
     scalars: [Scalar; 3],
     /// Colors stored as bytes.
     bytes: Vec<[u8; 3]>,
-    /// Colors of types other than bytes.
+    /// Colors stored as types other than bytes.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
     /// Extremes of red, green and blue.
     extremes: [Extremes; 3],
-    /// Minimum alpha, its type, and a byte offset in the same item.
+    /// Minimum alpha, its type, and a byte offset in its item.
     alpha: Option<(f64, Scalar, usize)>,
 }
 
@@ -25,7 +25,7 @@ impl PlyColors {
         Self { scalars, bytes, numbers, range, extremes, alpha: None }
     }
 
-    /// Adds a color, given a byte offset in the same item.
+    /// Adds a color. `at` is a byte offset in its item.
     pub(super) fn push(&mut self, color: [f64; 3], at: usize) {
         self.extremes.iter_mut().zip(color).for_each(|(extremes, part)| extremes.add(part, at));
         if !self.are_bytes() {
@@ -57,8 +57,8 @@ impl PlyColors {
         }
     }
 
-    /// Returns the colors as bytes, and warnings about ignored alpha and values out of range, each with a byte
-    /// offset in an item concerned.
+    /// Returns the colors as bytes, and warnings about ignored alpha and out-of-range values. Each warning
+    /// has a byte offset in an affected item.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
         let max = self.extremes.iter().map(Extremes::max).fold(0.0, f64::max);
         let one = |scalar: Scalar| match scalar {

@@ -16,8 +16,8 @@ enum PropertyRole {
     Uvs,
     /// List of colors, either per corner or for the entire face.
     Colors,
-    /// Scalar value of the face (texture coordinate, color component or texture number), identified by its
-    /// index into `FaceReader::values`.
+    /// Scalar value of the face: a texture coordinate, color component or texture number. Contains its index
+    /// in `FaceReader::values`.
     Value(usize),
     Unused,
 }
@@ -80,7 +80,7 @@ pub(super) fn read(
     Ok(())
 }
 
-/// Values of the current face, and accumulated results.
+/// Values of the current face and the results accumulated so far.
 struct FaceReader {
     has_uvs: bool,
     has_uv: bool,
@@ -97,8 +97,9 @@ struct FaceReader {
     /// Texture number of the first face.
     texture: Option<f64>,
     has_several_textures: bool,
-    /// Number of faces with a list of the wrong length, and the index and byte offset of the first one.
+    /// Number of faces with a list of the wrong length.
     wrong: u64,
+    /// Index and byte offset of the first face with a list of the wrong length.
     first_wrong: (usize, usize),
 }
 
@@ -177,7 +178,7 @@ impl FaceReader {
         Ok(())
     }
 
-    /// Adds the current face, which is stored between two byte offsets, to `parsed`.
+    /// Adds the current face to `parsed`. The face is stored between the byte offsets `start` and `end`.
     fn add(&mut self, parsed: &mut ParsedMesh, start: usize, end: usize) {
         let arity = self.corners.len();
         let is_wrong = |list: &[f64], sizes| {
@@ -239,21 +240,18 @@ impl FaceReader {
 /// Warning about faces with different texture numbers.
 pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces have the same material";
 
-/// Warning about `count` faces with texture coordinate or color lists that do not match the number of
-/// corners.
+/// Warning about `count` faces whose texture coordinate or color lists do not match the number of corners.
 pub(super) fn wrong_list_length(first: &str, count: u64) -> String {
     let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
-    format!(
-        "{first}{more}: ignored texture coordinates or colors because their number does not match the corners"
-    )
+    format!("{first}{more}: ignored texture coordinates or colors that do not match the number of corners")
 }
 
-/// Allowed component counts of texture coordinates and colors in lists.
+/// Allowed numbers of components per texture coordinate and per color in a list.
 const UV_SIZES: [usize; 2] = [2, 3];
 const COLOR_SIZES: [usize; 2] = [3, 4];
 
-/// Returns a corner's components from a list that contains either one value per corner or a single value for
-/// the face.
+/// Returns a corner's components. The list contains either one value per corner or a single value for the
+/// face.
 fn corner_value(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
     match sizes.into_iter().find(|size| list.len() == size * arity) {
         Some(size) => list.get(index * size..(index + 1) * size),

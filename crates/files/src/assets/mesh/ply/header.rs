@@ -1,4 +1,4 @@
-//! Header of a PLY file: its elements and their properties.
+//! PLY header: the file's elements and their properties.
 
 use super::super::text::{expected, shown};
 use super::super::{AssetError, MeshSource};
@@ -104,7 +104,7 @@ impl Element {
 pub(super) struct PlyHeader {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Warning about skipped lines.
+    /// Warning about skipped header lines.
     pub(super) warning: Option<String>,
     /// Warning about textures.
     pub(super) texture_warning: Option<String>,
@@ -112,7 +112,7 @@ pub(super) struct PlyHeader {
     pub(super) body: usize,
 }
 
-/// Keywords of a PLY header.
+/// Keywords in a PLY header.
 const KEYWORDS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
 
 /// Parses the header.
@@ -185,14 +185,14 @@ pub(super) fn skipped_lines(first: &str, count: u32) -> String {
     }
 }
 
-/// Name of the image in a comment `TextureFile wall.png`, as MeshLab writes it.
+/// Returns the image name from a comment such as `TextureFile wall.png`, which MeshLab writes.
 fn texture_name(line: &str) -> Option<&str> {
     let comment = line.trim().strip_prefix("comment")?.trim_start();
     let (keyword, name) = comment.split_once(char::is_whitespace)?;
     keyword.eq_ignore_ascii_case("TextureFile").then(|| name.trim_start())
 }
 
-/// Warning about `count` textures, of which the first one is named on line `first`.
+/// Warning about `count` ignored textures. The first one is `name`, on line `first`.
 pub(super) fn texture_ignored(first: usize, name: &str, count: u32) -> String {
     let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
     let name = shown(name.as_bytes());
@@ -200,7 +200,7 @@ pub(super) fn texture_ignored(first: usize, name: &str, count: u32) -> String {
 }
 
 pub(super) fn too_long() -> String {
-    format!("{NO_END} in its first {} MiB, the size limit of a header", HEADER_LIMIT >> 20)
+    format!("{NO_END} in its first {} MiB, the maximum header size", HEADER_LIMIT >> 20)
 }
 
 pub(super) fn unknown_keyword(found: &str) -> String {

@@ -1,5 +1,5 @@
-//! PLY (Turk, *The PLY Polygon File Format*, 1994). Supports text and both binary byte orders, all scalar types,
-//! and unknown properties and elements.
+//! PLY (Turk, *The PLY Polygon File Format*, 1994). Supports text and both binary byte orders, all scalar
+//! types, and unknown properties and elements.
 
 mod body;
 mod colors;
@@ -16,7 +16,7 @@ use body::{Ascii, Binary, LineEndMode, NumberReader};
 use colors::PlyColors;
 use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
 
-/// Number of items between two polls of the cancel token.
+/// Number of items between polls of the cancel token.
 const BATCH: u64 = 1 << 14;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -30,8 +30,8 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     }
 }
 
-/// Reads a text file, ignoring line ends. If this fails or leaves words unread, lines may have undeclared
-/// values, so the file is read again with one item per line.
+/// Reads a text file, ignoring line ends. If this fails or leaves words unread, some lines may contain
+/// undeclared values, so the file is read again with one item per line.
 fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
     let mut words = Ascii(cursor, LineEndMode::Blank);
@@ -54,7 +54,7 @@ fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, 
     }
 }
 
-/// Adds the position in the file to errors.
+/// Adds file positions to errors.
 struct ErrorContext<'a> {
     source: &'a MeshSource<'a>,
     encoding: Encoding,
@@ -78,7 +78,7 @@ impl ErrorContext<'_> {
         }
     }
 
-    /// Adds the line number to warnings with a byte offset.
+    /// Adds line numbers to warnings that have a byte offset.
     fn located(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
         warnings.into_iter().map(|(at, words)| format!("{}{words}", self.line_prefix(at)))
     }
@@ -101,7 +101,7 @@ fn read(
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
         return Err(source.wrong(format!("too many vertices ({vertices}), or more than one vertex element")));
     }
-    // Ignore strips if there are faces: both describe the same triangles.
+    // Ignore strips if there are faces, because both describe the same triangles.
     let has_faces = count_of("face") > 0;
     let mut parsed = ParsedMesh {
         warnings: header.warning.iter().cloned().collect(),
@@ -218,7 +218,7 @@ fn list_length(numbers: &mut impl NumberReader, count: Scalar, item: Scalar) -> 
 /// Slot of a vertex's alpha property.
 const ALPHA: usize = 13;
 
-/// Maps the name of a vertex property to its slot: position, normal, texture coordinates, color, second
+/// Maps a vertex property's name to its slot: position, normal, texture coordinates, color, second
 /// texture coordinates or alpha. `None` for unknown properties.
 fn vertex_property_slot(name: &str) -> Option<usize> {
     Some(match name {
@@ -367,7 +367,7 @@ fn read_strips(
     })
 }
 
-/// Index of the property that lists the vertices of a face or a strip.
+/// Returns the index of the property that lists the vertices of a face or strip.
 fn vertex_list_index(element: &Element) -> Option<usize> {
     let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
     let corners = element.properties.iter().position(|property| is_named(&property.name));
@@ -383,8 +383,8 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
     }
 }
 
-/// Reads all items of an element. `read` receives the type and length of the list with property index
-/// `corners`.
+/// Reads all items of an element. `corners` is a property index. `read` receives the type and length of that
+/// property's list.
 fn read_lists<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,

@@ -47,8 +47,8 @@ fn both_line_ends_are_accepted() {
     assert_eq!(read_bytes(windows.as_bytes()).expect("whole").mesh, mesh);
 }
 
-/// A file with all types, unknown properties and elements, lists in the vertices, and an element before the
-/// vertices.
+/// A file with all scalar types, unknown properties and elements, list properties on the vertices, and an
+/// element before the vertices.
 fn wild(big_endian: bool) -> Vec<u8> {
     let order = if big_endian { "big" } else { "little" };
     let mut file = format!(
@@ -179,7 +179,7 @@ fn the_header_size_is_limited() {
     assert_eq!(error(long.as_bytes()).1, too_long());
     let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
     assert_eq!(error(line.as_bytes()).1, too_long());
-    // This header is just below the size limit, which falls within a line after the header.
+    // This header is just short enough. The size limit is reached within a line after it.
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
     let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
     assert!(read_bytes(fits.as_bytes()).is_ok());
@@ -210,7 +210,7 @@ fn strip_triangles_alternate_in_orientation() {
     };
     let strips = "element tristrips 1\nproperty list int int vertex_indices\n";
     let read = |list: &str| read_bytes(&file(list, strips)).expect("whole");
-    // Both triangles of a strip have the same orientation.
+    // Both triangles in a strip have the same orientation.
     assert_eq!(read("4 0 1 3 2\n").mesh.triangles, [[0, 1, 3], [3, 1, 2]]);
     // −1 starts a new strip.
     assert_eq!(read("7 0 1 3 -1 0 1 2\n").mesh.triangles, [[0, 1, 3], [0, 1, 2]]);
@@ -271,7 +271,7 @@ fn undeclared_values_are_ignored() {
         let line = if body.contains("9 9") { 11 } else { 14 };
         assert_eq!(read.warnings[0], undeclared_values(line, 2));
     }
-    // A file with undeclared values that is also truncated must not be read word by word.
+    // A truncated file with undeclared values must not be read word by word.
     let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n";
     assert_eq!(error(&ascii(rows)), (None, implausible("face", 1, 0)));
     let truncated = (Some(15), face_error(END_OF_FILE));
@@ -283,7 +283,7 @@ fn undeclared_values_are_ignored() {
     assert_eq!((joined.mesh, joined.warnings.len()), (plain.mesh, 0));
 }
 
-/// A text file with the square's vertices, the given face properties and the given face lines.
+/// A text file with the square's vertices and the specified face properties and face lines.
 fn square(vertex: (&str, [&str; 4]), face: &str, lines: &[&str]) -> String {
     let (properties, tails) = vertex;
     let xyz = "property float x\nproperty float y\nproperty float z\n";
@@ -298,7 +298,7 @@ fn square(vertex: (&str, [&str; 4]), face: &str, lines: &[&str]) -> String {
 
 const PLAIN: (&str, [&str; 4]) = ("", [""; 4]);
 
-/// Values at the corners of all triangles.
+/// Returns the values at the corners of all triangles.
 fn at_corners<T: Copy>(loaded: &LoadedMesh, values: &[T]) -> Vec<T> {
     loaded
         .mesh
@@ -367,7 +367,7 @@ fn texture_seams_do_not_change_vertex_normals() {
 }
 
 #[test]
-fn vertex_colors_of_all_types_are_read() {
+fn vertex_colors_of_any_type_are_read() {
     let colors = |scalar: &str, names: [&str; 3], tail: &str| {
         let properties: String = names.iter().map(|name| format!("property {scalar} {name}\n")).collect();
         let loaded = loaded(&square((&properties, [tail; 4]), "", &["3 0 1 2"]));

@@ -1,4 +1,4 @@
-//! Writes meshes as little-endian PLY files. Reading the file back returns the same mesh.
+//! Writes meshes as little-endian PLY files. Reading such a file returns the same mesh.
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;

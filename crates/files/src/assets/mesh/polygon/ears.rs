@@ -1,15 +1,15 @@
 //! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may
-//! touch themselves. Corners may be repeated or lie on other edges, and holes may be connected to the outline
-//! by a double edge.
+//! touch themselves. Corners may be repeated or may be on other edges, and holes may be connected to the
+//! outline by a double edge.
 
 use std::collections::VecDeque;
 
 use super::tree::{CornerTree, twice_signed_area};
 use crate::math::DVec2;
 
-/// Limit on the number of visited corners and tree nodes: a number of visits per corner, plus a constant.
-/// Simple polygons need about 50 visits per corner. Polygons that wind around the same corners many times may
-/// exceed the limit. Beyond the limit, corners are clipped without testing them.
+/// Maximum number of visits to corners and tree nodes: this many per corner, plus [`EXTRA_VISITS`]. Simple
+/// polygons need about 50 visits per corner. Polygons that wind around the same corners many times may exceed
+/// the limit. Corners are then clipped without being tested.
 const VISITS_PER_CORNER: u64 = 200;
 const EXTRA_VISITS: u64 = 1_000_000;
 
@@ -22,7 +22,7 @@ pub(super) fn clip(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
     Clipper::new(points, emit).run()
 }
 
-/// Returns whether all cuts are diagonals, and the number of visits.
+/// Like [`clip`], but also returns the number of visits.
 #[cfg(test)]
 pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = Clipper::new(points, |_| {});
@@ -36,10 +36,10 @@ struct Clipper<'a, F> {
     previous: Vec<u32>,
     remaining: usize,
     tree: CornerTree,
-    /// Corners to test, with their stamps. Entries with an old stamp are skipped.
+    /// Corners to test, each with a stamp. Entries with an outdated stamp are skipped.
     queue: VecDeque<(u32, u32)>,
     stamps: Vec<u32>,
-    /// For each corner, the head of its list of blocked corners in `waiting`.
+    /// For each corner, the head of its list of blocked corners. The lists are stored in `waiting`.
     first_waiting: Vec<u32>,
     waiting: Vec<(u32, u32, u32)>,
     visits: u64,
@@ -179,9 +179,9 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         }
     }
 
-    /// Finds a corner at which the outline enters the triangle of a convex corner. If there is one, the
-    /// convex corner is not an ear. Unless `may_touch`, corners on the diagonal also count, because the
-    /// triangles on the two sides of the diagonal would not share these vertices.
+    /// Finds a corner that prevents a convex corner from being an ear: one at which the outline enters the
+    /// convex corner's triangle. Unless `may_touch` is true, corners on the diagonal also count, because the
+    /// triangles on its two sides would not share these vertices.
     fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
         if self.visits > self.max_visits {
             return None;
@@ -198,8 +198,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         found
     }
 
-    /// Whether the outline enters the interior of a triangle at this corner, or (unless `may_touch`) the
-    /// corner lies on the diagonal.
+    /// Whether the outline enters a triangle's interior at this corner. Unless `may_touch` is true, corners
+    /// on the diagonal also count.
     fn outline_enters(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
@@ -210,8 +210,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         if !may_touch && turns[2] == 0.0 && point != a && point != c {
             return true;
         }
-        // If the corner is on one or more sides of the triangle, a neighbor enters the triangle if it is on
-        // the inner side of each of these sides.
+        // If the corner is on the triangle's boundary, the outline enters the triangle if a neighbor is
+        // inside every side that the corner is on.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
             let sides = self::turns(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
@@ -219,7 +219,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     }
 }
 
-/// For each edge of a triangle, the side on which the point lies (positive: inside).
+/// Returns which side of each triangle edge a point is on. Positive values are inside.
 fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     [twice_signed_area(a, b, point), twice_signed_area(b, c, point), twice_signed_area(c, a, point)]
 }

@@ -5,8 +5,8 @@ mod tree;
 
 use crate::math::{DVec2, DVec3, Vec3};
 
-/// Triangulates a polygon of at least 3 finite points. Emits each triangle as three corner indices, with the
-/// polygon's orientation. Returns whether the triangles cover the polygon exactly once. Self-intersecting
+/// Triangulates a polygon with at least 3 finite points. Emits each triangle as three corner indices, with
+/// the polygon's orientation. Returns whether the triangles cover the polygon exactly once. Self-intersecting
 /// polygons are triangulated as well as possible.
 pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> bool {
     let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
@@ -26,7 +26,8 @@ pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> 
     }
 }
 
-/// Projects the points along the largest component of the normal, in counterclockwise order. This is exact.
+/// Projects the points along the axis of the normal's largest component, in counterclockwise order. The
+/// projection is exact.
 fn project_points(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let axis = normal.abs().max_position();
     let (first, second) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -34,7 +35,7 @@ fn project_points(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     points.iter().map(|point| DVec2::new(point[x], point[y])).collect()
 }
 
-/// Sum of the normals of a triangle fan (Newell's method). Does not depend on the origin.
+/// Returns the sum of the triangle normals in a fan (Newell's method). Does not depend on the fan's origin.
 fn newell_normal(points: &[DVec3]) -> DVec3 {
     let origin = points[0];
     points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()

@@ -23,7 +23,7 @@ fn covering(space: &[Vec3], points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Twice the signed area enclosed by these corners (the shoelace formula).
+/// Twice the signed area that the corners enclose (the shoelace formula).
 fn area(points: &[(f32, f32)], corners: &[usize]) -> f64 {
     let at = |index: usize| {
         let (x, y) = points[corners[index % corners.len()]];
@@ -160,7 +160,7 @@ fn sieve(side: usize) -> Points {
     for hole in 0..side * side {
         let (x, y) = (3.0 * (hole % side) as f32 + 1.0, 3.0 * (hole / side) as f32 + 1.0);
         let corners = [(x, y), (x, y + 2.0), (x + 2.0, y + 2.0), (x + 2.0, y)];
-        // Start the double edge at a corner of the outline, or of the hole below or to the left.
+        // Start the double edge at a corner of the outline or of a neighboring hole (below or to the left).
         let from = match (hole % side, hole / side) {
             (0, 0) => (0.0, 0.0),
             (0, _) => (x, y - 1.0),

@@ -1,11 +1,11 @@
-//! A k-d tree over a polygon's corners that supports removal.
+//! A k-d tree over a polygon's corners. Corners can be removed.
 
 use crate::math::DVec2;
 
 /// Maximum number of corners per leaf.
 const LEAF: usize = 8;
 
-/// Corners in the plane, ordered so that each node is a contiguous range.
+/// Polygon corners in the plane, ordered so that each tree node is a contiguous range.
 pub(super) struct CornerTree {
     order: Vec<u32>,
     /// Index of each corner in `order`.
@@ -72,8 +72,8 @@ impl CornerTree {
         }
     }
 
-    /// Searches the nodes that overlap the triangle and returns a corner accepted by `is_wanted`. Removed
-    /// corners are not filtered out. Adds the number of visited nodes and corners to `visits`.
+    /// Searches the nodes that overlap the triangle, and returns a corner that `is_wanted` accepts. Passes
+    /// removed corners to `is_wanted` as well. Adds the number of visited nodes and corners to `visits`.
     pub(super) fn find(
         &self,
         triangle: [DVec2; 3],
@@ -108,7 +108,7 @@ impl CornerTree {
 /// Whether a box is entirely outside one side of a triangle.
 fn is_outside([a, b, c]: [DVec2; 3], low: DVec2, high: DVec2) -> bool {
     [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| {
-        // Test the innermost corner of the box.
+        // Test the corner of the box that is farthest inside.
         let x = if to.y > from.y { low.x } else { high.x };
         let y = if to.x > from.x { high.y } else { low.y };
         twice_signed_area(from, to, DVec2::new(x, y)) < 0.0

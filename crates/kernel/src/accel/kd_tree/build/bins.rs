@@ -1,7 +1,7 @@
 //! Splits large cells. Candidate planes are evenly spaced on all three axes, and each box is counted in the
 //! bins where it starts and ends (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction
 //! for Interactive Ray Tracing of Dynamic Scenes*, 2007). The faces of the references' bounding box are also
-//! candidates, because space beyond them is empty.
+//! candidates, because the space beyond them is empty.
 
 use std::array;
 
@@ -26,7 +26,7 @@ struct Histogram {
     ends: [[u32; PLANES]; 3],
 }
 
-/// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits.
+/// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits of the sum.
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
@@ -57,7 +57,7 @@ impl Histogram {
     }
 }
 
-/// Finds the cheapest plane. Returns `None` if a leaf costs no more.
+/// Finds the cheapest plane. Returns `None` if a leaf is no more expensive.
 pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     let around = SimdBounds::around(references);
     let extent = around.extent();
@@ -91,6 +91,6 @@ pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<S
             &CandidatePlanes { at: four(at), left: counts(left), right: counts(right) },
         );
     }
-    // At a face of the bounding box, put references within the plane on the nonempty side.
+    // At a face of the bounding box, put references in the plane on the nonempty side.
     search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -1,5 +1,5 @@
-//! Expected cost of a split, from surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
-//! subdivision*, 1990). Evaluates four planes at a time.
+//! Expected cost of a split, estimated from surface areas (MacDonald, Booth, *Heuristics for ray tracing
+//! using space subdivision*, 1990). Evaluates four planes at a time.
 
 use crate::accel::reference::SimdBounds;
 use crate::math::{Vec3, Vec4};
@@ -10,10 +10,10 @@ const TRAVERSAL_COST: f32 = 1.0;
 /// Cost factor for a split that cuts off empty space.
 const EMPTY_FACTOR: f32 = 0.8;
 
-/// Tag of a leaf, in place of an axis.
+/// Leaf tag, stored in place of an axis.
 const LEAF: usize = 3;
 
-/// Tag bit above the axis, set if triangles within the plane go to the right.
+/// Tag bit above the axis. Set if triangles in the plane go to the right.
 const PLANAR_RIGHT: usize = 4;
 
 /// A splitting plane.
@@ -21,7 +21,7 @@ const PLANAR_RIGHT: usize = 4;
 pub struct SplitPlane {
     pub axis: usize,
     pub at: f32,
-    /// Whether triangles within the plane go to the right.
+    /// Whether triangles in the plane go to the right.
     pub planar_right: bool,
 }
 
@@ -38,7 +38,8 @@ pub struct CandidatePlanes<const N: usize> {
 pub struct PlaneSearch<const N: usize> {
     min: [f32; 4],
     max: [f32; 4],
-    /// Edge lengths of the cell. Flat cells are slightly thickened to allow splitting cells without area.
+    /// Edge lengths of the cell. Flat cells are slightly thickened, so that even cells without area can be
+    /// split.
     extent: [f32; 3],
     inverse_area: f32,
     cost: [Vec4; N],
@@ -48,7 +49,7 @@ pub struct PlaneSearch<const N: usize> {
 }
 
 impl<const N: usize> PlaneSearch<N> {
-    /// Starts a search for planes that are cheaper than a leaf with `count` triangles.
+    /// Starts a search for a plane that is cheaper than a leaf with `count` triangles.
     #[inline(always)]
     pub fn new(cell: &SimdBounds, count: usize) -> Self {
         let extent = cell.extent().truncate();
@@ -86,7 +87,7 @@ impl<const N: usize> PlaneSearch<N> {
         }
     }
 
-    /// Updates the lanes in which a plane improves on the best cost so far.
+    /// Updates the lanes whose plane is cheaper than their best plane so far.
     #[inline(always)]
     fn update_lanes(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);
@@ -95,7 +96,7 @@ impl<const N: usize> PlaneSearch<N> {
         self.tag[i] = Vec4::select(is_cheaper, tag, self.tag[i]);
     }
 
-    /// Returns the cheapest plane, or `None` if a leaf costs no more.
+    /// Returns the cheapest plane, or `None` if a leaf is no more expensive.
     #[inline(always)]
     pub fn cheapest(mut self) -> Option<SplitPlane> {
         for i in 1..N {

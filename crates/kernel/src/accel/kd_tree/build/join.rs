@@ -52,7 +52,7 @@ impl TreePart {
         all
     }
 
-    /// Writes the part, given the number of nodes and references that precede it.
+    /// Writes the part, given the numbers of nodes and references that precede it.
     fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: SubtreeSize) {
         match self {
             Self::Built(subtree) => {

@@ -26,21 +26,22 @@ use join::TreePart;
 use partition::PartitionBuffers;
 use subtree::KdSubtree;
 
-/// Maximum number of references in a cell built by a single thread. The token is polled between such cells.
+/// Maximum number of references in a cell built by a single thread. The cancellation token is polled between
+/// such cells.
 const TASK_SIZE: usize = 4096;
 
-/// Maximum number of leaves plus references. A tree has fewer than two nodes per leaf, and node indices must
-/// fit into a [`KdNode`].
+/// Maximum total number of leaves and references. A tree has fewer than two nodes per leaf, and node indices
+/// must fit into a [`KdNode`].
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
 /// All triangles must fit into a single leaf.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Maximum number of leaves plus references per triangle. Typical meshes need only a fraction of this. Many
-/// triangles around a single vertex could produce far more references.
+/// Maximum total number of leaves and references per triangle. Typical meshes need only a fraction of this.
+/// Many triangles around a single vertex could produce far more references.
 const MOST_PER_TRIANGLE: u64 = 24;
 
-/// Added to the triangle count to give small meshes enough room.
+/// Number added to the triangle count, so that small meshes have enough room.
 const FEW: u64 = 64;
 
 /// Marks a triangle without an assigned position.
@@ -73,7 +74,7 @@ pub fn build(
     build_within(room, count, corners, token)
 }
 
-/// [`build`] with at most `room` leaves plus references.
+/// [`build`] with at most `room` leaves and references in total.
 fn build_within(
     room: u64,
     count: u32,
@@ -95,7 +96,7 @@ fn build_within(
     Ok(BuiltKdTree { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
-/// Orders the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
+/// Sorts the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
 fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     let mut places = vec![NOWHERE; count as usize];
     let mut order = Vec::with_capacity(count as usize);
@@ -110,18 +111,18 @@ fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     (ids, order)
 }
 
-/// A region of space to be covered by a subtree.
+/// A region of space that a subtree covers.
 #[derive(Clone, Copy)]
 struct Cell {
     bounds: SimdBounds,
     /// Maximum number of levels in the cell's subtree.
     levels: u32,
-    /// Maximum number of leaves plus references in the cell.
+    /// Maximum total number of leaves and references in the cell.
     room: u64,
 }
 
 impl Cell {
-    /// Chooses the splitting plane, or `None` for a leaf.
+    /// Chooses the splitting plane. Returns `None` if the cell should become a leaf.
     fn choose_split(&self, references: &[TriangleReference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
         let has_room = 2 * leaf_room(references.len()) <= self.room;
@@ -195,12 +196,12 @@ mod tests {
             let built = build(count, fan(count), &CancelToken::new()).expect("never canceled");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
             assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
-            assert!(size > 4 * u64::from(count), "{size} for {count}: most of the room is unused");
+            assert!(size > 4 * u64::from(count), "{size} for {count}: most of the room was left unused");
         }
     }
 
     #[test]
-    fn size_limit_leads_to_early_leaves() {
+    fn size_limit_stops_splitting_early() {
         let fan = |id: u32| {
             let angle = id as f32 * 0.1;
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
@@ -217,6 +218,6 @@ mod tests {
             assert!(size(room) <= room, "{} in {room}", size(room));
         }
         assert_eq!(size(6001), 6001, "one leaf");
-        assert!(size(20_000) > 6001, "the available room should be used");
+        assert!(size(20_000) > 6001, "the tree should use the available room");
     }
 }

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 /// Reusable buffers for partitioning.
 #[derive(Default)]
 pub struct PartitionBuffers {
-    /// References on the left, followed by stale entries.
+    /// References on the left of the plane, followed by stale entries.
     left: Vec<TriangleReference>,
     /// Left and right indices of the references that are on both sides.
     on_both: Vec<[u32; 2]>,
@@ -75,7 +75,7 @@ mod tests {
     use crate::math::random::signed as random;
 
     #[test]
-    fn partitioning_keeps_order_and_overlap() {
+    fn partition_keeps_order_and_straddlers() {
         let mut next = random(29);
         let mut step = || Vec3::new(next(), next(), next()).map(|x| (x * 6.0).round());
         let mesh: Vec<[Vec3; 3]> = (0..200_u32)

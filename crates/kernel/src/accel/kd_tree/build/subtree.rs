@@ -40,7 +40,7 @@ impl KdSubtree {
 /// Builds a subtree, reusing the same buffers for all cells.
 struct KdSubtreeBuilder<'a, C> {
     built: KdSubtree,
-    /// References of all pending cells. The next cell's references are last.
+    /// References of all pending cells. Those of the next cell are last.
     references: Vec<TriangleReference>,
     scratch: PartitionBuffers,
     corners: &'a C,
@@ -48,8 +48,8 @@ struct KdSubtreeBuilder<'a, C> {
 }
 
 impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
-    /// Adds a cell and removes its references, which begin at `first`. The recursion depth is limited by the
-    /// tree depth.
+    /// Builds the nodes for a cell and removes the cell's references, which begin at `first`. The recursion
+    /// depth is limited by the tree depth.
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
@@ -74,5 +74,5 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     }
 }
 
-/// Number of references above which splitting a cell polls the token.
+/// Number of references above which splitting a cell polls the cancellation token.
 const POLLED: usize = 256;

@@ -25,7 +25,8 @@ type Values<const N: usize> = [[f32; 4]; N];
 /// [`cheapest`] for at most 4·`N` references.
 fn cheapest_of<const N: usize>(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     let mut search = PlaneSearch::<N>::new(cell, references.len());
-    // Starts and ends of the boxes along each axis. Unused lanes start above every plane and end below it.
+    // Store the start and the end of each box along each axis. Unused lanes start above every plane and end
+    // below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
     for (place, reference) in references.iter().take(4 * N).enumerate() {
         let (min, max) = (reference.bounds.min.to_array(), reference.bounds.max().to_array());

@@ -96,7 +96,7 @@ impl UpperNodes {
         (nodes, self.subtrees.iter().flat_map(|subtree| subtree.packs.iter().copied()).collect())
     }
 
-    /// Start of each subtree, followed by the end of the last subtree.
+    /// Start position of each subtree, followed by the end of the last subtree.
     fn subtree_starts(&self) -> Vec<SubtreeStart> {
         let mut start = SubtreeStart { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];

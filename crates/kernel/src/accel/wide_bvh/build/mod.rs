@@ -20,7 +20,8 @@ use crate::math::Vec3;
 use split::{ReferenceRange, partition};
 use subtree::WideSubtree;
 
-/// Maximum number of triangles in a part built by a single thread. The token is polled between such parts.
+/// Maximum number of triangles in a part built by a single thread. The cancellation token is polled between
+/// such parts.
 const TASK_SIZE: usize = 8192;
 
 /// A finished wide BVH.
@@ -70,8 +71,8 @@ enum TreePart {
     Built(WideSubtree),
 }
 
-/// Splits parts in parallel until they are small enough for a single thread. `start` is the overall index of
-/// the part's first reference.
+/// Splits parts in parallel until they are small enough for a single thread. `start` is the index of the
+/// part's first reference among all references.
 fn build_part(
     references: &mut [TriangleReference],
     start: usize,

@@ -31,11 +31,12 @@ const SURFACE_AREA_LEVELS: u32 = 56;
 pub struct ReferenceRange {
     pub count: usize,
     pub bounds: SimdBounds,
-    /// Number of splits above this segment.
+    /// Number of ancestors of this segment.
     level: u32,
-    /// `None` if a leaf costs no more than the best split, even without the cost of the traversal step.
+    /// The best split. `None` if it costs at least as much as a leaf, even without counting the traversal
+    /// step.
     pub split: Option<Split>,
-    /// Whether the segment is worth a separate node.
+    /// Whether the segment is worth its own node.
     pub is_node: bool,
 }
 
@@ -95,7 +96,7 @@ impl SegmentBounds {
     }
 }
 
-/// Chooses the best split of a segment, and whether the segment is worth a separate node.
+/// Chooses the best split of a segment, and decides whether the segment is worth its own node.
 fn choose_split(
     references: &[TriangleReference],
     boxes: &SegmentBounds,
@@ -181,7 +182,7 @@ struct CheapestBinSplit {
     axis: usize,
     /// First bin on the right.
     bin: usize,
-    /// Sum over both sides of pack count times surface area.
+    /// Pack count times surface area, summed over both sides.
     cost: f32,
     sides: [SimdBounds; 2],
 }
@@ -298,7 +299,7 @@ fn partition_along_axis<const AXIS: usize>(
     }
 }
 
-/// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
+/// Moves the references below a bin to the front. Returns how many there are, and the bounding boxes of the
 /// centroids on both sides. Branchless, since data-dependent branches would often be mispredicted: every
 /// reference is swapped with the first one on the right, and then the length of the left side is incremented
 /// by 0 or 1.

@@ -7,7 +7,7 @@ use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 /// A range of references that forms a triangle pack.
 #[derive(Clone, Copy, Debug)]
 pub struct PackRange {
-    /// Overall index of the first reference.
+    /// Index of the first reference among all references.
     pub first: u32,
     /// Number of references, from one to four.
     pub count: u32,
@@ -23,7 +23,7 @@ pub struct WideSubtree {
 }
 
 impl WideSubtree {
-    /// Builds a subtree over `references`. `start` is the overall index of the first reference.
+    /// Builds a subtree over `references`. `start` is the index of the first reference among all references.
     pub fn build(references: &mut [TriangleReference], start: usize, segment: ReferenceRange) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),

@@ -15,7 +15,7 @@ const MOST_MORE: f64 = 0.3;
 /// Number of levels in the grid of planes. The grid has 2^`LEVELS` cells along each axis.
 const LEVELS: u32 = 20;
 
-/// Number of references processed between polls of the token.
+/// Number of references processed between polls of the cancellation token.
 const CHUNK: usize = 4096;
 
 /// Splits the references of large triangles. The result depends only on the triangles.
@@ -48,7 +48,7 @@ pub fn split_large(
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// Number of times to cut a triangle with the given priority.
+/// How often to cut a triangle with this priority.
 fn cut_count(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
@@ -62,7 +62,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
     }
-    // Rounding down loses less than one cut per triangle.
+    // Rounding down loses less than one cut for each triangle.
     let (mut low, mut high) =
         ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
     for _ in 0..12 {

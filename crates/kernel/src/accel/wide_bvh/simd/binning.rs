@@ -1,5 +1,5 @@
-//! SIMD inner loops for construction. Each register contains an entire box. They compute the same numbers as
-//! the scalar code in `build::split`.
+//! SIMD inner loops for tree construction, with an entire box in each register. The loops compute the same
+//! numbers as the scalar code in `build::split`.
 
 use super::InstructionSet;
 use crate::accel::reference::{SimdBounds, TriangleReference};
@@ -17,7 +17,7 @@ pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into
     false
 }
 
-/// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
+/// Moves the references below a bin to the front. Returns how many there are, and the bounding boxes of the
 /// centroids on both sides. Returns `None` and does nothing if the processor lacks AVX2.
 pub fn partition<const AXIS: usize>(
     references: &mut [TriangleReference],

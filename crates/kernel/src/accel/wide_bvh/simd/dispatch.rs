@@ -1,6 +1,6 @@
-//! Recompiles portable loops for several x86-64 instruction sets. Operations are never reordered, and are
-//! fused only where rounding cannot change the final result. Therefore, results are bit-identical on all
-//! instruction sets.
+//! Recompiles portable loops for several x86-64 instruction sets. Operations are never reordered, and they
+//! are fused only where the different rounding cannot affect the final result. Therefore, results are
+//! bit-identical on all instruction sets.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;

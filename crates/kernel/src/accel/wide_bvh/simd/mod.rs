@@ -50,8 +50,8 @@ impl InstructionSet {
     /// All instruction sets, slowest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The fastest supported instruction set. For comparisons, the environment variable `GLIMT_SIMD=portable`
-    /// or `GLIMT_SIMD=avx2` selects a slower one.
+    /// The fastest supported instruction set. To compare instruction sets, select a slower one with the
+    /// environment variable `GLIMT_SIMD` (`portable` or `avx2`).
     pub fn best() -> Self {
         static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {

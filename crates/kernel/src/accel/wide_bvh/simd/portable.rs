@@ -7,7 +7,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// Whether a ray can hit anything. Non-finite rays and rays with zero direction cannot, although they would
+/// Whether a ray can hit anything. Non-finite rays and rays with a zero direction cannot, although they would
 /// pass every box test.
 fn may_hit(ray: &Ray) -> bool {
     ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO

@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Ray};
 /// Minimum absolute direction component, as a fraction of the largest component.
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 
-/// A ray preprocessed for the boxes of nodes and the triangles of packs.
+/// A ray preprocessed for testing the boxes in nodes and the triangles in packs.
 pub struct SimdRay {
     /// Inverse direction.
     to_near: [SimdF32x8; 3],
@@ -23,7 +23,7 @@ pub struct SimdRay {
     from_far: [SimdF32x8; 3],
     /// For each axis, the row of a node that contains the near planes.
     near: [usize; 3],
-    /// Origin permuted to the axes of the sheared ray.
+    /// Origin, with coordinates in the axis order of the sheared ray.
     origin: [SimdF32x4; 3],
     shear: [SimdF32x4; 3],
     axes: [usize; 3],
@@ -128,7 +128,7 @@ fn broadcast_to_four(v: __m128) -> [SimdF32x4; 3] {
 }
 
 impl SimdRay {
-    /// Preprocesses a ray for triangles inside the box `whole`.
+    /// Preprocesses a ray for testing triangles inside the box `whole`.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
@@ -221,7 +221,7 @@ impl SimdRay {
         }
     }
 
-    /// Corners of all lanes in the ray's coordinates. `row` is their first row.
+    /// One corner of each triangle, in the ray's coordinates. `row` is the corner's first row.
     #[inline(always)]
     fn corner(&self, pack: &TrianglePack, row: usize) -> [SimdF32x4; 3] {
         let z = self.row(pack, row, 2);

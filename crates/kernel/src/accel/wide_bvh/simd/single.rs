@@ -90,7 +90,7 @@ fn update_nearest_of_pack(
     }
 }
 
-/// Non-inlined version of [`update_nearest`], which is rarely needed.
+/// Non-inlined version of [`update_nearest`] for rare cases.
 #[cold]
 #[inline(never)]
 fn update_nearest_uninlined(

@@ -95,7 +95,7 @@ fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_deter
     (shear_z.splat_like(3.0) * sum * inverse_determinant.abs(), z)
 }
 
-/// Largest absolute value of the corners' coordinates along an axis.
+/// Largest absolute coordinate of the corners along an axis.
 #[inline(always)]
 fn max_abs_corner<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
@@ -108,8 +108,8 @@ mod tests {
     use crate::accel::wide_bvh::simd::vector::SimdF32x4;
     use crate::math::random::signed as random;
 
-    /// Tests triangles slightly within and slightly beyond the filter's limits on thinness and distance from
-    /// the origin.
+    /// Tests triangles slightly inside and slightly outside the filter's limits on thinness and on distance
+    /// from the origin.
     #[test]
     fn filter_rejects_only_clear_misses() {
         // SAFETY: every x86-64 processor supports four-float vectors.
@@ -142,7 +142,7 @@ mod tests {
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = SimdF32x4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = SimdF32x4::movemask(t.abs().le(error)) != 0;
-            // End the ray in front of the triangle, on it, behind it, or at infinity.
+            // Place the ray's end in front of the triangle, on it, behind it, or at infinity.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
@@ -164,7 +164,7 @@ mod tests {
             clear += u32::from(!passes);
         }
         assert!(needles > 20_000 && starts > 2_000 && clear > 20_000, "{needles}, {starts}, {clear}");
-        assert!(passed < 4 * (needles + starts), "{passed} pass; {needles} needles, {starts} at start");
+        assert!(passed < 4 * (needles + starts), "{passed} passed, {needles} needles, {starts} at origin");
         assert!(beyond > 5_000, "{beyond} past the end");
     }
 }

@@ -58,7 +58,7 @@ fn quad_power_is_the_mean_of_its_texture() {
     assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
 }
 
-/// The triangles of a curved and transformed sheet, with UVs.
+/// The triangles of a curved sheet after a transform, with their UV coordinates.
 fn sheet(side: u32) -> Vec<UvTriangle> {
     let transform = Transform::scale_rotate_translate(
         DVec3::new(0.5, -1.5, 0.8),

@@ -10,7 +10,7 @@ use crate::math::frame::Frame;
 use glimt_base::soa;
 
 soa! {
-    /// Reflection by rough glass or transmission through it.
+    /// Reflection from rough glass, or transmission through it.
     pub struct DielectricBxdf<const THROUGH: bool> in DielectricPacket {
         /// [`GlassPoint::near`].
         near: f32 = 1.0,
@@ -39,16 +39,17 @@ const MIN_COSINE: f32 = 1e-6;
 pub struct SideSample {
     /// Unit direction.
     pub wi: Vec3,
-    /// Pdf of the direction in sr⁻¹. 0 if no light arrives from there.
+    /// Pdf of the direction in sr⁻¹. 0 for directions from which no light arrives.
     pub pdf: f32,
     /// f·cosθ of the lobe divided by the pdf.
     pub weight: f32,
-    /// Whether the direction is on the opposite side from the light of the BSDF.
+    /// Whether the direction and the BSDF's light are on opposite sides.
     pub is_beyond: bool,
 }
 
 impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
-    /// Smith terms of the directions to the viewer and to the light, each with the normal on its side.
+    /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
+    /// side.
     #[inline(always)]
     fn smith_terms(&self, view: &DielectricView, wi: Vec3) -> [SmithTerms; 2] {
         let lit = if THROUGH { -view.normal } else { view.normal };
@@ -79,7 +80,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
         let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha)));
         let value = value * (self.far * self.far);
-        // Nearly equal indices do not have a usable half vector.
+        // If the indices are nearly equal, there is no usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
     }
 
@@ -188,8 +189,8 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
         if !THROUGH {
             return Some(NarrowLobe::of_microfacets(normal, wo, self.alpha, reflectance, 0.0));
         }
-        // Rotating a facet at normal incidence rotates the refracted direction by 1 − 1/η times the facet's
-        // angle, whereas a reflected direction rotates by twice this angle.
+        // At normal incidence, rotating a facet by an angle rotates the refracted direction by 1 − 1/η times
+        // this angle, and a reflected direction by twice this angle.
         let alpha = 0.5 * (1.0 - 1.0 / eta).abs() * self.alpha;
         let axis = refract_at(normal, wo, eta);
         let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, wo, alpha, 1.0, 0.0) };

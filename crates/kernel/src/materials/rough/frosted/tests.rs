@@ -20,7 +20,7 @@ fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
     GlassPoint { near, far, alpha }
 }
 
-/// The reflection and the transmission of a surface seen from a direction.
+/// The reflection and the transmission of a surface that is seen from a direction.
 fn parts(
     point: &GlassPoint,
     to_eye: DVec3,
@@ -30,7 +30,8 @@ fn parts(
     (reflection, Subject::lit(point, alphas, to_eye, LitFrom::Refracted(eta)))
 }
 
-/// f of transmission for basic radiance, as in Walter et al. (equations 16, 20, 21, and 33, with our G).
+/// Computes f for transmission of basic radiance, as in Walter et al. (equations 16, 20, 21, and 33, with our
+/// G).
 fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
     let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
     let half = -(i * far + o * near).normalize();
@@ -63,7 +64,7 @@ fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// A pair of directions. The second is near the lobe's peak or arbitrary.
+/// Returns a pair of directions. The second one is either near the lobe's peak or arbitrary.
 fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (DVec3, Option<DVec3>) {
     let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
@@ -140,7 +141,7 @@ fn reflection_matches_the_formulas() {
                 let eta = f64::from(point.far) / f64::from(point.near);
                 let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
                 let exact = fresnel * reference(o, i, [f64::from(alpha); 2]);
-                // Near total reflection, the reflectance has an unbounded slope.
+                // Near total reflection, the slope of the reflectance is unbounded.
                 let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
                 assert!(
                     (there - exact).abs() <= room * error * exact + 1e-12,
@@ -233,7 +234,7 @@ fn two_sided_samples_match_one_sided_samples() {
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
-                // The vertices on both sides generate the same continuation, which is on one side only.
+                // The vertices on both sides generate the same continuation, which is only on one side.
                 assert_eq!((up.direction, up.density, up.share), (down.direction, down.density, down.share));
                 assert_ne!(up.is_beyond, down.is_beyond, "{what}");
                 let side = usize::from(up.is_beyond);

@@ -28,12 +28,12 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
         wo: Vec3 = Vec3::Z,
-        /// Direction along u. Arbitrary for isotropic surfaces.
+        /// Direction of u. Arbitrary for isotropic surfaces.
         tangent: Vec3 = Vec3::X,
     }
 }
 
-/// Has an index of refraction instead of a color.
+/// Set if the conductor has an index of refraction instead of a color.
 const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
@@ -42,7 +42,7 @@ impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
         if BRUSHED { frame_along(view.normal, view.tangent) } else { Frame::from_normal(view.normal) }
     }
 
-    /// Smith terms of the directions to the viewer and to the light.
+    /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
     fn smith_terms(&self, view: &ConductorView, wi: Vec3) -> [SmithTerms; 2] {
         if BRUSHED {
@@ -70,7 +70,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
 
     #[inline(always)]
     fn new(point: &ConductorPoint, tangent: Vec3) -> Self {
-        // Without texture coordinates, the surface is isotropic. Its α is the geometric mean of the two α
+        // Without texture coordinates, the surface is isotropic. Its α is the geometric mean of both α
         // values.
         let [u, v] = point.alphas;
         let mean = (u * v).sqrt();

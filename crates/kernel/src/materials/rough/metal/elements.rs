@@ -10,7 +10,7 @@ use crate::choice;
 use crate::math::Vec3;
 
 choice! {
-    /// A metal with a known index of refraction.
+    /// A metal whose index of refraction is built in.
     pub enum Element {
         /// Au.
         Gold = "gold",
@@ -30,7 +30,7 @@ choice! {
 }
 
 impl Element {
-    /// Real and imaginary part of the index of refraction.
+    /// Real and imaginary parts of the index of refraction.
     pub fn index(self) -> [Vec3; 2] {
         let [eta, k] = match self {
             Self::Gold => [[0.108, 0.488, 1.478], [3.508, 2.338, 1.809]],

@@ -1,5 +1,4 @@
-//! Conductors: microfacets with the exact Fresnel equations, or with Schlick's approximation for a given
-//! color.
+//! Conductors: microfacets with the exact Fresnel equations, or with Schlick's approximation for a color.
 
 mod bxdf;
 pub mod elements;
@@ -29,7 +28,7 @@ pub struct Conductor {
 /// Reflectance of a smooth conductor as a function of angle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConductorFresnel {
-    /// Schlick's approximation, from the reflectance at normal incidence.
+    /// Schlick's approximation, based on the reflectance at normal incidence.
     Schlick(Color),
     /// Exact equations, from the complex index of refraction.
     Index {
@@ -49,7 +48,7 @@ pub struct FresnelPoint {
     pub second: Vec3,
 }
 
-/// [`Conductor`] at a point, with textures looked up.
+/// [`Conductor`] at a point, after texture lookups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConductorPoint {
     /// Reflectance of the facets.
@@ -59,7 +58,8 @@ pub struct ConductorPoint {
 }
 
 impl ConductorFresnel {
-    /// The reflectance at one point, with its textures looked up. Counts texture lookups in `lookups`.
+    /// Looks up the textures and returns the reflectance at a single point. Counts texture lookups in
+    /// `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
         match self {
@@ -68,7 +68,7 @@ impl ConductorFresnel {
         }
     }
 
-    /// The conductor with all textures replaced by white.
+    /// The conductor with all textures replaced by white ones.
     pub fn with_white_textures(&self) -> FresnelPoint {
         let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         match self {
@@ -96,13 +96,13 @@ impl ConductorFresnel {
 }
 
 impl FresnelPoint {
-    /// Schlick's approximation, with a reflectance at normal incidence of at most 1.
+    /// Schlick's approximation. Limits the reflectance at normal incidence to at most 1.
     pub fn schlick(reflectance: Vec3) -> Self {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }
 
-    /// Exact equations, from the complex index of refraction. The index is limited to 1e8, where metals
-    /// reflect all light, because fourth powers of larger values would overflow.
+    /// Uses the exact equations, with a complex index of refraction. The index is limited to 1e8, where
+    /// metals reflect all light, because the fourth power of a larger value would overflow.
     pub fn index(eta: Vec3, k: Vec3) -> Self {
         const MOST: Vec3 = Vec3::splat(1e8);
         Self { first: eta.min(MOST), second: k.min(MOST) }
@@ -113,7 +113,7 @@ impl FresnelPoint {
         if self.second.x < 0.0 { Self { first: self.first * color, ..self } } else { self }
     }
 
-    /// The reflectance for a cosine of the angle of incidence.
+    /// Computes the reflectance from the cosine of the angle of incidence.
     pub fn reflectance(&self, cosine: f32) -> Vec3 {
         let of = |first, second| reflectance(first, second, cosine, schlick_weight(cosine));
         let Self { first, second } = self;

@@ -114,7 +114,7 @@ fn narrow_lobes_approach_a_mirror() {
 }
 
 #[test]
-fn elements_have_known_reflectances() {
+fn element_reflectances_match_reference_values() {
     // Reflectance at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
     for (element, known) in [
         (Element::Gold, [0.968, 0.746, 0.372]),

@@ -14,7 +14,7 @@ soa! {
     pub struct PhongBxdf in PhongPacket {
         /// f of the diffuse lobe in sr⁻¹.
         diffuse: Vec3 = Vec3::ZERO,
-        /// f at the peak of the glossy lobe in sr⁻¹.
+        /// Peak value of the glossy lobe's f in sr⁻¹.
         specular: Vec3 = Vec3::ZERO,
         /// Exponent of the glossy lobe.
         shininess: f32 = 0.0,
@@ -26,8 +26,9 @@ soa! {
 soa! {
     /// View-dependent values of a Phong surface.
     pub struct PhongView in PhongViewPacket {
-        /// The view direction reflected at the normal. Its cosine with a light direction equals the cosine
-        /// between the reflected light direction and the view direction: (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+        /// The view direction reflected about the normal. The cosine between this direction and a light
+        /// direction equals the cosine between the view direction and the reflected light direction: (2(n·l)n
+        /// − l)·v = (2(n·v)n − v)·l.
         reflected: Vec3 = Vec3::ZERO,
     }
 }

@@ -9,12 +9,12 @@ use crate::math::Vec3;
 use crate::math::elementary::{pow_f64, sin_cos};
 use crate::math::frame::Frame;
 
-/// The lobes of a Phong surface at one point, for one view direction.
+/// The lobes of a Phong surface at a single point, for a single view direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {
     /// Unit normal on the viewer's side.
     pub normal: Vec3,
-    /// The view direction reflected at the normal.
+    /// The view direction reflected about the normal.
     pub mirrored_eye: Vec3,
     /// The largest component of kd.
     pub diffuse: f32,
@@ -31,8 +31,8 @@ impl Lobes {
     pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
         let is_diffuse = lobe < self.diffuse_share();
         let rest = 1.0 - u[0];
-        // For the glossy lobe, the cosine is (1 − u)^(1/(α + 1)). It is computed in `f64` for an accurate
-        // sine of narrow lobes.
+        // For the glossy lobe, the cosine is (1 − u)^(1/(α + 1)). It is computed in `f64` because the sine
+        // would otherwise be inaccurate for narrow lobes.
         let cosine = pow_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
         let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
@@ -72,7 +72,8 @@ impl Lobes {
     }
 }
 
-/// A unit direction, from the angle to an axis and a number in [0, 1) for the angle around the axis.
+/// Computes a unit direction from the angle to an axis, and from a number in [0, 1) for the angle around the
+/// axis.
 #[inline(always)]
 pub fn direction_about_axis(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);

@@ -27,7 +27,7 @@ pub struct Phong {
     pub ambient: Option<Color>,
 }
 
-/// [`Phong`] at a point, with textures looked up.
+/// [`Phong`] at a point, after texture lookups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongBsdf {
     /// Diffuse reflectance kd.
@@ -175,8 +175,8 @@ mod tests {
     }
 
     #[test]
-    fn glossy_lobe_has_the_known_value() {
-        // (n + 2)/2π·cosⁿ 10° for n = 50, seen 10° from the mirror direction.
+    fn glossy_lobe_has_the_exact_value() {
+        // The expected value is (n + 2)/2π·cosⁿ 10° for n = 50, seen 10° from the mirror direction.
         let value = reflected(50.0, at_angle(-30.0), at_angle(20.0));
         let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
@@ -195,12 +195,12 @@ mod tests {
                 sum += f64::from(reflected(shininess, at_angle(degrees), light));
             }
         }
-        // With equal steps of cos², ∫f cos dω = π·mean(f).
+        // With equal steps in cos², ∫f cos dω = π·mean(f).
         sum / f64::from(rings * steps) * std::f64::consts::PI
     }
 
     #[test]
-    fn albedos_match_known_values() {
+    fn albedos_match_exact_values() {
         for (shininess, values) in
             [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5000, 0.1752])]
         {

@@ -24,7 +24,7 @@ soa! {
         ior: f32 = 1.5,
         /// [`PlasticPoint::alpha`].
         alpha: f32 = 1.0,
-        /// Terms of the coat's albedo.
+        /// Polynomial terms of the coat's albedo.
         terms: [f32; TERMS] = [0.0; TERMS],
         /// Mean albedo of the coat.
         mean: f32 = 0.0,
@@ -38,14 +38,14 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
         wo: Vec3 = Vec3::Z,
-        /// Fraction of light that the coat transmits toward the viewer.
+        /// Fraction of the light that the coat transmits toward the viewer.
         transmittance: f32 = 1.0,
         /// Probability of choosing the coat's lobe.
         coat_share: f32 = 0.0,
     }
 }
 
-/// Has a smooth coat.
+/// Set if the coat is smooth.
 const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl PlasticBxdf {
@@ -70,14 +70,14 @@ impl PlasticBxdf {
         if is_ahead { view.transmittance * entering } else { 0.0 }
     }
 
-    /// Smith terms of the directions to the viewer and to the light.
+    /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
     fn smith_terms(&self, view: &PlasticView, wi: Vec3) -> [SmithTerms; 2] {
         let of = |direction| SmithTerms::isotropic(view.normal, direction, self.alpha);
         [of(view.wo), of(wi)]
     }
 
-    /// D of the coat for a direction, and the reflectance of the coat's facets.
+    /// The coat's D for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
     fn distribution_and_fresnel(&self, view: &PlasticView, wi: Vec3) -> [f32; 2] {
         let half = HalfVector::between(view.normal, view.wo, wi);

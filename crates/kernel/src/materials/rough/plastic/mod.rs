@@ -18,7 +18,7 @@ use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use bxdf::PlasticBxdf;
 
-/// A diffuse base under a coat. If the coat is smooth, this is only the base; see
+/// A diffuse base under a coat. If the coat is smooth, this type contains only the base. See
 /// [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
@@ -30,14 +30,14 @@ pub struct Plastic {
     albedos: AlbedoTable,
 }
 
-/// [`Plastic`] at a point, with textures looked up.
+/// [`Plastic`] at a point, after texture lookups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlasticPoint {
     /// Diffuse reflectance kd.
     pub diffuse: Vec3,
     /// f of the base in sr⁻¹, for light that passes through the coat in both directions.
     pub base: Vec3,
-    /// Factor on the coat's reflectance. 0 if the coat is smooth.
+    /// Factor for the coat's reflectance. 0 if the coat is smooth.
     pub specular: Vec3,
     /// Index of refraction.
     pub ior: f32,
@@ -48,8 +48,8 @@ pub struct PlasticPoint {
 }
 
 impl Plastic {
-    /// Creates a plastic from kd, a factor on the coat's reflection, the square root of α, and an index of
-    /// refraction ≥ 1.
+    /// Creates a plastic material from kd, a factor for the coat's reflectance, the square root of α, and an
+    /// index of refraction of at least 1.
     pub fn new(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Self {
         let fresnel = |cosine: f64| dielectric(cosine, ior.into());
         let is_smooth = roughness.constant() == Some(0.0);
@@ -80,7 +80,7 @@ impl Plastic {
     }
 }
 
-/// f in sr⁻¹ of a base with the given kd, for light that passes through the coat in both directions.
+/// Computes f in sr⁻¹ of a base from its kd, for light that passes through the coat in both directions.
 fn base(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;

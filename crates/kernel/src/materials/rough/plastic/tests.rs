@@ -53,8 +53,8 @@ fn samples_follow_the_pdf() {
             [alpha; 2],
             direction(cosine, 0.7),
         );
-        subject.check_samples(&format!("the coat of α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
-        // For narrow lobes, the cells of the diffuse lobe on the map are too large.
+        subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
+        // For narrow lobes, the map's cells are too large for the diffuse lobe.
         if alpha >= 0.2 {
             subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobeSet::All);
         }
@@ -79,7 +79,7 @@ fn white_furnace_and_albedos_match_quadrature() {
 }
 
 #[test]
-fn base_under_smooth_coat_gets_one_minus_fresnel() {
+fn base_under_smooth_coat_gets_transmitted_light() {
     for ior in [1.0, 1.3, 1.5, 3.0] {
         for cosine in COSINES {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));

@@ -52,9 +52,10 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer. For transmitted light, it is mirrored to the other side.
         wo: Vec3 = Vec3::Z,
-        /// Fraction of light that passes through the specular lobe between the diffuse lobe and the viewer.
+        /// Fraction of the light that passes through the specular lobe between the diffuse lobe and the
+        /// viewer.
         transmittance: Vec3 = Vec3::ONE,
-        /// Fraction of light that the coat transmits toward the viewer.
+        /// Fraction of the light that the coat transmits toward the viewer.
         coat_transmittance: f32 = 1.0,
         /// Probability of choosing the specular lobe.
         specular_share: f32 = 1.0,
@@ -65,7 +66,7 @@ soa! {
     }
 }
 
-/// Has a clear coat.
+/// Set if there is a clear coat.
 const COATED: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 /// Transmits light.
@@ -91,16 +92,17 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         [evaluate(cosine, |number| self.terms[number]), evaluate(cosine, |number| self.grazing_terms[number])]
     }
 
-    /// Fraction of light that passes through the dielectric's specular lobe at a cosine ≥ 0.
+    /// Fraction of the light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
     fn specular_transmittance(&self, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.albedos(cosine);
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
-        // If the facets reflect everything, no light passes. Clamp because of rounding.
+        // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
+        // result negative.
         Vec3::new(nonnegative(rest.x), nonnegative(rest.y), nonnegative(rest.z))
     }
 
-    /// Smith terms of the directions to the viewer and to the light.
+    /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
     fn smith_terms(view: &PrincipledView, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
         [SmithTerms::isotropic(view.normal, view.wo, alpha), SmithTerms::isotropic(view.normal, wi, alpha)]
@@ -147,7 +149,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         self.transmission * rest * (white * self.coat_transmittance(view, light.cosine, any))
     }
 
-    /// Pdf of a direction for a lobe with this α.
+    /// Pdf of a direction that is sampled from a lobe with this α.
     #[inline(always)]
     fn lobe_pdf(view: &PrincipledView, wi: Vec3, alpha: f32) -> f32 {
         let half = HalfVector::between(view.normal, view.wo, wi);
@@ -216,8 +218,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             transmittance,
             coat_transmittance: 1.0 - coat,
             specular_share: below * specular,
-            // The probability of the coat is at least its fraction of the light. The rest is split among the
-            // other lobes.
+            // The coat is chosen with a probability that is at least its fraction of the light. The remaining
+            // probability is split among the other lobes.
             coat_share: if self.coat > 0.0 { 1.0 - below * all } else { 0.0 },
             transmission_share: below * transmission,
         }
@@ -283,7 +285,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             LobeSet::All => choice,
             LobeSet::Narrow => choice * (specular_share + coat_share + transmission_share),
         };
-        // The order of lobes is coat, specular, diffuse, transmission.
+        // The lobes are in this order: coat, specular, diffuse, transmission.
         let last = match lobes {
             LobeSet::All => 1.0 - transmission_share,
             LobeSet::Narrow => specular_share + coat_share,

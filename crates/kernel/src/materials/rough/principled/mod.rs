@@ -47,9 +47,9 @@ pub struct PrincipledInputs {
     pub roughness: Number,
     /// Index of refraction. At least 1.
     pub ior: f32,
-    /// Factor on the reflectance of the dielectric.
+    /// Factor for the dielectric's reflectance.
     pub specular: Number,
-    /// Factor on the reflectance of the dielectric at normal incidence.
+    /// Factor for the dielectric's reflectance at normal incidence.
     pub specular_color: Color,
     /// Fraction of the light that enters the dielectric and is transmitted instead of scattered.
     pub transmission: Number,
@@ -59,7 +59,7 @@ pub struct PrincipledInputs {
     pub clearcoat_roughness: Number,
 }
 
-/// [`Principled`] at a point, with textures looked up.
+/// [`Principled`] at a point, after texture lookups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrincipledPoint {
     /// f of the diffuse lobe in sr⁻¹, for light that passes through the lobes above it in both directions.
@@ -72,7 +72,7 @@ pub struct PrincipledPoint {
     pub grazing: f32,
     /// Reflectances of the dielectric at normal incidence and at grazing angles.
     pub dielectric: (Vec3, f32),
-    /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for transmitted light.
+    /// Factor for (1 − F)·D·G/(4 cosθᵢ cosθₒ) for transmitted light.
     pub transmission: Vec3,
     /// α of the specular lobe.
     pub alpha: f32,
@@ -84,7 +84,7 @@ pub struct PrincipledPoint {
     pub coat_alpha: f32,
     /// Albedo of the clear coat.
     pub coat_albedo: LobeAlbedo,
-    /// Reflectance of ambient light.
+    /// Reflectance for ambient light.
     pub ambient: Vec3,
 }
 
@@ -96,8 +96,8 @@ impl PrincipledPoint {
     }
 }
 
-/// Albedos of two lobes with Schlick's approximation. The reflectance of one lobe's facets is 1 at normal
-/// incidence and 0 at grazing angles. For the other lobe, it is the reverse.
+/// Albedos of two lobes that use Schlick's approximation. The facets of one lobe have a reflectance of 1 at
+/// normal incidence and 0 at grazing angles. For the other lobe, it is the other way around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedo {
     /// Albedo per unit of reflectance at normal incidence.
@@ -120,7 +120,7 @@ impl SchlickAlbedo {
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
 
-    /// Albedo of a coat with this reflectance at normal incidence, and a reflectance of 1 at grazing angles.
+    /// Albedo of a coat with this reflectance at normal incidence and a reflectance of 1 at grazing angles.
     fn of_coat(&self, reflectance: f32) -> LobeAlbedo {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
         LobeAlbedo {
@@ -307,7 +307,7 @@ impl RoughMaterial for Principled {
 
     #[inline]
     fn supports_packets(&self) -> bool {
-        // Packets receive light from only one side.
+        // Packets are lit from only one side.
         !self.is_transmissive() && self.textures().next().is_none()
     }
 

@@ -150,7 +150,7 @@ fn fully_reflective_facets_have_bounded_weights() {
     }
 }
 
-/// Transmitted fractions to test.
+/// The tested fractions of transmitted light.
 const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
 
 #[test]

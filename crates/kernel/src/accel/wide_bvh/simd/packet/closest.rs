@@ -62,7 +62,7 @@ pub fn closest<V: SimdVector>(
     true
 }
 
-/// Pushes the children that any ray hits, farthest first, so the nearest is on top.
+/// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
 #[inline(always)]
 fn push_ordered<V: SimdVector>(
     tree: &WideBvh,

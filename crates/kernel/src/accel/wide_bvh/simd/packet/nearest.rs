@@ -13,13 +13,13 @@ pub struct NearestHits<V: SimdVector> {
     pub t: V,
     u: V,
     v: V,
-    /// Bit patterns of the triangle indices.
+    /// Triangle indices, stored as bit patterns.
     id: V,
     found: u32,
 }
 
 impl<V: SimdVector> NearestHits<V> {
-    /// No hits yet, for rays with the given ends.
+    /// Creates a packet without hits from the ends of the rays.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.splat_like(f32::from_bits(u32::MAX)), found: 0 }

@@ -15,12 +15,12 @@ pub struct SimdRayPacket<V: SimdVector> {
     near_origin: [V; 3],
     far_origin: [V; 3],
     pub inverse: [V; 3],
-    /// Origins permuted to the axes of the sheared rays.
+    /// Origins, with coordinates in the axis order of the sheared rays.
     sheared_origin: [V; 3],
     shear: [V; 3],
-    /// World axes that are the x, y, and z axes of every sheared ray.
+    /// World axes that become the x, y, and z axes of the sheared rays.
     axes: [usize; 3],
-    /// Bit patterns of the indices of the rays' start triangles.
+    /// Indices of the rays' start triangles, stored as bit patterns.
     start: V,
     /// Rows of a node that contain the near planes.
     pub near: [usize; 3],
@@ -95,7 +95,8 @@ impl<V: SimdVector> SimdRayPacket<V> {
         Some(own)
     }
 
-    /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::entry_distance`.
+    /// Whether any ray hits the box in a slot before the ray's end. SIMD version of
+    /// `SlabRay::entry_distance`.
     #[inline(always)]
     pub fn any_ray_hits_box(&self, node: &WideNode, slot: usize, end: V) -> bool {
         let pad = end.splat_like(SLAB_PAD);

@@ -9,7 +9,7 @@ pub struct RaySoa {
     pub origin: [F32x16; 3],
     pub direction: [F32x16; 3],
     pub ends: F32x16,
-    /// Bit patterns of [`Ray::start`]; NaN for none.
+    /// [`Ray::start`] of each ray, stored as a bit pattern. NaN for a ray without a start triangle.
     pub start: F32x16,
     /// Mask of the traced rays.
     pub traced: u32,

@@ -1,7 +1,7 @@
 //! A trait for SIMD vectors of all widths, so that each kernel is written only once.
 //!
 //! Outside this module, values can only be created by unsafe functions whose callers guarantee the
-//! instruction set. Inside, they are also created by functions compiled with the instructions. A value
+//! instruction set. Inside it, functions compiled with these instructions can also create values. A value
 //! therefore proves that the processor has the instructions, which makes the operators safe.
 
 mod eight;

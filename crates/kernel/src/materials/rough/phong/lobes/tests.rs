@@ -1,4 +1,4 @@
-//! Tests that compare samples with pdfs, and their means with known albedos.
+//! Tests that compare samples with pdfs, and the means of samples with exact albedos.
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
@@ -149,14 +149,14 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
 }
 
 #[test]
-fn sampled_albedos_match_known_values() {
-    // (n + 2)/2π ∫cosⁿα cosθ dω.
+fn sampled_albedos_match_exact_values() {
+    // Compute (n + 2)/2π ∫cosⁿα cosθ dω.
     for (shininess, known) in [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5, 0.1752])] {
         for (degrees, known) in [0.0, 30.0, 60.0, 80.0].into_iter().zip(known) {
             let found = albedo(&bsdf(0.0, 1.0, shininess), degrees);
             assert!((found - known).abs() < 3e-3, "α {shininess} at {degrees}°: {found} instead of {known}");
             let both = albedo(&bsdf(0.4, 0.6, shininess), degrees);
-            assert!((both - 0.4 - 0.6 * known).abs() < 4e-3, "with a diffuse part: {both}");
+            assert!((both - 0.4 - 0.6 * known).abs() < 4e-3, "with a diffuse lobe: {both}");
         }
     }
     // For narrow lobes, the albedo approaches cosθ.
