@@ -101,10 +101,11 @@ impl TestDir {
             let ended = child.try_wait().expect("a child");
             // The child may have created the file just before it ended.
             assert!(ended.is_none() || self.path(name).exists(), "ended without {name}: {ended:?}");
-            if Instant::now() > deadline {
+            let is_late = Instant::now() > deadline;
+            if is_late {
                 child.kill().expect("a running child");
-                panic!("{name} was not written");
             }
+            assert!(!is_late, "{name} was not written");
             std::thread::sleep(Duration::from_millis(1));
         }
     }
