@@ -111,7 +111,7 @@ fn physical_mtl_matches_principled_material() {
     }
 }
 
-/// MeshLab and some other programs invert `Tr`, so that 1 instead of 0 is opaque.
+/// MeshLab and some other programs invert `Tr`, so that the opaque value is 1 instead of 0.
 #[test]
 fn misused_mtl_statements_are_corrected() {
     let dir = TestDir::new();
@@ -190,7 +190,7 @@ fn missing_mtl_images_name_their_material() {
     assert_mentions(&gray, &["warning: a.mtl:2: ", "heights.pgm", "normals", "\"brick\""]);
 }
 
-/// Values of a model that cannot be used cause warnings with the file and line, with and without a scene.
+/// Unusable values in a model cause warnings that name the file and line, with and without a scene.
 #[test]
 fn unusable_model_values_warn() {
     let dir = TestDir::new();

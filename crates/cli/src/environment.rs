@@ -4,7 +4,10 @@
 /// Comma-separated names of related variables, and the effect of each group.
 pub const VARIABLES: [(&str, &str); 14] = [
     ("NO_COLOR", "no colors, unless `--color` is given"),
-    ("CLICOLOR, CLICOLOR_FORCE, COLUMNS", "colors (0: off, 1: on without a terminal) and width of help texts"),
+    (
+        "CLICOLOR, CLICOLOR_FORCE, COLUMNS",
+        "colors (0: off, 1: on without a terminal) and width of help texts",
+    ),
     ("COLORTERM, TERM, TERM_PROGRAM", "colors and block characters that the terminal supports"),
     (
         "TERM_PROGRAM_VERSION, VTE_VERSION, KONSOLE_VERSION, XTERM_VERSION",

@@ -17,8 +17,9 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
-            console
-                .print_message(&format!("note: to create {name} next to the scene, run: glimt schema > {name}"));
+            console.print_message(&format!(
+                "note: to create {name} next to the scene, run: glimt schema > {name}"
+            ));
         }
         console.print_trusted_text(&text);
         return Exit::DONE;

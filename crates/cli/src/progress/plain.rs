@@ -128,9 +128,11 @@ mod tests {
             (1..10).map(|ten| format_progress(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
         assert_eq!(said, tens);
         // The interval has passed, but nothing has changed.
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
+        plain.last =
+            Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
         assert_eq!(plain.next_line(&progress(0.9, 90)), None);
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
+        plain.last =
+            Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
         assert!(plain.next_line(&progress(0.91, 91)).is_some());
     }
 
