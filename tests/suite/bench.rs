@@ -99,7 +99,7 @@ fn bench_measures_a_scene_end_to_end() {
 }
 
 #[test]
-fn errors_repeat_and_references_are_cached() {
+fn errors_are_reproducible_and_references_cached() {
     let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path --json");
     bench(&dir, &format!("{line} a.json"), 0);
@@ -122,7 +122,7 @@ fn errors_repeat_and_references_are_cached() {
     assert_eq!(errors(&json(&dir, "c.json")), errors(&a));
     dir.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
     bench(&dir, &format!("{line} d.json"), 0);
-    assert!(!is_cached(&json(&dir, "d.json")), "a changed scene needs another reference");
+    assert!(!is_cached(&json(&dir, "d.json")), "a changed scene needs a new reference");
     assert_eq!(kept().count(), 2);
     bench(&dir, &format!("{line} e.json --no-cache"), 0);
     assert!(
@@ -182,7 +182,7 @@ fn all_scenes_are_checked_before_measuring() {
     );
     assert!(!dir.path("a.csv").exists());
     assert!(!dir.path("cache/glimt/references").exists(), "expected no measurement");
-    // This output is an input of the second scene.
+    // This output would overwrite an input of the second scene.
     dir.write("skin.ppm", "P6\n1 1\n255\nabc");
     let skin = "diffuse = { texture = \"skin\" }\n[textures.skin]\nfile = \"skin.ppm\"\n[materials.other]\ndiffuse = 0";
     dir.write(
@@ -199,7 +199,7 @@ fn all_scenes_are_checked_before_measuring() {
 }
 
 #[test]
-fn references_set_the_size_and_one_warns() {
+fn references_set_size_and_a_single_one_warns() {
     let dir = box_dir();
     for seed in [8, 9] {
         let line =
@@ -256,7 +256,7 @@ fn outputs_never_replace_inputs_or_each_other() {
 }
 
 #[test]
-fn failed_output_does_not_affect_others() {
+fn failed_output_does_not_affect_other_outputs() {
     let dir = box_dir();
     symlink("/dev/full", dir.path("full.csv")).expect("a link");
     let line =
@@ -325,7 +325,7 @@ fn progress_is_plain_lines_or_json_objects() {
 }
 
 #[test]
-fn time_budgets_are_measured() {
+fn time_budgets_are_sorted_and_used_up() {
     let dir = box_dir();
     let line = "box.toml --time 0.02,0.01 --reference-samples 16 --seeds 2 --integrator path --progress none";
     bench(&dir, &format!("{line} --json a.json"), 0);

@@ -1,4 +1,4 @@
-//! Bias of EXR images and its standard error, as reported by `glimt compare`.
+//! The bias that `glimt compare` reports for EXR images, and its standard error.
 
 use serde_json::Value;
 

@@ -27,7 +27,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         "camera_both",
         &[(4, 1, "`position` conflicts with `orbiter`"), (5, 1, "`look_at` conflicts with `orbiter`")],
     ),
-    ("camera_direction", &[(4, 11, "the camera has no direction; the same point as `position`")]),
+    ("camera_direction", &[(4, 11, "the camera has no direction; this is the same point as `position`")]),
     (
         "camera_up",
         &[(4, 11, "`up` must not be parallel to the view; the view is parallel to the default [0, 1, 0]")],
@@ -121,7 +121,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         &[
             (1, 1, "warning: nothing lights this scene"),
             (9, 2, "warning: [environment] replaces `background`, which has no effect"),
-            (10, 9, "warning: `color` is black, so the environment is black; a scale factor for `file`"),
+            (10, 9, "warning: `color` is black, so the environment is black; this scales the map in `file`"),
         ],
     ),
     (
@@ -599,7 +599,7 @@ fn lists_in_other_syntax_get_a_suggestion() {
     let brackets = "lists use square brackets: write [0, 3, 3]";
     let write = Some("write [0, 3, 3]");
     let close = Some("expected `]`");
-    // Values of `position` with the expected message, column and help.
+    // Values for `position`, each with the expected message, column and help.
     for (value, message, column, help) in [
         ("(0, 3, 3)", brackets, 12, None),
         ("(0 3 3) # where", brackets, 12, None),

@@ -1,5 +1,4 @@
-//! Number of bytes sent to the terminal for bundled scenes: for the first preview, for whole renders, and for
-//! edits.
+//! Number of bytes sent to the terminal for a bundled scene's first preview, whole render, and edits.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
@@ -23,7 +22,7 @@ const SIZES: [(Rect, PreviewSize); 3] = [
 /// Width and height of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
 
-/// Renders previews of scenes, one scene after another.
+/// Renders previews, one scene at a time.
 struct PreviewRenderer {
     handle: Handle,
     preview: PreviewSize,
@@ -165,7 +164,7 @@ fn scene(name: &str) -> String {
     std::fs::read_to_string(path).expect("a bundled scene")
 }
 
-/// Number of cells that differ by more than one.
+/// Number of cells in which a color channel differs by more than 1.
 fn changed(a: &Picture, b: &Picture) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);

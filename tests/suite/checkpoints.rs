@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use crate::parts::{METHODS, ROOM, room_dir};
 use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
-/// Generator of random numbers in [0, 1).
+/// Random number generator for values in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut next = glimt::math::random::unit(seed);
     move || f64::from(next())
@@ -35,7 +35,7 @@ fn end(mut child: Child, signal: Signal) -> Option<i32> {
     child.wait().expect("a child").code()
 }
 
-/// Checks that no temporary files of killed processes remain after the next write.
+/// Checks that no temporary files from killed processes remain after the next write.
 fn assert_no_leftovers(dir: &TestDir) {
     let names =
         fs::read_dir(dir.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
@@ -43,7 +43,7 @@ fn assert_no_leftovers(dir: &TestDir) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// Small images that take a few seconds to render.
+/// Methods, each with options for a render that takes a few seconds.
 const LONG: [(&str, &str); 4] = [
     ("whitted", "--samples 4096"),
     ("path", "--integrator path --samples 1024"),
@@ -58,7 +58,7 @@ fn killed_render_resumes_with_same_pixels() {
 
 #[test]
 #[ignore = "twenty seconds: cargo test --release --test suite killed_20_times -- --ignored"]
-fn killed_20_times_at_random() {
+fn render_killed_20_times_resumes_identically() {
     kill_at_any_time(20);
 }
 
@@ -102,7 +102,7 @@ fn kill_during_write_keeps_valid_checkpoint() {
 
 #[test]
 #[ignore = "sixteen seconds: cargo test --release --test suite killed_200_times -- --ignored"]
-fn killed_200_times_while_writing_a_checkpoint() {
+fn writer_killed_200_times_keeps_checkpoint() {
     kill_while_it_writes(200);
 }
 
@@ -114,7 +114,7 @@ fn kill_while_it_writes(times: u32) {
     for round in 0..times {
         let mut child = begin(&dir, line);
         if round == 0 {
-            // On a busy machine, the first checkpoint may take longer than the time until the kill.
+            // On a busy machine, the process may be killed before its first checkpoint.
             dir.await_file("out.exr.checkpoint", &mut child);
         }
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
@@ -176,7 +176,7 @@ fn signal_leaves_a_resumable_checkpoint() {
         dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
         let line = format!("room.toml --once --progress none -o out.exr {options}");
         let child = begin(&dir, &line);
-        // Wait for samples to save. A signal before the first sample leaves no checkpoint.
+        // Wait until there are samples to save. A signal before the first sample leaves no checkpoint.
         std::thread::sleep(Duration::from_millis(300));
         let ended = end(child, signal);
         if dir.path("out.exr").exists() {
@@ -218,7 +218,7 @@ fn finished_render_can_add_samples() {
 }
 
 #[test]
-fn checkpoint_of_another_image_is_rejected() {
+fn checkpoint_for_another_image_is_rejected() {
     let dir = room_dir();
     kept(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
@@ -296,7 +296,7 @@ fn checkpoints_are_used_only_with_resume() {
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
-    // It also survives a render of another image with fewer samples in its checkpoint.
+    // It also survives a render of another image that would save fewer samples.
     let child = begin(&dir, &format!("{line} --seed 5"));
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
@@ -306,7 +306,7 @@ fn checkpoints_are_used_only_with_resume() {
     dir.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
     assert!(dir.bytes("out.exr.checkpoint") == longer);
     fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
-    // A checkpoint of another image and a file that is not a checkpoint survive.
+    // A checkpoint for another image survives, and so does a file that is not a checkpoint.
     kept(&dir, "");
     dir.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
     assert!(dir.path("out.exr.checkpoint").exists());

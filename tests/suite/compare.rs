@@ -27,7 +27,7 @@ fn floats(value: impl Fn(u32, u32, u32) -> f32) -> Rgb32FImage {
     ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| value(x, y, c))))
 }
 
-/// A directory with an image and its reference in every lossless format, and as floats.
+/// A directory with an image and its reference in every lossless 8-bit format and as float EXR files.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     for ending in ["png", "ppm", "tga", "bmp", "webp"] {
@@ -150,7 +150,7 @@ fn table_lists_every_metric() {
 }
 
 #[test]
-fn threshold_decides_the_exit_code() {
+fn threshold_determines_the_exit_code() {
     let dir = dir();
     let (object, stderr) = json(&dir, "a.png b.png --max-relmse 0.5", 0);
     assert_eq!(

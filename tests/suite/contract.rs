@@ -1,4 +1,4 @@
-//! The scene file contract: every key with its default, and which keys are required.
+//! The scene file contract: all keys, their defaults, and whether they are required.
 
 use std::fs;
 use std::path::PathBuf;

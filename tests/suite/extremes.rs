@@ -10,7 +10,7 @@ const MIRROR: &str = "type = \"mirror\"\nreflectance = [1, 1, 1]";
 const GLASS: &str = "type = \"glass\"\nior = 1.5";
 const CAMERA: &str = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
 const LAMP: &str = "[[light]]\ntype = \"point\"\nposition = [1, 3, 2]\nintensity = [10, 10, 10]\n";
-/// Limit on peak memory, far above the needs of these scenes.
+/// Limit on peak memory, far above what these scenes need.
 const MEMORY_BYTES: u64 = 400 << 20;
 
 fn sphere(center: &str, radius: &str) -> String {
@@ -206,7 +206,7 @@ fn is_made_on_demand(scene: &Path) -> bool {
 }
 
 #[test]
-fn bundled_scenes_ignore_thread_count() {
+fn bundled_scenes_do_not_depend_on_threads() {
     for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
         let dir = TestDir::new();
         let path = scene.display();

@@ -210,7 +210,7 @@ fn default_acl_never_widens_permissions() {
 }
 
 #[test]
-fn scenes_with_equal_names_keep_their_images() {
+fn scenes_with_the_same_name_keep_their_images() {
     let dir = TestDir::new();
     for folder in ["a", "b"] {
         std::fs::create_dir(dir.path(folder)).expect("made");

@@ -71,7 +71,7 @@ impl Glb {
     }
 }
 
-/// A cube primitive of side length 2. It has normals and texture coordinates.
+/// A cube primitive with side length 2, normals and texture coordinates.
 pub(crate) fn cube(glb: &mut Glb) -> Value {
     let (mut positions, mut normals, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for axis in 0..3 {

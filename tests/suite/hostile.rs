@@ -1,5 +1,5 @@
-//! Malformed files must be rejected quickly and with little memory: a clear error, exit code 2, no output on
-//! stdout, and the previous image unchanged.
+//! Malformed files must be rejected quickly and with little memory. The result must be a clear error, exit
+//! code 2, no output on stdout, and an unchanged previous image.
 
 use std::fs::{self, File};
 use std::os::unix::ffi::OsStrExt;
@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 use super::test_dir::{SCENE, TestDir, assert_mentions};
 
-/// Time limit for a rejection. It takes milliseconds, but reading the whole file would take minutes.
+/// Time limit for rejecting a file. Rejection takes milliseconds, but reading the whole file would take
+/// minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
 
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
@@ -33,7 +34,7 @@ fn scene(file: &str) -> (String, &'static str) {
     (text.replace("FILE", file), place)
 }
 
-/// Renders a scene, and checks that the error contains all of the given words.
+/// Renders a scene, and checks that the error contains all expected words.
 #[track_caller]
 fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     dir.write("ball.png", "the old one");
@@ -47,8 +48,8 @@ fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     stderr
 }
 
-/// Creates something that is not a regular file. Returns words of the expected error, or `None` if it cannot
-/// be created on this system.
+/// Creates something that is not a regular file. Returns words from the expected error, or `None` if this
+/// system cannot create such a file.
 fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     Some(match what {
         "missing" => &["not found"],
@@ -193,7 +194,8 @@ fn huge_and_binary_scenes_are_rejected() {
     refused(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
-/// Checks that a mesh is rejected with an error that contains the given words and its position in the scene.
+/// Checks that a mesh is rejected with an error that contains the expected words and the mesh's position in
+/// the scene.
 #[track_caller]
 fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
     let dir = TestDir::new();
@@ -256,7 +258,7 @@ fn unreadable_mtl_fails_only_if_it_is_used() {
         dir.write("scene.toml", &text);
         let stderr = dir.expect("scene.toml --once -o a.png", 0);
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
-        // An error if it does not.
+        // An error if the scene does not set it.
         dir.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
         refused(
             &dir,

@@ -60,8 +60,8 @@ fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     found
 }
 
-/// Runs glimt and checks that the exit code is 2, the message contains the given words, nothing is rendered
-/// and no file changes. Returns the message.
+/// Runs glimt and checks that it exits with code 2, prints a message with the expected words, renders nothing
+/// and changes no file. Returns the message.
 #[track_caller]
 fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
     let before = everything(dir);
@@ -174,7 +174,7 @@ fn gltf_images_are_never_replaced() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let positions = glb.vectors(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    // Unused images: an occlusion map, an image of a material without faces, and an image without a texture.
+    // Unused images: an occlusion map, an image for a material without faces, and an image without a texture.
     let json = json!({
         "scene": 0,
         "scenes": [{"nodes": [0]}],

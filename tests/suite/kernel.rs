@@ -12,7 +12,7 @@ use glimt::math::Vec3;
 
 use crate::test_dir::TestDir;
 
-/// Generator of random numbers in [0, 1).
+/// Random number generator for values in [0, 1).
 struct UnitRandom(u64);
 
 impl UnitRandom {
@@ -83,7 +83,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
     tree.expect("the token is not cancelled")
 }
 
-/// Number of rays that escape from a closed mesh. Each is aimed at a vertex or an edge from inside.
+/// Number of rays that escape from a closed mesh. Each ray starts inside and is aimed at a vertex or an edge.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
     let tree = tree(mesh).with(instructions);
     let mut random = UnitRandom(rays as u64);
@@ -153,8 +153,8 @@ fn no_ray_leaks_at_edges_and_vertices() {
 
 /// Traces 10⁸ rays.
 #[test]
-#[ignore = "90 s on two cores: cargo test --release --test suite leaks_of_many -- --ignored"]
-fn leaks_of_many_rays() {
+#[ignore = "90 s on two cores: cargo test --release --test suite no_leaks_with_many -- --ignored"]
+fn no_leaks_with_many_rays() {
     assert_watertight(100_000_000 / 48);
 }
 
@@ -233,7 +233,7 @@ fn boxes_do_not_speckle_from_any_direction() {
     }
 }
 
-/// Checks that a ray hits the box that it enters, and that a ray which misses all boxes has no hit. Allows
+/// Checks that a ray hits the box that it enters, and that a ray that misses all boxes has no hit. Allows
 /// for rounding errors.
 fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     let shifted = |by: f32| {
@@ -257,7 +257,7 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
 }
 
 /// Distance at which a ray crosses a triangle's plane, and the smallest barycentric coordinate at that point,
-/// in double precision. `None` if they are parallel.
+/// in double precision. `None` if the ray is parallel to the plane.
 fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
     let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
@@ -279,7 +279,7 @@ fn hits_close_to_the_ray_origin_are_found() {
             [at, at + along, at + along * random.next() + random.vector() * width]
         })
         .collect();
-    // A ray of length 0.03 from a point farther away than this has no crossing with `least` ≥ −0.02.
+    // If a ray of length 0.03 starts farther away than this, it has no crossing with `least` ≥ −0.02.
     let around = |corners: &[Vec3; 3]| {
         let middle = corners.iter().sum::<Vec3>() / 3.0;
         (middle, corners.iter().map(|corner| (*corner - middle).length()).fold(0.0, f32::max) * 1.2 + 0.03)

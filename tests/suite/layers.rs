@@ -45,7 +45,7 @@ fn picture(dir: &TestDir, options: &str) -> Vec<f32> {
     image::open(dir.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
-/// The components add up to the beauty image, even with adaptive sampling and with photons.
+/// The components add up to the beauty image, even with adaptive sampling or photons.
 #[test]
 fn components_add_up_to_beauty_layer() {
     let dir = dir();

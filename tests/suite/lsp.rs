@@ -1,4 +1,4 @@
-//! `glimt lsp` used by an editor, over the process's stdin and stdout.
+//! `glimt lsp` as an editor uses it: a process with requests on stdin and replies on stdout.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
@@ -146,7 +146,7 @@ fn diagnostics_follow_edits_and_saves() {
     );
     assert_eq!((&unknown["severity"], &unknown["source"]), (&json!(1), &json!("glimt")));
     assert_mentions(unknown["message"].as_str().expect("text"), &["`radius`"]);
-    // This file is not an image, which is detected only when reading it.
+    // This file is not an image, which is detected only when the file is read.
     editor.dir.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
@@ -209,7 +209,7 @@ fn hover_and_go_to_definition_work() {
 }
 
 #[test]
-fn colors_are_shown_as_srgb_written_as_linear() {
+fn colors_are_shown_in_srgb_and_written_linear() {
     let text =
         TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\"\n[[light]]\nintensity = \"#+12345\"");
     let mut editor = Editor::open(&text);

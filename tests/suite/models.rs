@@ -140,7 +140,7 @@ fn mtl_maps_scale_like_constants() {
     }
 }
 
-/// MeshLab and some other programs invert `Tr`, so that 1 instead of 0 is opaque.
+/// MeshLab and some other programs invert `Tr`, so that the opaque value is 1 instead of 0.
 #[test]
 fn misused_mtl_statements_are_corrected() {
     let dir = TestDir::new();
@@ -157,7 +157,7 @@ fn misused_mtl_statements_are_corrected() {
     let (plain, quiet) = said("Kd 0.8 0.8 0.8\n");
     assert!(!quiet.contains("warning"), "{quiet}");
     let opaque = "`Tr 1` without `d`";
-    let dull = "a.mtl:3: `Ks` has no effect without `Ns`";
+    let dull = "a.mtl:3: `Ks` has no effect unless `Ns`";
     for (mtl, words) in [
         ("Tr 1.000000\n", Some(opaque)),
         ("Tr 1\nd 1\n", None),
@@ -219,7 +219,7 @@ fn missing_mtl_images_name_their_material() {
     assert_mentions(&gray, &["warning: a.mtl:2: ", "heights.pgm", "normals", "\"brick\""]);
 }
 
-/// Values of a model that cannot be used cause warnings with the file and line, with and without a scene.
+/// Unusable values in a model cause warnings that name the file and line, with and without a scene.
 #[test]
 fn unusable_model_values_warn() {
     let dir = TestDir::new();

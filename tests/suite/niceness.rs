@@ -40,8 +40,8 @@ pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
         .collect()
 }
 
-/// The distinct nice values of two or more render threads. The program prints `sign` to stderr when it starts
-/// to render.
+/// The distinct nice values of at least two render threads. The program prints `sign` to stderr when it
+/// starts to render.
 fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
     let mut said = BufReader::new(child.stderr.take().expect("stderr"));

@@ -9,7 +9,7 @@ use super::test_dir::TestDir;
 
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Image width and height, in whole tiles.
+/// Image width and height. Both are whole numbers of tiles.
 const SIZE: [usize; 2] = [64, 32];
 
 const HEAD: &str = r#"[render]
@@ -43,7 +43,7 @@ radius = 0.4
 material = "lamp"
 "#;
 
-/// A caustic on the floor, which paths rarely find. The ball and the light are outside the image.
+/// A caustic on the floor, which path tracing rarely finds. The ball and the light are outside the image.
 const CAUSTIC: &str = r#"
 [materials]
 wall = { diffuse = [0.7, 0.7, 0.7] }
@@ -61,7 +61,7 @@ radius = 0.2
 material = "lamp"
 "#;
 
-/// A ball with the given shininess and surroundings.
+/// A ball with the specified shininess and surroundings.
 fn ball(around: &str, shininess: u32) -> String {
     format!(
         r#"{HEAD}{around}
@@ -97,7 +97,7 @@ fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
     )
 }
 
-/// Statistics over several seeds: mean and variance of each pixel, and RMS of the reported errors.
+/// Statistics over several seeds: the mean and variance of each pixel, and the RMS of the reported errors.
 struct Seeds {
     means: Vec<f64>,
     variances: Vec<f64>,

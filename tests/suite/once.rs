@@ -254,7 +254,7 @@ fn write_failure_exits_1() {
 }
 
 #[test]
-fn each_failed_output_is_reported_on_a_line() {
+fn failed_outputs_are_reported_on_separate_lines() {
     let dir = TestDir::new();
     for name in ["a.png", "b.ppm"] {
         std::os::unix::fs::symlink("/dev/full", dir.path(name)).expect("a link");
@@ -337,14 +337,14 @@ fn check_names_lights_counted_twice() {
     };
     let once = "f 1 2 3 4\n";
     assert!(!mentions(&said(once, &[mesh]), "twice"));
-    // The same faces again, starting at another corner, emit once.
+    // Repeated faces that start at another corner emit once.
     assert!(!mentions(&said("f 1 2 3\nf 1 3 4\nf 2 3 1\nf 3 4 1\n", &[mesh]), "twice"));
     // The other diagonal.
     assert_mentions(
         &said("f 1 2 3 4\nf 2 3 4 1\n", &[mesh]),
         &["tube 0", "line 6", "twice", "a.toml:6", "help"],
     );
-    // Two objects in one place.
+    // Two objects in the same place.
     for (objects, other, line) in [
         ([quad, quad], "panel 0", "a.toml:12"),
         ([quad, mesh], "panel 0", "a.toml:12"),

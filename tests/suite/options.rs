@@ -70,7 +70,7 @@ fn room() -> TestDir {
     dir
 }
 
-/// Renders with the given options and returns the image file.
+/// Renders with additional options. Returns the contents of the image file.
 #[track_caller]
 fn picture(dir: &TestDir, options: &str) -> Vec<u8> {
     dir.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
@@ -389,7 +389,7 @@ fn images_as_scenes_are_rejected_with_info() {
     }
 }
 
-/// Checks the suggested fix if the stacks of too many threads exceed the memory limit.
+/// Checks the fix that is suggested when too many thread stacks exceed the memory limit.
 #[cfg(target_os = "linux")]
 #[test]
 fn thread_failure_message_suggests_a_fix() {
@@ -415,7 +415,7 @@ fn dash_is_standard_output() {
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
-    // Close this process's copy of the other end.
+    // Close this process's copy of the child's end.
     drop(command);
     let mut report = String::new();
     ours.read_to_string(&mut report).expect("a report");
@@ -457,7 +457,7 @@ fn signal_interrupts_a_blocked_report() {
 }
 
 #[test]
-fn full_device_is_an_error_closed_pipe_is_not() {
+fn full_device_fails_but_closed_pipe_does_not() {
     let dir = TestDir::new();
     for seed in [1, 2] {
         dir.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);

@@ -133,7 +133,7 @@ fn pipe_needs_a_reader() {
     let is_unconnected =
         matches!(&error, OutputError::File { source, .. } if source.kind() == ErrorKind::NotConnected);
     assert!(is_unconnected, "{error:?}");
-    // More bytes than fit into a pipe. Once the pipe can be opened for writing, `cat` has started.
+    // Write more bytes than fit into a pipe. Once the pipe can be opened for writing, `cat` has started.
     let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
     let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");
@@ -192,7 +192,7 @@ fn longest_possible_name_is_written() {
     assert_eq!(fs::read(&path).expect("a file"), b"picture");
 }
 
-/// Runs as an unprivileged user, because root may write any file.
+/// Runs as an unprivileged user, because root may write to any file.
 #[test]
 fn missing_permission_is_an_error() {
     if let Some(directory) = child_path() {
@@ -297,7 +297,7 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
-        // The child is writing once the file changes. Then wait for this round's delay.
+        // When the file changes, the child is writing. Then wait for this round's delay.
         let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
         let before = state().expect("a file");
         while state().expect("a file") == before {

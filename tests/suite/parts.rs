@@ -334,7 +334,7 @@ fn merge_of_moved_parts_never_replaces_an_input() {
     for part in ["1.part", "2.part"] {
         fs::rename(dir.path(part), dir.path("elsewhere").join(part)).expect("moved");
     }
-    // The scene references this texture only since the parts were rendered.
+    // The scene's reference to this texture was added after the parts were rendered.
     dir.write(
         "room.toml",
         ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"new.ppm\"\n[textures.tiles]"),
@@ -355,7 +355,7 @@ fn merge_protects_textures_of_a_mesh_with_errors() {
     let image = "P3 1 1 255 9 9 9\n";
     dir.write("late.ppm", image);
     parts(&dir, 2, "--view depth");
-    // The mesh references the texture only since the parts were rendered.
+    // The mesh's reference to this texture was added after the parts were rendered.
     dir.write("step.mtl", "newmtl a\nKd one\nmap_Kd late.ppm\n");
     dir.write("step.obj", format!("mtllib step.mtl\n{STEP}f 1 2 9\n"));
     let said = dir.expect("merge late.ppm 1.part 2.part --progress none", 2);
@@ -437,7 +437,7 @@ fn watching_merge_waits_for_incomplete_parts() {
     assert!(!dir.path("joined.exr").exists());
 }
 
-/// Runs the program as an unprivileged user, because root may write any file.
+/// Runs the program as an unprivileged user, because root may write to any file.
 #[test]
 fn merge_replaces_the_same_files_as_a_render() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};

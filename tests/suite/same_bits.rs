@@ -96,7 +96,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn known_images_are_bit_identical() {
+fn images_match_known_hashes() {
     let dir = TestDir::new();
     dir.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
     let known: [(&str, &str, u64); 5] = [
@@ -218,7 +218,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn materials_are_bit_identical() {
+fn material_images_match_known_hashes() {
     let dir = TestDir::new();
     dir.write(
         "waves.ppm",
@@ -286,7 +286,7 @@ fn photon_image_does_not_depend_on_tree() {
 }
 
 #[test]
-fn known_photon_image_is_bit_identical() {
+fn photon_image_matches_known_hash() {
     const KNOWN: u64 = 0x777f_28d8_83fa_7d9c;
     let dir = TestDir::new();
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");

@@ -21,7 +21,7 @@ fn checker() -> Vec<u8> {
     fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/checker.png")).expect("an image")
 }
 
-/// An OBJ file of a box with the given sizes.
+/// An OBJ file of a box with the specified side lengths.
 fn box_of([x, y, z]: [i32; 3]) -> String {
     let corner =
         |bits: i32| format!("v {} {} {}\n", (bits & 1) * x, (bits >> 1 & 1) * y, (bits >> 2 & 1) * z);
@@ -29,7 +29,7 @@ fn box_of([x, y, z]: [i32; 3]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// Range of columns and rows with pixels that are neither ground nor sky.
+/// Ranges of columns and rows that contain pixels other than ground and sky.
 fn covered(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
@@ -167,7 +167,7 @@ fn both_uv_sets_are_imported() {
     assert_mentions(&said, &["warning", "b.obj", "\"checks_2\"", "\"material\""]);
 }
 
-/// A GLB file of a cube with a texture at the given URI.
+/// A GLB file of a cube whose texture is at the specified URI.
 fn with_image(uri: &str) -> Vec<u8> {
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
@@ -379,7 +379,7 @@ fn model_cameras_and_lights_are_used() {
     assert!(!text.contains("directional"), "{text}");
 }
 
-/// For models with polished surfaces, glimt clamps reflected light and reports it. Other models render
+/// For models with polished surfaces, glimt clamps reflected light and reports this. Other models render
 /// without bias.
 #[test]
 fn only_polished_models_are_clamped() {

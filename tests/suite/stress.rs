@@ -1,6 +1,6 @@
-//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`. Checks that
-//! images are within bounds of their references, that samples are finite, and that unused features change no
-//! bits or rays. Only the benchmarks measure times.
+//! Runs the short cases from `cargo bench --bench stress` and the pairs from `cargo bench --bench skips`.
+//! Checks that images differ from their references by at most a bound, that samples are finite, and that
+//! unused features change no bits or rays. Only the benchmarks measure times.
 
 #[path = "../../benches/stress/cases/mod.rs"]
 mod cases;

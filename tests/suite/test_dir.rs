@@ -54,8 +54,8 @@ impl TestDir {
     }
 
     /// Copies the program for another user without access to the build directory. Uses `cp`, because a copy
-    /// written by this process could still be open for writing in a child forked by another test, which would
-    /// prevent its execution.
+    /// written by this process could still be open for writing in a child forked by another test, and could
+    /// not be executed then.
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
         let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();
@@ -74,7 +74,7 @@ impl TestDir {
         self.glimt(line).output().expect("it runs")
     }
 
-    /// Runs `line` and checks that it has the given exit code and no output on stdout. Returns stderr.
+    /// Runs `line` and checks that it exits with `code` and prints nothing to stdout. Returns stderr.
     #[track_caller]
     pub(crate) fn expect(&self, line: &str, code: i32) -> String {
         let output = self.run(line);
@@ -85,7 +85,7 @@ impl TestDir {
         stderr
     }
 
-    /// Runs `line` like [`Self::expect`] with exit code 0. Returns the report.
+    /// Runs `line` like [`Self::expect`], expecting exit code 0. Returns the report.
     #[track_caller]
     pub(crate) fn report(&self, line: &str) -> serde_json::Value {
         self.expect(&format!("{line} --once --report report.json"), 0);
@@ -116,7 +116,7 @@ impl TestDir {
     }
 }
 
-/// Whether a message contains a fact (a file, option, key or number) as a separate word.
+/// Whether a message mentions a fact (a file, option, key or number) as a separate word.
 pub(crate) fn mentions(message: &str, fact: &str) -> bool {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let is_inside = |c: char| fact.starts_with(is_word) && is_word(c);
@@ -126,7 +126,7 @@ pub(crate) fn mentions(message: &str, fact: &str) -> bool {
     })
 }
 
-/// Checks that a message contains the given facts, regardless of its wording.
+/// Checks that a message contains all expected facts, regardless of its wording.
 #[track_caller]
 pub(crate) fn assert_mentions(message: &str, facts: &[&str]) {
     for fact in facts {

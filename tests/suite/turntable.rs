@@ -105,7 +105,7 @@ fn turntable_reuses_trees_and_photons() {
 #[test]
 fn model_stays_in_the_frame() {
     let dir = TestDir::new();
-    // A long plank. The first frame shows its end.
+    // A long plank, seen end-on in the first frame.
     dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
     dir.expect(&format!("plank.obj {SMALL} --turntable 4 --from front --view albedo -o b.apng"), 0);
     for frame in frames(&dir.bytes("b.apng")) {
@@ -143,7 +143,7 @@ fn impossible_turntables_are_rejected() {
     assert_mentions(&stderr, &["27.94 GiB"]);
     let stderr =
         dir.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
-    assert_mentions(&stderr, &["error", "frames", "30.00 MiB", "--memory"]);
+    assert_mentions(&stderr, &["error", "frames", "30 MiB", "--memory"]);
 }
 
 #[test]

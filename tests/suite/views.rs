@@ -95,7 +95,7 @@ fn infinite_floor_keeps_near_depth_contrast() {
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
-    // Pixels at the horizon are arbitrarily far away, so some are beyond the range.
+    // Points near the horizon are arbitrarily far away, so some are beyond the range.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
     assert!(notes(&dir, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));

@@ -7,7 +7,7 @@ use crate::math::{DVec3, Vec3};
 /// Values that affect the image. Implementations destructure all fields without `..`, so a new field causes a
 /// compile error until it is added to the fingerprint or explicitly ignored.
 pub trait Fingerprinted {
-    /// Extends the fingerprint by all values that later stages read.
+    /// Feeds into the fingerprint all values that later stages read.
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
 }
 
@@ -47,7 +47,7 @@ impl std::fmt::Display for Key {
 pub struct FingerprintHasher(blake3::Hasher);
 
 impl FingerprintHasher {
-    /// Starts a fingerprint. `domain` separates the stages.
+    /// Starts a fingerprint. The `domain` string makes the fingerprints of different stages differ.
     pub fn new(domain: &str) -> Self {
         let mut new = Self(blake3::Hasher::new());
         new.text(domain);

@@ -6,7 +6,7 @@ use std::fs;
 use super::imports::{Module, Modules};
 use super::{all_sources, root};
 
-/// Pairs of files that may import each other, with the reason.
+/// Pairs of files that may import each other, each with the reason.
 const PAIRS: [(&str, &str, &str); 9] = [
     (
         "accel/bvh/build",
@@ -19,7 +19,11 @@ const PAIRS: [(&str, &str, &str); 9] = [
         "split bins are counted with vector instructions",
     ),
     ("cli/bench/measure", "cli/bench/run", "a run measures methods, and each method reads the run's options"),
-    ("output/error", "output/format", "an error lists the formats; an unknown format is an error"),
+    (
+        "output/error",
+        "output/format",
+        "an error lists the valid formats, and parsing a format may return this error",
+    ),
     (
         "scene/description/material",
         "scene/fingerprint",
@@ -32,7 +36,7 @@ const PAIRS: [(&str, &str, &str); 9] = [
         "outputs use the stored contents to detect whether they were replaced",
     ),
     ("world/geometry", "world/isolated", "the geometry stores its isolated surfaces"),
-    ("world/mesh_instance", "world/mesh_packet", "packets and single hits share their interpolation"),
+    ("world/mesh_instance", "world/mesh_packet", "packets and single hits share interpolation code"),
 ];
 
 /// All source files with their imports.
@@ -88,7 +92,7 @@ fn only_listed_pairs_import_each_other() {
     assert_eq!(pairs, BTreeSet::from(listed), "existing pairs and listed pairs differ");
 }
 
-/// The rank of each integrator submodule: its line in the `text` block of the module documentation.
+/// The rank of each integrator submodule: its line number in the `text` block of the module documentation.
 fn ranks() -> BTreeMap<String, usize> {
     let map = fs::read_to_string(root().join("crates/trace/src/integrators/mod.rs")).expect("the map");
     let block = map.split("```").nth(1).and_then(|block| block.strip_prefix("text\n")).expect("a table");
@@ -100,7 +104,7 @@ fn ranks() -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn integrators_use_only_higher_ranks() {
+fn integrators_use_only_lower_ranks() {
     let (modules, ranks) = (all_modules(), ranks());
     let mut found = BTreeSet::new();
     for module in modules.all().filter(|module| module[0] == "integrators" && module.len() > 1) {

@@ -8,7 +8,7 @@ use std::slice;
 /// A module path: `["tui", "view", "layout"]`.
 pub(super) type Module = Vec<String>;
 
-/// An imported item: its path, and its name in the importing file.
+/// An imported item, with its path and its name in the importing file.
 struct Import {
     path: Vec<String>,
     name: String,
@@ -52,7 +52,7 @@ impl Modules {
         files.filter(|file| !module.starts_with(file)).collect()
     }
 
-    /// Expands the first name of a path in `module` if it is an imported name.
+    /// Expands the first name in a path used in `module` if that name is imported.
     fn unabbreviated(&self, module: &Module, path: Vec<String>) -> Vec<String> {
         match self.imports[module].iter().find(|one| one.name == path[0]) {
             Some(import) => [import.path.clone(), path[1..].to_vec()].concat(),
@@ -166,7 +166,7 @@ fn names(path: &str) -> Vec<String> {
     path.split("::").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
 
-/// Paths with at least two components in the code.
+/// Paths in the code that have at least two components.
 fn paths_in(text: &str) -> Vec<Vec<String>> {
     let words = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
     words
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn crate_path_reaches_single_module_children() {
+    fn crate_path_may_name_a_child_or_top_module() {
         let modules = modules(&[
             ("a/lib.rs", "mod b;\nmod c;\n"),
             ("a/b.rs", "use crate::c::Thing;\n"),

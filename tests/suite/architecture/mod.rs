@@ -102,7 +102,7 @@ fn dependencies_have_no_cycle() {
     }
 }
 
-/// Functions of the system's math library, whose results differ between machines. `sqrt` and `mul_add` are
+/// Functions from the system's math library, whose results differ between machines. `sqrt` and `mul_add` are
 /// correctly rounded everywhere, but `mul_add` is slow on processors without an FMA instruction.
 const LIBM: [&str; 34] = [
     "sin",
@@ -145,7 +145,7 @@ const LIBM: [&str; 34] = [
 /// the `libm` crate.
 const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/work_rate.rs"];
 
-/// Module compiled for specific instruction sets, some of which have FMA instructions.
+/// Module compiled for specific instruction sets, some of which include FMA.
 const SIMD: &str = "accel/wide_bvh/simd";
 
 /// Standard library functions that panic if the system fails to close a folder. The asset generator and build

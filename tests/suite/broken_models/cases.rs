@@ -1,6 +1,7 @@
 //! Malformed mesh and material files.
 
-/// The fault, the file, and the error message. The message is empty if the valid part of the file is read.
+/// The fault, the file, and the expected error message, which is empty if the valid part of the file can be
+/// read.
 pub(super) type Case = (&'static str, Vec<u8>, &'static str);
 
 /// A facet in a binary STL file.
@@ -245,7 +246,7 @@ pub(super) fn stl() -> Vec<Case> {
         ("no count", vec![0; 82], "a.stl:1: this is a binary file in another format"),
         ("no facets", stl_of(0, &[]), "a.stl:1: this is a binary file in another format"),
         ("four billion facets", stl_of(4000000000, &FACET), "a.stl: the header claims 4000000000 facets, but the file ends after 1"),
-        ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, but the file ends after 0"),
+        ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facet, but the file ends after 0"),
         ("one facet fewer than declared", stl_of(2, &FACET), "a.stl: the header claims 2 facets, but the file ends after 1"),
         ("a facet with three equal vertices", stl_of(1, &[0; 50]), "a.stl: no usable face: 0 of 1 have a non-finite corner, 1 have zero area"),
         ("non-finite values", stl_of(1, &[0xff; 50]), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),

@@ -1,5 +1,5 @@
 //! Glass assembled from several open parts. Parts that together form a closed surface are one solid. Open
-//! surfaces are reported, and render identically with path tracing and photons.
+//! surfaces are reported, and they render identically with path tracing and photons.
 
 use glimt::assets::LoadedMesh;
 use glimt::control::CancelToken;
@@ -18,8 +18,8 @@ fn bodies(build: &Build) -> GlassSolids {
     GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not cancelled")
 }
 
-/// A prism over a polygon in the plane z = 0, counterclockwise when viewed from +z. Each side is divided into
-/// rectangles.
+/// A prism whose base is a polygon in the plane z = 0, specified counterclockwise as viewed from +z. Each
+/// side is divided into rectangles.
 fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut put = |corners: [DVec3; 3]| {
@@ -77,13 +77,13 @@ fn closed(round: usize) -> TriangleMesh {
     }
 }
 
-/// The triangles of a mesh that satisfy `holds`.
+/// A mesh's triangles that satisfy `holds`.
 fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
     let own = mesh.triangles.iter().enumerate().filter(|&(i, _)| holds(i));
     TriangleMesh { triangles: own.map(|(_, &own)| own).collect(), ..mesh.clone() }
 }
 
-/// Divides a mesh around random points by assigning each triangle to the nearest point.
+/// Splits a mesh into parts by assigning each triangle to the nearest of several random points.
 fn cut(mesh: &TriangleMesh, count: usize, random: &mut Random) -> Vec<TriangleMesh> {
     let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let seeds: Vec<Vec3> =
@@ -100,7 +100,7 @@ fn turned(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
 }
 
-/// A floor, a large area light above it, and the parts in between.
+/// A floor with a large area light above it, and the parts in between.
 fn room(parts: &[TriangleMesh], material: &Material) -> Build {
     let build = scene().quad(v(-6.0, -6.0, -0.1), v(12.0, 0.0, 0.0), v(0.0, 12.0, 0.0), matte(0.7)).quad(
         v(-3.0, 3.0, 4.0),
@@ -169,7 +169,7 @@ fn reversed_part_is_flipped() {
 
 #[test]
 fn long_edge_matches_several_short_edges() {
-    // A box at an oblique angle to the axes. Its sides are divided into strips, but its lids are not divided.
+    // A box at an oblique angle to the axes. Its sides are divided into strips, but its lids are not.
     let corners = [v(-0.7, -0.6, 0.0), v(0.7, -0.6, 0.0), v(0.7, 0.6, 0.0), v(-0.7, 0.6, 0.0)];
     let side = |step: f64| v(0.0, 0.0, 0.9 * step);
     let mut sides = TriangleMesh::default();
@@ -270,8 +270,7 @@ fn quads_of_glass_are_a_box() {
 
 #[test]
 fn camera_inside_split_solid_is_in_glass() {
-    // A light inside the glass, visible to the camera through 0.8 units of glass without a surface in
-    // between.
+    // The camera sees a light through 0.8 units of glass, with no surface in between.
     let (low, high) = (v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0));
     let material = tinted(1.33, v(0.5, 0.5, 0.5));
     let lit = |build: Build| {
@@ -355,8 +354,8 @@ fn light_inside_split_solid_emits_photons() {
     }
 }
 
-/// Checks that two scenes have equal means over the image and each quarter, within `errors` standard errors
-/// plus a fraction of the value.
+/// Checks that two scenes have the same mean in the whole image and in each quarter, to within `errors`
+/// standard errors plus a fraction of the value.
 #[track_caller]
 fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64, part: f64) {
     let means = |build: &Build, first: u32| -> Vec<[f64; 5]> {
@@ -485,7 +484,8 @@ fn curved_opaque_surface_closes_open_glass() {
     let off =
         TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
     assert!(bodies(&with(off)).has_open());
-    // Two glass panes in an opaque tube. The chords of their rims deviate from it by 2 % of the radius.
+    // Two glass panes in an opaque tube. The chords along their rims deviate from the tube by 2 % of the
+    // radius.
     let pane = |radius: f64, height: f64, faces_up: bool| {
         let mut mesh =
             TriangleMesh { positions: vec![v(0.0, 0.0, height).as_vec3()], ..TriangleMesh::default() };
@@ -509,7 +509,7 @@ fn curved_opaque_surface_closes_open_glass() {
 
 #[test]
 fn each_hole_is_tested_separately() {
-    // Boxes with five sides: on a table, above the table, with the open side up, and on a mesh.
+    // Five-sided boxes: on a table, above the table, with the open side up, and on a mesh.
     let (low, high) = (v(0.0, 0.0, 0.0), v(1.0, 1.0, 0.5));
     let five = |at: DVec3, lost: usize| {
         let all = quads(low + at, high + at, 0).into_iter().enumerate();

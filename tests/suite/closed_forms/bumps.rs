@@ -1,4 +1,4 @@
-//! Bump maps: a ramp equals a tilted plane, and the normals of waves match their analytic derivatives.
+//! Bump maps: a ramp is shaded like a tilted plane, and wave normals match the analytic derivatives.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,8 @@ use super::scenes::{
 };
 use super::v;
 
-/// A height texture from a function of the image position, from (0, 0) at the bottom left to (1, 1).
+/// A height texture computed from a function of the image position, which is (0, 0) at the bottom left and
+/// (1, 1) at the top right.
 fn heights(build: &mut Build, size: usize, height: impl Fn(DVec2) -> f64) -> usize {
     let place = |i: usize| (i as f64 + 0.5) / size as f64;
     let row =
@@ -28,7 +29,7 @@ fn bumped(texture: usize, scale: f64, material: Material) -> Material {
     Material { bump: Some(Bump { texture, channel: None, scale: scale as f32 }), ..material }
 }
 
-/// One material of each kind affected by the shading normal.
+/// One material of each kind that the shading normal affects.
 fn materials() -> Vec<(&'static str, Material)> {
     vec![
         ("phong", phong(0.3, 0.5, 20.0, 0.0)),
@@ -104,7 +105,7 @@ fn ramp_equals_constant_normal_map() {
     }
 }
 
-/// Shading normal seen by the camera.
+/// Shading normal at the point that the camera sees.
 fn normal(build: &Build) -> DVec3 {
     build.clone().viewed(View::Normal).color() * 2.0 - 1.0
 }
@@ -139,7 +140,7 @@ fn tiled_waves_have_analytic_normals() {
             let slopes = repeat
                 * DVec2::from_angle(-degrees.to_radians()).rotate(waves(turn.rotate(repeat * at) + offset).1)
                 * 0.05;
-            // The tangents of the height field are u and w, each raised by its slope.
+            // The tangents of the height field are u and w, each tilted by the slope along it.
             let expected = (u + DVec3::Y * slopes.x).cross(w + DVec3::Y * slopes.y).normalize();
             let point = u * at.x + w * at.y;
             let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));

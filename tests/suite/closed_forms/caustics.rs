@@ -1,5 +1,5 @@
 //! Photon mapping against path tracing: means over pixel blocks and the whole image, with their spread over
-//! seeds. Also uniform light near edges and walls, which truncate kernels.
+//! seeds. Also tests uniform light near edges and walls, which truncate kernels.
 
 use std::f64::consts::PI;
 
@@ -24,13 +24,13 @@ const SEEDS: u32 = 16;
 /// Image side length in pixels, and in blocks.
 const SIDE: usize = 16;
 const BLOCKS: usize = 4;
-/// Largest relative standard error of the difference between both methods. A difference of 3 % is then highly
-/// significant.
+/// Largest relative standard error of the difference between the two methods. A difference of 3 % is then
+/// highly significant.
 const MOST_ERROR: f64 = 4.5e-3;
 /// Allowed kernel bias in smooth light, away from edges.
 const SLACK: f64 = 1.5e-3;
 
-/// Sample counts of both methods, and the kernel radius.
+/// Sample counts for both methods, and the kernel radius.
 struct Effort {
     path_samples: u32,
     passes: u32,
@@ -101,7 +101,7 @@ fn floor() -> Build {
     scene().quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), matte(0.7))
 }
 
-/// Views a square of the given width around a point, with the camera at the given height above it.
+/// Views a square around a point from a camera above it, with the specified square width and camera height.
 fn looked_at(build: Build, at: DVec3, width: f64, above: f64) -> Build {
     let from = v(at.x, at.y + above, at.z + 1e-4 * above);
     let angle = 2.0 * (0.5 * width / above).atan();
@@ -204,7 +204,7 @@ const PASSES: u32 = 64;
 /// kernel 2/πr²·(1 − ρ²/r²) that lies beyond distance x.
 const AT_EDGES: f64 = 2e-3;
 
-/// A view from above of a rectangle on the ground, given its center and its side lengths along x and z.
+/// A rectangle on the ground viewed from above, specified by its center and its side lengths along x and z.
 /// Pixels are nearly square.
 fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     const PIXELS: f64 = 256.0;
@@ -232,7 +232,7 @@ fn even() -> f64 {
     0.5_f64.sqrt() * 0.7 / PI
 }
 
-/// Checks that the image mean after [`PASSES`] is exact within [`AT_EDGES`] and noise.
+/// Checks that the image mean after [`PASSES`] is exact to within [`AT_EDGES`] plus noise.
 #[track_caller]
 fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: f64) {
     let build = build.clone().photons(photons, radius);
@@ -284,7 +284,7 @@ fn photon_light_is_uniform_up_to_walls() {
         let room = mirrored(wall(floor), (-2.2, -1.75), (0.0, 0.6));
         let foot = strip(room.clone(), v(-1.95, 0.0, 0.0), (0.099, 0.3));
         assert_even(&format!("a floor before a wall {what}"), &foot, (5000, 0.1), even());
-        // The lower part of the wall, on the side of the mirror.
+        // The lower part of the wall, on the side that faces the mirror.
         let low = room.pictured(v(-1.0, 0.05, 0.0), v(-2.0, 0.05, 0.0), 5.65, 48, 16).depth(3);
         assert_even(&format!("a wall {what}"), &low, (5000, 0.1), even());
     }

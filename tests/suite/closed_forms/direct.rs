@@ -98,7 +98,7 @@ fn perpendicular_square_light_is_exact() {
 
 #[test]
 fn rectangle_lights_match_lambert() {
-    // Lambert's formula for arbitrary rectangles above the plane that face the origin.
+    // Lambert's formula for arbitrary rectangles that face the origin from above the plane.
     for (corner, u, w) in [
         (v(0.3, 0.01, -0.5), v(0.0, 0.0, 1.0), v(0.0, 2.0, 0.0)),
         (v(0.02, 0.5, -5.0), v(0.0, 0.0, 10.0), v(0.1, 0.1, 0.0)),
@@ -178,7 +178,7 @@ fn transformed_mesh_light_is_exact() {
         });
         let exact = convex(faces);
         let lit = at_origin().mesh(ball.clone(), [scale, DVec3::ZERO, place], emitter(1.0));
-        assert_irradiance(&format!("ball of scale {scale}"), &lit, exact);
+        assert_irradiance(&format!("ball with scale {scale}"), &lit, exact);
     }
 }
 
@@ -223,7 +223,7 @@ fn sphere_light_is_exact_near_and_far() {
     }
 }
 
-/// A unit square light at height 4. A blocker at height 1 hides everything above x < 0.
+/// A unit square light at height 4, optionally with a blocker at height 1 that covers x < 0.
 fn penumbra(x: f64, blocker: bool) -> Build {
     let lit = receiver(v(x, 0.0, 0.0), 0.7).quad(v(-0.5, 4.0, -0.5), DVec3::X, DVec3::Z, emitter(1.0));
     let hide =

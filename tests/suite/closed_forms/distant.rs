@@ -58,7 +58,7 @@ fn directional_light_is_uniform() {
         for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
             let lit = sun(receiver(place, 0.7), direction, 5.0, 0.0).shadows(shadows, 3);
             assert_close("lit", lit.value(), 0.7 / PI * 5.0 * 0.8);
-            // A blocker between the light and the receiver, one beside the ray, and one on the other side.
+            // A blocker on the line to the light, one next to this line, and one on the opposite side.
             let blocked = |at: DVec3| lit.clone().sphere(place + at, 0.5, matte(0.5)).value();
             let expected = if shadows == Shadows::Off { lit.value() } else { 0.0 };
             assert_eq!(blocked(v(-300.0, 400.0, 0.0)), expected);
@@ -78,8 +78,8 @@ fn sun_disk_irradiance_and_shadow_are_exact() {
         let hard = lit.clone().shadows(Shadows::Hard, 1);
         assert_mean(&format!("{degrees}, hard"), &hard.values(64, 64), expected);
     }
-    // A half plane at height 1 with x < 0, whose edge crosses the center of the disk overhead, hides half of
-    // the disk from (0, 0, 0).
+    // The half-plane x < 0 at height 1 hides half of the disk from the origin, because its edge crosses the
+    // disk's center, which is overhead.
     let overhead = sun(at_origin(), v(0.0, -1.0, 0.0), 5.0, 40.0);
     let half = overhead.quad(v(-100.0, 1.0, -100.0), v(100.0, 0.0, 0.0), v(0.0, 0.0, 200.0), matte(0.5));
     assert_mean("half", &half.values(64, 256), 0.7 / PI * 2.5);

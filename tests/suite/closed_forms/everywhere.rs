@@ -13,7 +13,7 @@ use glimt::scene::description::{
 use super::scenes::{AS_IT_IS, Build, metal, plastic, principled, receiver, scene};
 use super::{assert_mean, mean_and_error, v};
 
-/// Materials with names for messages.
+/// Materials, each with a name for messages.
 fn materials() -> [(&'static str, Material); 6] {
     [
         ("metal", metal(0.8, 0.5, 0.0)),
@@ -33,7 +33,7 @@ fn uncoated(mut material: Material) -> Material {
     material
 }
 
-/// The scene with every integrator.
+/// The scene once per integrator, with the integrator's name.
 fn each(build: &Build) -> [(&'static str, Build); 3] {
     let path = build.clone().with(|scene| scene.render.integrator = Integrator::Path);
     [("whitted", build.clone()), ("path", path), ("photons", build.clone().photons(256, 0.1))]

@@ -11,7 +11,7 @@ use glimt::scene::description::{Bump, NormalMap, Shadows, TextureFilter, Wrap};
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
 
-/// Number of lit pixels in an image, and the largest value.
+/// Number of lit pixels in an image, and the largest pixel value.
 fn lit(build: &Build) -> (usize, f64) {
     let picture = build.picture(1, 0);
     let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
@@ -167,7 +167,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
             wall.normals = wall.positions.iter().map(any).collect();
         }
         let mut material = matte(0.8);
-        // Any texture values are valid normals and heights.
+        // Any texture value is a valid normal or height.
         let as_heights = bumps.filter(|_| number % 8 == 3);
         material.bump = as_heights.map(|texture| Bump { texture, channel: None, scale: 0.3 });
         material.normal_map = bumps.map(|texture| NormalMap { texture, strength: 2.0 });
@@ -189,8 +189,8 @@ fn closed(number: u32, random: &mut Random) -> Build {
     build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
 }
 
-/// Checks that no pixel is lit inside a thousand closed opaque meshes lit from outside by point and area
-/// lights. The meshes are smooth or flat, round or rough, single walls or shells, some with perturbed
+/// Checks that no pixel is lit inside any of a thousand closed opaque meshes with point and area lights
+/// outside. The meshes are smooth or flat, round or rough, and single- or double-walled. Some have perturbed
 /// normals.
 #[test]
 fn no_light_enters_a_closed_opaque_mesh() {

@@ -19,8 +19,8 @@ fn difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     (off / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
-/// A scene of size 8 with every shape, some of them emissive, a mesh and a point light, moved to `at`. All
-/// coordinates are multiples of 1/1024, so that sums are exact.
+/// A scene of size 8, moved to `at`. It contains a mesh, a point light, and every shape, some of them
+/// emissive. All coordinates are multiples of 1/1024, so that sums are exact.
 fn everything_at(at: DVec3, accel: Accel) -> Build {
     let p = |x: f64, y: f64, z: f64| at + (v(x, y, z) * 1024.0).round() / 1024.0;
     let d = |x: f64, y: f64, z: f64| (v(x, y, z) * 1024.0).round() / 1024.0;
@@ -140,7 +140,7 @@ fn plane_texture_is_stable_far_from_origin() {
     }
 }
 
-/// A mesh as a text file, moved by adding `at` to its coordinates in double precision.
+/// A text-format mesh file, moved by adding `at` to its coordinates in double precision.
 fn text_of(mesh: &TriangleMesh, at: DVec3, ending: &str) -> String {
     let points = mesh.positions.iter().map(|p| p.as_dvec3() + at);
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
@@ -182,7 +182,7 @@ fn mesh_files_keep_distant_vertices() {
             std::fs::write(&path, text_of(&ball, far, ending)).expect("written");
             let loaded = load(Path::new(&path), &ignore_progress, &CancelToken::new()).expect("a mesh");
             assert_eq!(loaded.mesh.triangles.len(), ball.triangles.len(), "{ending}");
-            // Rendered at the position in the file, and moved back by the scene.
+            // Render the mesh at its position in the file, and moved back by the scene.
             let off = difference(&seen(scene().loaded(loaded.clone(), AS_IT_IS, matte(0.8)), far), &near);
             assert!(off <= 1e-3, "{ending} at {far}: {off}");
             let back = [DVec3::ONE, DVec3::ZERO, -far];

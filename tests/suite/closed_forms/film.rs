@@ -11,7 +11,7 @@ use glimt::world::World;
 use super::scenes::{Build, emitter, matte, scene};
 use super::v;
 
-/// Adds the samples `from..to` to a film.
+/// Adds samples `from..to` of every pixel to a film.
 fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u32) {
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
@@ -100,8 +100,8 @@ fn error_estimate_matches_spread_over_seeds() {
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
-            // In an image this small, the last doubling may reduce the error more than predicted from earlier
-            // doublings.
+            // In an image this small, the last doubling of the sample count may reduce the error more than
+            // earlier doublings predict.
             let most = if samples > 256 { 1.5 } else { 1.35 };
             assert!((0.9..=most).contains(&rms), "{name}, {samples} samples: {rms:.2}");
             let outside = |least, most| ratios.iter().filter(move |ratio| !(least..=most).contains(*ratio));

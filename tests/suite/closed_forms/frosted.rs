@@ -26,8 +26,8 @@ fn sheet(material: Material) -> Build {
     quad.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
 }
 
-/// Boundaries viewed from above and below, each with the position of an area light on the other side in the
-/// direction of refraction.
+/// Boundaries viewed from above and from below. Each has an area light on the other side, in the direction of
+/// the refracted ray.
 fn boundaries() -> Vec<(String, Build, DVec3)> {
     let mut all = Vec::new();
     for roughness in [0.1, 0.3, 0.6, 1.0] {
@@ -99,7 +99,7 @@ fn every_light_shines_through_rough_glass() {
 
 #[test]
 fn whitted_follows_rough_glass_like_path() {
-    // A slab with lights on both sides, where all lobes are microfacet lobes.
+    // A slab that has only microfacet lobes, with lights on both sides.
     for roughness in [0.1, 0.4, 0.8] {
         let build = scene()
             .cuboid(DVec3::ZERO, v(4.0, 0.3, 4.0), DVec3::ZERO, frosted(1.5, roughness))
@@ -120,7 +120,7 @@ fn whitted_follows_rough_glass_like_path() {
 
 #[test]
 fn rough_glass_adds_no_light_in_a_furnace() {
-    // Microfacet models lose the energy of multiple scattering, but very little for narrow lobes.
+    // Microfacet models lose the energy from multiple scattering, which is very small for narrow lobes.
     for (roughness, least) in [(0.01, 0.999), (0.2, 0.97), (0.5, 0.6), (1.0, 0.2)] {
         for (what, material) in [
             ("glass", frosted(1.5, roughness)),
@@ -135,7 +135,8 @@ fn rough_glass_adds_no_light_in_a_furnace() {
                 let (mean, error) = mean_and_error(&build.values(512, 16));
                 let told = format!("{what}, roughness {roughness}, {integrator}: {mean} ± {error}");
                 assert!(mean < 1.0 + 4.0 * error + 1e-3, "{told}");
-                // No lower bound for a sheet, which has a clear coat and loses energy on each side.
+                // There is no lower bound for a sheet, because it has a clear coat and loses energy on each
+                // side.
                 assert!(what == "a sheet" || mean > least, "{told}");
             }
         }
@@ -154,8 +155,8 @@ fn rough_glass_with_ior_1_is_invisible() {
 
 #[test]
 fn later_touching_glass_sets_the_roughness() {
-    // Only smooth glass shows the background. If a smooth box comes later than a frosted box inside it, all
-    // surfaces are smooth. In the other order, surfaces of the frosted box are rough.
+    // Only smooth glass shows the background. If the scene lists a smooth box after a frosted box inside it,
+    // all surfaces are smooth. In the other order, the frosted box has rough surfaces.
     let smooth = |build: Build| build.cuboid(v(0.0, 0.0, -5.0), v(2.0, 2.0, 2.0), DVec3::ZERO, glass(1.5));
     let frost = |build: Build, size: f64| {
         build.cuboid(v(0.0, 0.0, -5.0), DVec3::splat(size), DVec3::ZERO, frosted(1.5, 0.5))
@@ -176,8 +177,8 @@ fn later_touching_glass_sets_the_roughness() {
     let seen = |build: Build| build.background(1.0).seen(v(0.3, 5.0, 0.1), v(0.0, 2.0, 0.0)).depth(16);
     let wet =
         slab(slab(slab(scene(), glass(1.5), 0.0, 1.0), frosted(1.5, 0.5), 0.5, 1.5), glass(1.33), 1.5, 2.0);
-    // The only rough boundary of the frosted glass is with the water, which comes later, so all surfaces are
-    // smooth.
+    // All surfaces are smooth, because the frosted glass has an interface only with the water, which comes
+    // later.
     let smooth = slab(slab(scene(), glass(1.5), 0.0, 1.5), glass(1.33), 1.5, 2.0);
     let (wet, smooth) = (seen(wet), seen(smooth));
     let means = [wet, smooth].map(|build| mean_and_error(&build.values(256, 16)));
@@ -284,8 +285,8 @@ fn clear_coat_attenuates_emission() {
             assert!((value / (3.0 * left(cosine)) - 1.0).abs() < 4e-3, "{cosine}: {value}");
         }
     }
-    // Emission onto a floor: with light samples, and behind glass without refraction with lobe samples and
-    // photons.
+    // Emission onto a floor. Light samples find it directly. Behind glass without refraction, only lobe
+    // samples and photons find it.
     let shapes = [
         Shape::Quad { corner: v(-0.5, 1.0, -0.5), u: v(1.0, 0.0, 0.0), v: v(0.0, 0.0, 1.0) },
         Shape::Box { center: v(0.0, 1.0, 0.0), size: DVec3::splat(0.5), rotate: v(10.0, 30.0, 0.0) },
@@ -448,7 +449,7 @@ fn photons_pass_rough_glass_with_ior_1() {
 }
 
 #[test]
-fn sheet_on_glass_gains_no_light() {
+fn sheet_on_glass_adds_no_light() {
     // A camera in glass below a sheet, with a sky above. The transmitted basic radiance is 1/n² of the
     // transmitted radiance in air. Nothing is reflected from below.
     let sky: Vec<Vec3> = [1.0, 1.0, 0.0, 0.0].map(Vec3::splat).to_vec();

@@ -189,7 +189,7 @@ fn white_furnace_from_inside_a_ball() {
 }
 
 #[test]
-fn absorption_along_a_slab_and_a_ball() {
+fn slab_and_ball_absorption_is_exact() {
     // Straight through thickness d with tint a: (1 − R)²·aᵈ, R = 0.04. With all reflections: (1 − R)²aᵈ/(1 −
     // R²a²ᵈ).
     let tint = DVec3::new(0.5, 0.9, 0.25);
@@ -265,7 +265,7 @@ fn nested_glass_transmits_exactly() {
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96);
 }
 
-/// A mesh of outward-facing cubes, given as (center, edge, material).
+/// A mesh of outward-facing cubes, each specified as (center, edge length, material).
 pub fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for &(center, edge, material) in parts {
@@ -322,8 +322,8 @@ fn mesh_parts_can_be_nested() {
 fn shading_normals_create_no_light() {
     // Reflection and refraction split radiance/n² without loss, and a random choice between them preserves
     // its expectation. Each path sees the sky at most once, so the value is at most 1, even inside glass.
-    // Rays that are refracted outward about the shading normal but do not cross the facet must not count as
-    // outside.
+    // A ray that is refracted outward with respect to the shading normal but does not cross the facet must
+    // not count as outside.
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
     let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {

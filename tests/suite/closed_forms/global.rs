@@ -100,8 +100,8 @@ fn emissive_ball_in_a_mirror_sees_itself() {
 
 #[test]
 fn two_plates_exchange_light() {
-    // Infinite plates with E₁ = 1, ρ₁ = 0.5 and ρ₂ = 0.8 have radiances 5/3 and 4/3. The quads are 1e4 times
-    // as wide as their distance.
+    // Infinite plates with E₁ = 1, ρ₁ = 0.5 and ρ₂ = 0.8 have radiances 5/3 and 4/3. The quads are 10⁴ times
+    // as wide as the gap between them.
     let half = 5e3;
     let plates = |at: f64| {
         scene()
@@ -192,7 +192,7 @@ fn path_components_add_up() {
     );
 }
 
-/// Every kind of light, large and close above a floor with the given material.
+/// Every kind of light, large and close to a floor with the specified material.
 pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
     let floor = || {
         let corner = v(-0.05, 0.0, 0.05);
@@ -331,8 +331,8 @@ fn no_rays_for_unreachable_sharp_highlights() {
 
 #[test]
 fn path_follows_mirrors_and_glass_like_whitted() {
-    // Emission seen only through delta lobes. Whitted splits rays and path chooses one. Both count each
-    // surface as a bounce.
+    // Emission seen only through delta lobes. Whitted splits each ray, whereas path follows one branch. Both
+    // count each surface as a bounce.
     let build = || {
         scene()
             .quad(v(-9.0, -9.0, -9.0), v(18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(1.0))

@@ -1,5 +1,5 @@
-//! Hard shadows: one ray to the light's center decides the visibility. Unoccluded light is the same as
-//! without shadows and with soft shadows.
+//! Hard shadows: one ray to the light's center decides the visibility. Unoccluded light is the same with hard
+//! shadows, with soft shadows, and without shadows.
 
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;
@@ -10,7 +10,7 @@ use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
 use super::{mean_and_error, v};
 
-/// Every kind of light, at the given height above a receiver and with the given size.
+/// Every kind of light, with the specified size and height above a receiver.
 fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
     let at = v(0.0, height, 0.0);
     let lit = |shape: Shape| receiver(DVec3::ZERO, 0.8).shape(shape, emitter(3.0));
@@ -72,7 +72,7 @@ fn metal_lobes_use_the_same_shadow_ray() {
             let build = lit(floor(roughness)).sphere(at, 0.02, matte(0.0)).shadows(shadows, 1);
             mean_and_error(&build.values(1024, 16))
         };
-        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "a hidden center must block all light");
+        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "no light must arrive if the center is hidden");
         let beside = corner + v(0.0, 1.5, 1.9);
         for (name, (mean, error)) in [
             ("off-center blocker", with(beside * 0.5, Shadows::Hard)),
@@ -109,7 +109,7 @@ fn center_ray_determines_visibility() {
         lamp(receiver(DVec3::ZERO, 0.8).quad(screen, v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4), matte(0.0))).value()
     };
     assert!(free > 0.0);
-    // In front of the center, and next to it, where soft shadows would be partial.
+    // Place the blocker in front of the center, and next to it, where soft shadows would be partial.
     assert_eq!(blocked(-0.2), 0.0);
     assert_eq!(blocked(0.05), free);
     assert_eq!(scene().value(), 0.0);
@@ -148,7 +148,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
         };
         let all = value(free);
         assert!(all > 0.0, "{name}");
-        // In front of the cube's center, and in front of the center of its lower face.
+        // Place the screen in front of the cube's center, and in front of its lower face's center.
         assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
         let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
         assert_eq!(beside, all, "{name}");

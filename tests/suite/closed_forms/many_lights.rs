@@ -12,8 +12,8 @@ use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
 use super::{Random, mean_and_error, v};
 
-/// Adds enough nearly black lights that vertices sample a subset of the lights. Black lights would be
-/// removed.
+/// Adds so many nearly black lights that each vertex samples only a subset of the lights. Black lights would
+/// be removed.
 fn with_dark_lights(build: Build) -> Build {
     (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 1e-20, Falloff::Square))
 }
@@ -38,7 +38,7 @@ fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), m
     assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a}, expected {b} ± {of_b}");
 }
 
-/// A floor with objects in a small image. The camera is below the lights, because edges of visible lights
+/// A small image of a floor with objects. The camera is below the lights, because edges of visible lights
 /// would dominate the noise.
 fn room(floor: glimt::scene::description::Material) -> Build {
     scene()
@@ -137,7 +137,7 @@ fn divided_light_matches_whole_light() {
     }
 }
 
-/// Lobe samples find most of the light. At each vertex, a given one of the thousand lights is sampled with a
+/// Lobe samples find most of the light. At each vertex, each of the thousand lights is sampled with a
 /// probability of about 1/30.
 #[test]
 fn divided_light_keeps_sharp_highlight() {

@@ -13,7 +13,7 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{AS_IT_IS, Build, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
-/// Adds a gray texture with the given values, top row first.
+/// Adds a gray texture from its values, top row first.
 fn grays(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
     let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
@@ -177,7 +177,7 @@ fn light_power_follows_mean_of_texture() {
     assert_close("power", strength(&patterned), strength(&plain));
 }
 
-/// Uses enough lights that vertices sample only some of them.
+/// Uses so many lights that each vertex samples only some of them.
 #[test]
 fn sampled_lights_keep_their_textures() {
     let mut build = at_origin();

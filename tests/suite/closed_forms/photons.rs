@@ -40,8 +40,8 @@ fn in_glass(build: Build, at: DVec3) -> Build {
 
 #[test]
 fn stored_photons_carry_emitted_power() {
-    // All of Φ arrives through glass, and every photon is stored once. The walls reflect a fraction ρ of the
-    // photons and of Φ, with variance ρ·(1 − ρ).
+    // The entire power Φ arrives through glass, and every photon is stored once. The walls reflect a fraction
+    // ρ of the photons and of Φ, with variance ρ·(1 − ρ).
     for (reflectance, count) in [(0.5_f64, 40_000_u32), (0.8, 40_000)] {
         let build = in_glass(room(|| matte(reflectance as f32)), v(0.2, -0.1, 0.3)).depth(10_000);
         let (world, token) = (build.world(), CancelToken::new());
@@ -306,7 +306,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
-    // Sample ranges, with photon maps for only these samples.
+    // Render each sample range with photon maps for only these samples.
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];

@@ -1,4 +1,4 @@
-//! Lights with faces that coincide with other faces of their mesh.
+//! Mesh lights with coincident faces.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec3};
@@ -8,7 +8,7 @@ use super::scenes::{AS_IT_IS, emitter, metal, scene};
 use super::two_sided::{assert_lit, at_origin, both};
 use super::{assert_mean, lambert, mean_and_error, v};
 
-/// A square light whose first two triangles face down, and vertices 4 to 7 at the same places as 0 to 3.
+/// A square light. Its first two triangles face down, and vertices 4 to 7 have the same positions as 0 to 3.
 fn light(more: &[[u32; 3]]) -> TriangleMesh {
     let corner = |i: usize| [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)][i % 4];
     TriangleMesh {
@@ -18,7 +18,7 @@ fn light(more: &[[u32; 3]]) -> TriangleMesh {
     }
 }
 
-/// More faces for the light, which must not change its image from below.
+/// Additional faces for the light. They must not change its appearance from below.
 const MORE: [(&str, [[u32; 3]; 2]); 5] = [
     ("same", [[0, 1, 2], [0, 2, 3]]),
     ("rotated", [[1, 2, 0], [2, 3, 0]]),
@@ -57,7 +57,7 @@ fn coincident_faces_keep_reflections_in_metal() {
 }
 
 #[test]
-fn lights_of_two_sheets_have_no_speckle() {
+fn two_sheet_lights_have_no_speckle() {
     // A tilted light, seen from both sides, from near and far.
     let [a, x, y] = [v(0.56, 1.58, 1.3), v(0.8, -0.6, 0.0), v(-0.48, -0.64, 0.6)];
     let positions = [a, a + x, a + x + y, a + y].map(DVec3::as_vec3).to_vec();

@@ -48,7 +48,7 @@ pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, t
     (hits, tried)
 }
 
-/// Random positions up to 10⁶ from the origin. The first ones place the shape's surface near the origin.
+/// Random positions up to 10⁶ from the origin. The first few place the shape's surface near the origin.
 pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
     let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
     for far in [1.0, 1e2, 1e4, 1e6] {
@@ -164,16 +164,15 @@ fn no_ray_escapes_through_room_edges() {
     }
 }
 
-/// A cylinder centered at `middle` with its half axis across or along `middle`, so that its surface passes
-/// through the origin.
+/// A cylinder centered at `middle`, with its surface through the origin. Its axis is perpendicular to
+/// `middle` if possible, and otherwise parallel.
 fn bar(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
     let flat = towards - middle * (middle.dot(towards) / middle.length_squared());
     let half = if flat.length() > 1e-6 * towards.length() { flat } else { middle };
     Shape::Cylinder { a: middle - half, b: middle + half, radius, caps: true }
 }
 
-/// A cone whose side passes through the origin. The tip is up along a tangent, and the base is on the other
-/// side of the origin.
+/// A cone whose side passes through the origin. Along the side, the origin is between the tip and the base.
 fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
     let down = normal.cross(towards).normalize();
     let tip = down * -radius;
@@ -184,7 +183,7 @@ fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
 
 #[test]
 fn shapes_through_the_origin_do_not_self_hit() {
-    // The hit's coordinates are nearly 0 although the shape is large, so rounding errors of the summands
+    // The hit's coordinates are nearly 0 although the shape is large, so rounding errors in the summands
     // dominate.
     let mut random = Random(3);
     for _ in 0..200 {
@@ -329,7 +328,7 @@ fn of_everything(k: i32) -> Build {
 }
 
 #[test]
-fn power_of_two_scale_keeps_bits() {
+fn power_of_two_scale_keeps_pixels_identical() {
     // Scaling by powers of two does not round, and no result may depend on the unit of length.
     let picture = of_everything(0).picture(4, 9);
     for k in [-30, -7, 1, 12, 30] {
@@ -340,7 +339,7 @@ fn power_of_two_scale_keeps_bits() {
 }
 
 #[test]
-fn splitting_the_work_keeps_bits() {
+fn splitting_the_work_keeps_pixels_identical() {
     // A sample depends only on the scene, pixel, sample index and seed.
     for integrator in Integrator::ALL {
         assert_no_split(&of_everything(0).with(|scene| scene.render.integrator = *integrator));

@@ -42,7 +42,7 @@ fn distance(shape: &Shape, p: DVec3) -> f64 {
     }
 }
 
-/// Upper bound on the distance of the shape's points from the origin.
+/// Upper bound on the distance from the origin to any point of the shape.
 fn reach(shape: &Shape) -> f64 {
     match *shape {
         Shape::Disk { center, radius, .. } => center.length() + radius,
@@ -104,7 +104,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let error = f64::from(surface.error.length());
     assert!(off.abs() <= error, "distance {off} exceeds error bound {error}: {shape:?} {ray:?}");
     assert!((surface.normal.length() - 1.0).abs() < 1e-6);
-    // The normal points outward. Skip the check where the shape is too thin for the error.
+    // The normal points outward. Skip the check where the shape is too thin relative to the error.
     let out = surface.point.as_dvec3() + surface.normal.as_dvec3() * (4.0 * error);
     let tells = error < 0.05 * size(shape);
     assert!(!tells || distance(shape, out) > 0.0, "{shape:?} {ray:?} {surface:?}");
@@ -185,7 +185,7 @@ fn torus_hits_match_distance_function() {
 
 #[test]
 fn ray_from_torus_finds_next_intersection() {
-    // Rays leave to the outside, including through the hole, and into the tube.
+    // Some rays start outward, including through the hole, and others start into the tube.
     let mut random = Random(29);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {

@@ -69,7 +69,7 @@ pub fn scene() -> Build {
     Build { scene, parts: WorldInputs::default(), view: View::Beauty, texels: Vec::new(), sky: None }
 }
 
-/// A field of view so narrow that a pixel is a point.
+/// A field of view so narrow that a pixel is effectively a point.
 const NARROW: f64 = 1e-6;
 
 fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
@@ -112,7 +112,8 @@ impl Build {
         self.with(|scene| scene.render.max_depth = max_depth)
     }
 
-    /// Enables photons: `count` per pass, with `radius` as the gather radius of the first pass.
+    /// Enables photon mapping with `count` photons per pass and a gather radius of `radius` in the first
+    /// pass.
     pub fn photons(self, count: u64, radius: f64) -> Self {
         self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
     }
@@ -176,7 +177,7 @@ impl Build {
         })
     }
 
-    /// Adds a flat-shaded instance of a mesh with its own file materials.
+    /// Adds a flat-shaded instance of a mesh with the materials from its file.
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
@@ -253,7 +254,7 @@ impl Build {
         RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
     }
 
-    /// The whole image: the mean of the samples of each pixel.
+    /// The whole image. Each pixel is the mean of its samples.
     pub fn picture(&self, samples: u32, seed: u32) -> Vec<DVec3> {
         let (width, height) = (self.scene.render.width, self.scene.render.height);
         tile(&self.world(), &self.settings(seed), Rect { x: 0, y: 0, width, height }, samples)
@@ -383,7 +384,7 @@ pub fn frosted(ior: f32, roughness: f32) -> Material {
     plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness })
 }
 
-/// A principled material with a clear coat, and with the given transmission.
+/// A principled material with a clear coat and the specified transmission.
 pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
     let mut material = principled(color, 0.0, roughness);
     if let MaterialKind::Principled { transmission: own, .. } = &mut material.kind {

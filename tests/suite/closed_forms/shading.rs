@@ -134,7 +134,8 @@ fn texture_on_a_quad_is_upright_along_v() {
     let place = (0.52, 0.85);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Mirror, Vec2::new(3.0, 2.0), place), BLUE);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Clamp, Vec2::new(3.0, 2.0), place), GREEN);
-    // Bilinear filtering returns the mean of all texels in the middle, and a single texel at its center.
+    // Bilinear filtering returns the mean of all texels in the middle of the texture, and only one texel at
+    // that texel's center.
     let smooth = |place| at(TextureFilter::Bilinear, Wrap::Clamp, Vec2::ONE, place);
     let mean = (RED + GREEN + BLUE + GRAY) / 4.0;
     assert!((smooth((0.5, 0.5)) - mean).length() < 1e-5);
@@ -180,8 +181,9 @@ fn sphere_uv_is_longitude_and_latitude() {
 }
 
 /// Checks that a coarse smooth ball is lit like the sphere it approximates, up to 4° from the terminator,
-/// where facets are turned away by up to half of their 11.25°. No facet may be black or deviate from the
-/// cosine by more than a third, which allows for vertex normals that average adjacent facets.
+/// where facets are turned away from the light by up to half of their 11.25°. No facet may be black or
+/// deviate from the cosine by more than a third, which allows for vertex normals that average adjacent
+/// facets.
 #[test]
 fn facets_are_invisible_at_the_terminator() {
     for shadows in [Shadows::Hard, Shadows::Off] {

@@ -213,7 +213,7 @@ fn courtyard() -> Build {
 }
 
 /// Checks that two scenes have the same mean in each block of 16 × 16 pixels and in the whole image. Tests
-/// the z-score of the difference, which is computed from the spread over seeds.
+/// the difference's z-score, which is computed from the spread over seeds.
 fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]: [u32; 2], seeds: u32) {
     let (width, height) = (48_usize, 32_usize);
     let blocks = |build: &Build, samples| -> Vec<Vec<f64>> {

@@ -118,7 +118,7 @@ fn pane_reflectance_is_exact() {
     assert_mean("path", &path(seen).depth(1).values(256, 64), exact);
 }
 
-/// A receiver on the axis of a disk light with radius 1 at height 2, with the objects added by `between`.
+/// A receiver on the axis of a disk light with radius 1 at height 2. `between` adds objects between the two.
 fn under_lamp(between: impl Fn(Build) -> Build) -> Build {
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
     between(receiver(DVec3::ZERO, 0.7)).shape(disk, emitter(1.0))
@@ -130,7 +130,7 @@ fn level(build: Build, y: f64, material: Material) -> Build {
 
 #[test]
 fn light_passes_through_panes() {
-    // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ, where R' is the pane's reflectance, up to tan θ = ½.
+    // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ from θ = 0 to tan θ = ½, where R' is the pane's reflectance.
     let irradiance = |count: i32, tint: f64| {
         let (steps, end) = (2000, 0.5_f64.atan());
         let of = |k: i32| {
@@ -211,7 +211,7 @@ fn shadows_multiply_transmittances() {
             assert_eq!(value(&[0.3, 1.0]), 0.0);
         }
     }
-    // A single ray to the light's center is also attenuated. Without shadows, nothing attenuates.
+    // A single ray to the light's center is also attenuated. Without shadows, light is not attenuated.
     let under = |shadows| {
         let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
         mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0

@@ -125,7 +125,7 @@ fn no_boundary_between_equal_iors() {
             .seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2))
             .depth(depth)
     };
-    // Passing three boxes with the same IOR takes two bounces. Boxes of air take none.
+    // Passing through three boxes with the same IOR takes two bounces. Boxes of air take none.
     assert_within("boxes with equal IORs", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
     assert_within("path", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
     for air in [lamp_under(1.0, 0), by_paths(lamp_under(1.0, 0), 0)] {
@@ -208,8 +208,8 @@ fn drink_in_a_glass_matches_layers() {
         let what = format!("full, round {round}");
         let seen = turned.seen(full, v(0.05, 4.0, 0.02), v(0.05, 0.0, 0.02));
         assert_within(&what, &seen, 512, layers(&[n, 1.5], 0.0).1, 2e-3);
-        // A hollow glass with air inside, half filled, with the drink touching the wall. Viewed from the side
-        // through the axis.
+        // A hollow glass with air inside, half filled with a drink that touches the wall. The camera looks
+        // through the axis from the side.
         let half = scene()
             .shape(bar(0.0, 2.0, 1.0), glass(1.5))
             .shape(bar(0.2, 2.0, 0.9), glass(1.0))
@@ -344,7 +344,7 @@ fn tints_apply_within_their_glass() {
 
 #[test]
 fn later_glass_determines_overlaps() {
-    // One solid is at y = 0 to 2, the other at −1 to 1. Between 0 and 1, the later solid counts.
+    // One solid extends from y = 0 to 2, the other from −1 to 1. Between 0 and 1, the later solid counts.
     let level = Turned::by(DVec3::ZERO);
     let tinted = |ior: f32, tint: f64| scenes::tinted(ior, DVec3::splat(tint));
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
@@ -457,7 +457,7 @@ fn ambient_light_is_uniform_in_and_under_glass() {
     }
 }
 
-/// A box mesh with exactly the given corners.
+/// A box mesh whose corners are exactly as specified.
 fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     let mut mesh = boxes(&[(DVec3::ZERO, 2.0, 0)]);
     for p in &mut mesh.positions {

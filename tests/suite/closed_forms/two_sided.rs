@@ -75,7 +75,7 @@ fn two_sided_mesh_lights_are_symmetric() {
 
 #[test]
 fn enclosing_light_fills_hemisphere() {
-    // Radiance 1 over the whole hemisphere: E = π.
+    // The radiance is 1 over the whole hemisphere, so E = π.
     let at = v(2.0, 0.0, 0.0);
     let around = |shape: Shape| receiver(at, 0.7).shape(shape, both());
     for shape in [

@@ -1,4 +1,4 @@
-//! Views of the acceleration structures and their cost.
+//! Views that show the acceleration structures and their cost.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
@@ -31,7 +31,8 @@ fn box_edges_are_drawn_at_exact_positions() {
     // center.
     let root = DVec3::new(1.0, 0.85, 0.1);
     let share = |x, y| (at(&drawn, x, y) - at(&plain, x, y)).dot(root) / (root - at(&plain, x, y)).dot(root);
-    // Inside the box, a line covers half its width of 1¼ pixels, which is 0.625 of the last pixel.
+    // Lines are 1¼ pixels wide, and half of this width is inside the box, so a line covers 0.625 of the last
+    // pixel.
     for (x, y) in [(47, 20), (16, 40), (30, 16), (33, 47)] {
         assert!((share(x, y) - 0.625).abs() < 0.12, "{x}, {y}: {}", share(x, y));
     }
@@ -91,8 +92,8 @@ fn cost_counts_boxes_and_shapes() {
     let floor = glimt::scene::description::Shape::Plane { point: v(0.0, -2.0, 0.0), normal: DVec3::Y };
     let cost = framed(ball().shape(floor, matte(0.5)), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (4.0, 1.0));
-    // A lit point traces one shadow ray. The ray starts inside the box, so its cost does not depend on the
-    // light.
+    // A lit point traces one shadow ray. This ray starts inside the box, so its cost does not depend on the
+    // light's position.
     let lit =
         |shadows| framed(ball().point_light(DVec3::ZERO, 1.0, Falloff::None).shadows(shadows, 1), View::Cost);
     assert_eq!(at(&lit(Shadows::Hard), 32, 32).x, 6.0);

@@ -1,4 +1,4 @@
-//! Runs the commands on every page in a temporary folder, at small image sizes.
+//! Runs every page's commands in a temporary folder, with small images.
 
 use std::collections::HashSet;
 use std::os::unix::fs::symlink;
@@ -52,7 +52,7 @@ fn page_commands_run() {
 }
 
 /// Sets up a folder for running commands, with the bundled scenes, the program, and the files that the page
-/// shows. The first line of such a file is its name.
+/// shows. The first line of each such file is a comment with its name.
 fn furnish(folder: &Path, page: &Page) {
     for name in ["scenes", "assets"] {
         symlink(root().join(name), folder.join(name)).expect("linked");

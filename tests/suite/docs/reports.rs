@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{codes, page};
 use crate::test_dir::TestDir;
 
-/// A directory with a scene. Its glass ball causes photons to be emitted.
+/// A directory with a scene whose glass ball causes photons to be emitted.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     let scene =
@@ -18,7 +18,7 @@ fn dir() -> TestDir {
     dir
 }
 
-/// Dotted paths of all values, and separately of all tables.
+/// The dotted paths of all values, and the dotted paths of all tables.
 fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BTreeSet<String>) {
     let inner: Vec<(String, &Value)> = match value {
         Value::Object(map) => {

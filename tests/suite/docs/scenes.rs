@@ -1,5 +1,5 @@
-//! Checks the scenes on the pages. Whole scenes are unchanged, and fragments are completed with the elements
-//! they refer to.
+//! Checks the scenes on the pages. Whole scenes are checked unchanged. Fragments are first completed with the
+//! elements that they refer to.
 
 use std::collections::BTreeSet;
 

@@ -79,7 +79,7 @@ fn example(head: &str, key: &str) -> &'static str {
 }
 
 impl DefinedTable {
-    /// A scene with this table: all required keys except one, and an extra line.
+    /// A scene with this table, including an extra line and all required keys except one.
     fn scene(&self, without: &str, line: &str) -> String {
         let required = self
             .keys
@@ -112,7 +112,7 @@ impl DefinedTable {
         errors(&self.said(key, value)).is_empty()
     }
 
-    /// Parses the table with a line instead of a key. Returns the errors and the scene.
+    /// Parses the table with a line in place of a key. Returns the errors and the scene.
     fn with(&self, key: &DefinedKey, line: &str) -> (String, Option<Scene>) {
         let outcome = parse(self.scene(&key.name, line).into(), &root().join("scenes/page.toml"));
         (errors(&outcome.diagnostics).join("\n"), outcome.scene.map(placeless))
@@ -268,7 +268,7 @@ fn defined_defaults_match_the_program() {
     assert!(keys().filter(|(_, key)| key.literal().is_some()).count() > 60);
 }
 
-/// Formats a number as a value of the given kind.
+/// Formats a number as a value of the specified kind.
 fn value(kind: ValueKind, number: f64) -> String {
     match kind {
         ValueKind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),

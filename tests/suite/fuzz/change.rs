@@ -179,7 +179,7 @@ fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     }
 }
 
-/// Writes a number with 1, 2, 4 or 8 bytes in either byte order.
+/// Writes a 1-, 2-, 4- or 8-byte number in either byte order.
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
@@ -195,7 +195,7 @@ fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.truncate(random.below(bytes.len()));
 }
 
-/// Splits bytes at those that satisfy `is_gap`. Returns at least one piece.
+/// Splits a byte string at each byte that satisfies `is_gap`. Returns at least one piece.
 fn pieces(bytes: &[u8], is_gap: fn(u8) -> bool) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut start = 0;

@@ -7,9 +7,10 @@
 //! GLIMT_FUZZ_CASES=20000,5000,500 cargo test --profile quick --test suite fuzz -- --nocapture
 //! ```
 //!
-//! The numbers are: scenes and assets that the library checks in worker processes, and files of each kind
-//! that the program checks. `GLIMT_FUZZ_SEED` (an integer, 1 by default) selects different files; a seed
-//! always generates the same files. Files that fail are kept in a folder, which the failure message names.
+//! The first two numbers count the scenes and assets that the library checks in worker processes. The third
+//! counts the files of each kind that the program checks. `GLIMT_FUZZ_SEED` (an integer, 1 by default)
+//! selects different files; a seed always generates the same files. Files that fail are kept in a folder,
+//! which the failure message names.
 
 mod change;
 mod program;
@@ -70,7 +71,8 @@ impl Corpus {
     }
 }
 
-/// Number of scenes, assets, and files of each kind that the program checks.
+/// Number of scenes and of assets for the library to check, and number of files of each kind for the program
+/// to check.
 fn counts() -> [u64; 3] {
     let asked = std::env::var("GLIMT_FUZZ_CASES").unwrap_or_else(|_| "250,250,15".to_owned());
     let numbers: Vec<u64> =
@@ -82,7 +84,7 @@ fn seed() -> u64 {
     std::env::var("GLIMT_FUZZ_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
 }
 
-/// Writes the files of failed cases to a folder and panics with its path.
+/// Writes the files from failed cases to a folder and panics with its path.
 fn settle(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;

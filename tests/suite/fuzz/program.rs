@@ -7,7 +7,7 @@ use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
 use super::{Case, Corpus, FuzzInput};
 use crate::test_dir::PROGRAM;
 
-/// The failed cases of a kind, each with a reason.
+/// The failed cases for a kind of file, each with the reason.
 pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let dir = CaseDir::new();
     let material = Corpus::new();

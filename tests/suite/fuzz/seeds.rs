@@ -21,7 +21,7 @@ pub(super) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Files with any of the given extensions, sorted by name.
+/// Files that have one of the extensions, sorted by name.
 fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
     let entries = fs::read_dir(root().join(folder)).expect("a folder");
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
@@ -54,7 +54,7 @@ pub(super) fn assets() -> Vec<Seed> {
         let ending = path.extension().expect("an ending").to_string_lossy();
         Seed { file: format!("case.{ending}"), bytes: fs::read(path).expect("an asset") }
     };
-    // Pick the small files more often.
+    // Pick small files more often.
     [made.clone(), made, found.iter().map(seed).collect()].concat()
 }
 

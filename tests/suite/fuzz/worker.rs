@@ -22,11 +22,11 @@ pub(super) const AT_MOST: Duration = Duration::from_secs(2);
 /// Time limit for generating a case, which only a stalled machine exceeds.
 const TO_BEGIN: Duration = Duration::from_secs(120);
 
-/// Maximum number of runs of a slow case, because the machine may be busy.
+/// Maximum number of attempts at a slow case. A case may be slow only because the machine is busy.
 pub(super) const TRIES: usize = 3;
 
-/// Limit on resident memory, including the worker's own memory. The worst case for a small file is an image
-/// whose pixels are allocated before the file turns out to be too short.
+/// Limit on resident memory, including the worker's own memory. The worst small file is an image whose pixels
+/// are allocated before the file turns out to be too short.
 const MEMORY_BYTES: u64 = 768 << 20;
 
 /// Limit on virtual memory.
@@ -38,7 +38,7 @@ const WORKERS: u64 = 2;
 /// Environment variable that turns a test process into a worker and specifies its cases.
 const ORDER: &str = "GLIMT_FUZZ_WORKER";
 
-/// The failed cases of a kind, each with a reason.
+/// The failed cases for a kind of file, each with the reason.
 pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let failures = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
@@ -69,7 +69,7 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
 /// Message for a case that takes too long.
 const SLOW: &str = "took more than 2 s";
 
-/// Starts a worker for the cases from `first` up to number `end`. Returns the first failure as an error.
+/// Runs the cases from `first` up to number `end` in a worker process. Returns the first failure as an error.
 fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
@@ -205,7 +205,7 @@ fn peak_memory_bytes() -> u64 {
     peak.and_then(|kibibytes| kibibytes.trim().parse::<u64>().ok()).map_or(0, |kibibytes| kibibytes * 1024)
 }
 
-/// A character that a terminal would interpret, if any.
+/// The first character that a terminal would interpret, if there is one.
 pub(super) fn harmful(text: &str) -> Option<char> {
     text.chars().find(|c| (c.is_control() && *c != '\n') || ('\u{202a}'..='\u{202e}').contains(c))
 }
@@ -234,7 +234,7 @@ impl CaseDir {
         let folder = self.0.path().join("scenes");
         let scene = folder.join("case.toml");
         if ["case.glb", "case.gltf"].contains(&made.file.as_str()) {
-            // Check a model directly, which reads more of it than a scene does.
+            // Check a model directly, because this reads more of it than loading a scene does.
             std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
             return folder.join(&made.file);
         }

@@ -33,7 +33,7 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
     folder.write("scene.toml", SCENE);
     terminal.wait("the original image", |_| is(own));
     terminal.wait_for("done");
-    // Keys pressed before the screen shows the change would move the previous camera.
+    // Wait for the change on the screen. Keys pressed earlier would move the previous camera.
     terminal.settled(|screen| screen.contents());
     kept
 }

@@ -42,7 +42,7 @@ fn terminal(folder: &Folder) -> Terminal {
     terminal
 }
 
-/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage `name`.
+/// `d`one, `r`eused or `s`kipped for each stage in order, and the message from stage `name`.
 fn stages(folder: &Folder, name: &str) -> (String, String) {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     let stages = report["stages"].as_array().expect("stages");
@@ -104,7 +104,7 @@ fn edits_rerun_only_dependent_stages() {
     assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 cached".to_owned()));
 }
 
-/// Waits until all of the given stage lines appear.
+/// Waits until all expected stage lines appear.
 #[track_caller]
 fn wait_for_stages(terminal: &Terminal, lines: &[(&str, &str, &str)]) {
     for (sign, name, status) in lines {

@@ -63,7 +63,7 @@ fn quit_while_rendering_keeps_the_last_image() {
 }
 
 #[test]
-fn quit_after_save_writes_or_reports() {
+fn quit_after_save_writes_or_explains_why_not() {
     let folder = Folder::new();
     let slow = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &slow);

@@ -1,5 +1,5 @@
-//! Window title, progress, notifications, links and the clipboard: which terminals receive them, and that
-//! they are reset.
+//! Window title, progress, notifications, links and the clipboard. Only terminals that support a feature
+//! receive its sequences, and all lasting changes are undone.
 
 use glimt::tui::messages;
 use nix::sys::signal::Signal;

@@ -20,7 +20,7 @@ fn beside(screen: &vt100::Screen, column: usize) -> String {
     rows.collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Number of cells of each color, from the given column on.
+/// Number of cells of each color, starting at the specified column.
 fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     let (_, columns) = screen.size();
     let mut count = [0; 3];

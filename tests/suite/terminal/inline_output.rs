@@ -1,4 +1,4 @@
-//! Commands without a full-screen interface: images and plots within their terminal output.
+//! Images and plots in the terminal output of commands that have no full-screen interface.
 
 use nix::sys::signal::Signal;
 

@@ -1,4 +1,5 @@
-//! Bursts, pasted text and terminal replies. glimt loses no key and does not mistake other input for keys.
+//! Bursts of keys, pasted text and terminal replies. glimt loses no key and does not mistake other input for
+//! keys.
 
 use std::time::Duration;
 

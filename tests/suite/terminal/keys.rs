@@ -13,7 +13,7 @@ const UP: &str = "\x1b[A";
 const DOWN: &str = "\x1b[B";
 
 #[test]
-fn settings_change_and_reset() {
+fn keys_change_and_reset_settings() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -102,7 +102,7 @@ fn views_are_shown_and_saved_on_request() {
     terminal.press("vv");
     terminal.wait_for("v beauty");
     terminal.wait_for("done");
-    // Looking at the scene's own image does not replace the written one.
+    // Switching back to the scene's own image does not replace the written image.
     terminal.wait_for_message(&messages::other_image_with("scene.png", "view normal"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
     terminal.press("w");

@@ -29,7 +29,7 @@ fn terminal(folder: &Folder, options: &[&str]) -> Terminal {
     folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[])
 }
 
-/// Beginning of the message about an ignored checkpoint.
+/// Start of the message about an ignored checkpoint.
 fn ignored() -> String {
     messages::checkpoint_ignored("scene.png.checkpoint", "")
 }

@@ -6,7 +6,7 @@ use glimt::tui::messages;
 
 use super::pty::Folder;
 
-/// An OBJ file of a red wall that faces the camera, with the given height and a width of one unit.
+/// An OBJ file of a red wall that faces the camera, one unit wide and `height` units high.
 fn wall(height: f32) -> String {
     format!("mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 {height} 0\nv 0 {height} 0\nf 1 2 3 4\n")
 }

@@ -155,7 +155,7 @@ fn echo_is_restored_after_killed_editor() {
     assert_eq!(terminal.end(), 0);
 }
 
-/// The program with a shell script as its editor, which controls the terminal.
+/// The program after it has opened a shell script as its editor, which now controls the terminal.
 fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> Terminal {
     folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");

@@ -13,7 +13,7 @@ use crate::test_dir::assert_mentions;
 /// An image with one red texel.
 const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
 
-/// The scene with the given file as the board's texture.
+/// The scene with a file as the board's texture.
 fn textured(file: &str) -> String {
     let texture = format!("[textures.paint]\nfile = \"{file}\"\n[materials]");
     SCENE.replace(RED, "{ texture = \"paint\" }").replace("[materials]", &texture)
@@ -125,7 +125,7 @@ fn link_changed_while_rendering_is_detected() {
 }
 
 #[test]
-fn own_render_keeps_an_image_written_on_request() {
+fn finishing_render_keeps_image_written_with_w() {
     let folder = Folder::new();
     let text = SCENE.replace("samples = 4", "samples = 3000");
     folder.write("scene.toml", &text);
@@ -153,7 +153,7 @@ fn own_render_keeps_an_image_written_on_request() {
 }
 
 #[test]
-fn save_replaces_an_image_written_on_request() {
+fn scene_save_replaces_image_written_with_w() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);

@@ -126,12 +126,12 @@ impl Folder {
         self.thin_line_in(answers, tmux)
     }
 
-    /// Like [`Self::thin_line`], with the given environment variables.
+    /// Like [`Self::thin_line`], with additional environment variables.
     pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
     }
 
-    /// The program rendering the scene in a terminal with the given size.
+    /// The program rendering the scene in a terminal of the specified size.
     pub fn terminal_of(&self, columns: u16, rows: u16) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], &[], self.0.path(), size(columns, rows), None)
     }

@@ -17,7 +17,7 @@ const DELAY: Duration = Duration::from_millis(75);
 const QUESTIONS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// What replies to the program's queries.
+/// The component that replies to the program's queries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
     /// The terminal at the far end.

@@ -92,7 +92,7 @@ impl<'a> RandomSession<'a> {
         }
     }
 
-    /// The image rendered with `--once` from the given scene text.
+    /// The image rendered with `--once` from the text of a scene.
     fn once(&self, known: &mut HashMap<String, Vec<u8>>, text: &str, options: &[&str]) -> Vec<u8> {
         let key = format!("{text}\0{options:?}");
         let image = known.entry(key).or_insert_with(|| {
@@ -152,7 +152,7 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
     let image = path.exists().then(|| without_settings(&path));
     let now = run.saved.last().expect("a scene").clone();
     let newest = run.once(known, &now, &[]);
-    // The last save may have been too late to be rendered.
+    // The last save may have been too late for a render.
     let is_current = image.as_ref() == Some(&newest);
     if !run.has_written {
         let earlier = run.saved.clone();
@@ -196,7 +196,7 @@ fn random_keys_never_write_wrong_image() {
 
 #[test]
 #[ignore = "takes half an hour"]
-fn sequences_over_bundled_scenes() {
+fn random_keys_are_safe_in_bundled_scenes() {
     let mut known = HashMap::new();
     let options = ["--width", "48", "--height", "36", "--samples", "16"];
     for seed in 0..LONG {

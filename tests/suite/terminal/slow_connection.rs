@@ -127,8 +127,8 @@ fn connection_is_measured_and_shown() {
         let folder = Folder::new();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
-        // If the machine stalls for a second, the first reply is too late to be measured. Then request
-        // another preview.
+        // If the machine stalls for a second, the first reply is too late to be measured, so request another
+        // preview.
         let mut seen = terminal.settled(measured);
         for _ in 0..20 {
             if seen.is_some() {
@@ -168,8 +168,8 @@ fn stalled_terminal_does_not_block_quitting() {
     });
 }
 
-/// Checks the redraw. A terminal truncates text that does not fit, and the program may see only the last
-/// size.
+/// Checks that the window is redrawn. A terminal truncates text that does not fit, and the program may see
+/// only the last size.
 #[test]
 fn quick_shrink_and_grow_redraws_the_window() {
     let folder = Folder::new();

@@ -127,7 +127,7 @@ impl Figures {
     }
 }
 
-/// Saves a last scene, and waits until its image equals that of `--once`.
+/// Saves a final scene, and waits until its image equals that of `--once`.
 fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &[&str]) {
     folder.write("scene.toml", text);
     let once = folder.once(options);
@@ -146,7 +146,7 @@ fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &
     }
 }
 
-/// Keys that change at most the preview or the screen. Excludes keys that quit, start an editor or change the
+/// Keys that change only the preview or the screen. Excludes keys that quit, start an editor or change the
 /// file.
 const KEYS: [&str; 34] = [
     "s", "d", "p", "i", "v", "V", "\t", "x", "z", "h", "j", "k", "l", "+", "-", "<", ">", "[", "]", "f",

@@ -1,5 +1,5 @@
-//! Saves that do not change the image, such as typos, corrections and comments, add no history entry and do
-//! not count for comparisons.
+//! Saves that do not change the image, such as typos, corrections and comments, add no history entry and are
+//! ignored by comparisons.
 
 use glimt::tui::messages;
 
@@ -21,7 +21,7 @@ fn typo(folder: &Folder, terminal: &Terminal, text: &str, while_broken: &str) {
 }
 
 #[test]
-fn typo_is_not_an_edit_for_comparison() {
+fn comparison_ignores_a_typo() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);

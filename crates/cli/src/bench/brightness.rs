@@ -1,5 +1,5 @@
-//! Detects images that are brighter or darker than the references on average. A bias shared by all pixels is small in relMSE, but
-//! large compared with the noise of the mean.
+//! Detects images that are brighter or darker than the references on average. A bias shared by all pixels is
+//! small in relMSE, but large compared with the noise of the mean.
 
 use serde::{Deserialize, Serialize};
 

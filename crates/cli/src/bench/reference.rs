@@ -108,8 +108,8 @@ impl ReferenceRenderer<'_> {
         cache_key(BUILD, self.asked, keys)
     }
 
-    /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can be
-    /// read.
+    /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can
+    /// be read.
     pub(super) fn keys(&self, session: &mut Session) -> Result<ReferenceKeys, BenchError> {
         let [one, two] = SEEDS.map(|seed| {
             self.render(session, seed, ReferenceQuality { samples: 1, seconds: None }).map(|it| it.key)

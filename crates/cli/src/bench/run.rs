@@ -28,7 +28,8 @@ const LONG_SIDE: u32 = 96;
 /// Runs a benchmark. Checks all scenes before measuring the first one.
 ///
 /// # Errors
-/// A scene or the arguments are invalid, or the benchmark failed or was cancelled. The error contains the results of completed scenes.
+/// A scene or the arguments are invalid, or the benchmark failed or was cancelled. The error contains the
+/// results of completed scenes.
 pub fn run(
     order: &BenchRequest,
     token: &CancelToken,

@@ -62,7 +62,7 @@ fn read_look_at(table: &TableReader<'_>) -> Option<Camera> {
     let Some(direction) = view.try_normalize() else {
         let span = table.optional("look_at").span()?;
         let issue = Issue::error(span, "the camera has no direction")
-            .label("the same point as `position`")
+            .label("this is the same point as `position`")
             .help("`look_at` is the point at the center of the image");
         table.context.report(issue);
         return None;

@@ -21,7 +21,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     table.finish();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
-            .label("a scale factor for `file`");
+            .label("this scales the map in `file`");
         table.context.report(issue.help("remove it to use the map unchanged"));
     }
     if let Some(span) = rotate.span().filter(|_| !file.is_present()) {

@@ -40,8 +40,8 @@ use self::wire::{Client, Received};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// Runs the server until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a failure,
-/// as the protocol requires.
+/// Runs the server until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a
+/// failure, as the protocol requires.
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
         Ok(exit) => exit,

@@ -113,7 +113,8 @@ fn not_stl(found: &[u8]) -> String {
 }
 
 fn missing_facets(claimed: u64, found: u64) -> String {
-    format!("the header claims {claimed} facets, but the file ends after {found}")
+    let facets = if claimed == 1 { "facet" } else { "facets" };
+    format!("the header claims {claimed} {facets}, but the file ends after {found}")
 }
 
 /// Warning about bytes after the last facet.

@@ -39,7 +39,7 @@ const KINDS: [(&str, ShapeReader); 10] = [
     ("mesh", mesh::read),
 ];
 
-/// Whether `[[name]]` is a shape.
+/// Whether `[[name]]` tables define shapes.
 pub(super) fn is_shape_table(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
