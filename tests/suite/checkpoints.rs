@@ -296,7 +296,7 @@ fn checkpoints_are_used_only_with_resume() {
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
-    // It also survives a render of another image that would save fewer samples.
+    // It also survives a shorter render with another seed.
     let child = begin(&dir, &format!("{line} --seed 5"));
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn default_arguments_override_no_settings() {
+    fn default_arguments_change_no_settings() {
         let order = lowered("a.toml").expect("valid arguments");
         let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
         assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });

@@ -148,7 +148,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
         };
         let all = value(free);
         assert!(all > 0.0, "{name}");
-        // Place the screen in front of the cube's center, and in front of its lower face's center.
+        // A screen in front of the cube's center blocks all of its light. One lower down blocks none.
         assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
         let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
         assert_eq!(beside, all, "{name}");

@@ -36,7 +36,7 @@ fn tab_shows_only_the_preview() {
     assert!(last.contains("✓ done") && last.ends_with("tab back"), "{last}");
     terminal.press("e");
     terminal
-        .wait("a message in the only line", |screen| last_line(screen).contains(messages::NO_DIAGNOSTICS));
+        .wait("a message on the only line", |screen| last_line(screen).contains(messages::NO_DIAGNOSTICS));
     terminal.press(TAB);
     terminal.wait("the keys", |screen| last_line(screen).ends_with("? help"));
     assert_eq!(terminal.settled(|screen| Colors::of(screen).red), beside);

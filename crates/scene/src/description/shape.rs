@@ -208,7 +208,7 @@ impl MeshTransform {
 pub enum LoweredShape<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
-    /// A mesh, whose triangles are in a file.
+    /// A triangle mesh from a file.
     Mesh(&'a Mesh),
 }
 

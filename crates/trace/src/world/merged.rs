@@ -31,8 +31,8 @@ const MIN_FACETS: usize = 8;
 /// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
-/// Maximum size of a transformed mesh, relative to the scene's smallest object. Rounding of a larger mesh
-/// would move corners by more than 1/256 of the smallest object's size.
+/// Maximum size of a transformed mesh, relative to the scene's smallest object. Rounding
+/// would move the corners of a larger mesh by more than 1/256 of the smallest object's size.
 const MAX_RELATIVE_SIZE: f32 = (1 << 17) as f32;
 
 /// Identifies the object and primitive of a triangle in the merged tree.

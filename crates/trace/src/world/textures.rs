@@ -351,7 +351,7 @@ pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
 }
 
-/// How a mesh file material's opacity texture is used.
+/// Returns how a material from a mesh file uses its opacity texture.
 pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);

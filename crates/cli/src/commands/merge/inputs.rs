@@ -70,7 +70,7 @@ impl<'a> MergeInputs<'a> {
     }
 }
 
-/// Returns all possible paths of the parts' scenes, whether or not they exist: first relative to each part,
+/// Returns every path at which a part's scene may be, whether or not it exists: first relative to each part,
 /// then next to the output.
 pub(super) fn scene_paths(parts: &[PartFile], out: &Path) -> impl Iterator<Item = PathBuf> {
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());

@@ -86,7 +86,7 @@ pub enum ImageInfoError {
     },
     /// The file is not an image that can store settings.
     #[error(
-        "{}: not an image with settings (png, apng, gif, exr, hdr, jpg, ppm, webp), a part or a checkpoint",
+        "{}: not a part, a checkpoint, or an image that can store settings (png, apng, gif, exr, hdr, jpg, ppm, webp)",
         path.display()
     )]
     NotAnImage {

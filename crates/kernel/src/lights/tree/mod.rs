@@ -201,7 +201,7 @@ impl CumulativeImportance {
     }
 }
 
-/// To each number, adds the number that is `STEP` places before it.
+/// Adds the value `STEP` lanes earlier to each lane.
 #[inline(always)]
 fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
     let mut before = [0.0; PACKET_SIZE];
