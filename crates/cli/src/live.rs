@@ -6,17 +6,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::console::Console;
+use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
 use crate::pipeline::protocol::{CheckpointUpdate, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
-use crate::pipeline::watch::{ExternalChange, Watcher, missing_folder};
+use crate::pipeline::watch::{Contents, ExternalChange, FileRead, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
 use crate::system::threads::{describe_start_failure, spawn};
-use crate::tui::messages::WAITING_FOR_FILE;
+use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
 /// How long to wait at exit until an image is written. After that, glimt exits if it received a signal. If
@@ -99,7 +100,8 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     }
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.changed_externally(&contents);
-        closing_lines(&writes, ended, (has_ended, &lost, &shell_command_line()))
+        let is_older = ended.is_current && writes.has_unread_change(&contents);
+        closing_lines(&writes, ended, (has_ended, is_older, &lost, &shell_command_line()))
             .iter()
             .for_each(|line| console.print_message(line));
     }
@@ -115,12 +117,12 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
 
 /// Returns the lines to print after the terminal UI exits: unreported writes, the summary, the checkpoint and
 /// lost changes. The summary is printed only after `q`, and only if all writes were reported or if a write
-/// failed but earlier files exist. `lost` contains the outputs changed by other programs. `call` is this
-/// command line.
+/// failed but earlier files exist. `is_older` is true if the images are older than the scene. `lost` contains
+/// the outputs changed by other programs. `call` is this command line.
 fn closing_lines(
     writes: &SharedWriteLog,
     ended: &TuiOutcome,
-    (has_ended, lost, call): (bool, &[(PathBuf, ExternalChange)], &str),
+    (has_ended, is_older, lost, call): (bool, bool, &[(PathBuf, ExternalChange)], &str),
 ) -> Vec<String> {
     let mut lines = writes.unreported_lines(ended.is_write_unanswered, has_ended);
     let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
@@ -128,7 +130,8 @@ fn closing_lines(
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
     if has_summary {
         let lost = lost.iter().map(|(path, lost)| format!("; {} {} since", path.display(), lost.words()));
-        lines.push(ended.summary.clone() + &lost.collect::<String>());
+        let older = if is_older { OLDER_THAN_EDIT } else { "" };
+        lines.push(ended.summary.clone() + older + &lost.collect::<String>());
     }
     // After SIGHUP the terminal is gone.
     match writes.checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
@@ -180,6 +183,8 @@ struct WriteLog {
     checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is in its last stage.
     is_last_stage: bool,
+    /// The files that the last request before the UI exited has read.
+    files: Vec<FileRead>,
 }
 
 impl SharedWriteLog {
@@ -252,9 +257,18 @@ impl SharedWriteLog {
             | Event::Text { .. }
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
-            | Event::Picked { .. }
-            | Event::Files { .. } => {}
+            | Event::Picked { .. } => {}
+            Event::Files { files, .. } if !has_left => log.files.clone_from(files),
+            Event::Files { .. } => {}
         }
+    }
+
+    /// Whether a file has changed since it was read, for example because the user saved the scene and quit at
+    /// once.
+    fn has_unread_change(&self, contents: &Contents) -> bool {
+        let files = std::mem::take(&mut self.lock_log().files);
+        let now = |path| contents.read(path, &CancelToken::new());
+        files.iter().any(|file| now(&file.path) != Ok(file.content))
     }
 
     /// Returns the checkpoint written after the UI exited, or an error message.
@@ -331,6 +345,7 @@ mod tests {
             status: ExitStatus::QUIT,
             is_write_unanswered: true,
             summary: summary.to_owned(),
+            is_current: false,
             has_written,
             is_unwritten: false,
             not_kept: None,
@@ -346,7 +361,7 @@ mod tests {
         let message = "the latest image is not written".to_owned();
         writes.record_event(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the latest image is not written";
-        let said = |ended: TuiOutcome| closing_lines(&writes, &ended, (true, &[], "glimt a.toml"));
+        let said = |ended: TuiOutcome| closing_lines(&writes, &ended, (true, false, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
         writes.record_event(&written(2));
@@ -359,6 +374,7 @@ mod tests {
             status,
             is_write_unanswered: false,
             summary: "a.png not finished (10 %)".to_owned(),
+            is_current: false,
             has_written: false,
             is_unwritten: false,
             not_kept: Some("not kept: --shadows off".to_owned()),
@@ -366,7 +382,7 @@ mod tests {
         let writes = SharedWriteLog::default();
         let lost = [(PathBuf::from("a.png"), ExternalChange::Removed)];
         let said = |status, lost: &[(PathBuf, ExternalChange)]| {
-            closing_lines(&writes, &ended(status), (true, lost, "glimt a.toml --seed 1"))
+            closing_lines(&writes, &ended(status), (true, false, lost, "glimt a.toml --seed 1"))
         };
         let not_kept = "not kept: --shadows off";
         assert_eq!(said(ExitStatus::QUIT, &[]), ["a.png not finished (10 %)", not_kept]);
@@ -380,6 +396,38 @@ mod tests {
         let saved = "progress saved in a.png.checkpoint; run glimt again to resume";
         assert_eq!(said(ExitStatus::TERMINATED, &[]), [saved]);
         assert_eq!(said(ExitStatus::HANGUP, &[]), [""; 0]);
+    }
+
+    #[test]
+    fn unread_save_makes_the_image_older() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, "1").expect("written");
+        let (writes, contents) = (SharedWriteLog::default(), Contents::default());
+        let content = contents.read(&path, &CancelToken::new()).expect("never canceled");
+        let read = || Event::Files {
+            generation: 1,
+            files: vec![FileRead { path: path.clone(), content }],
+            read: 1,
+            since: std::time::Instant::now(),
+        };
+        writes.record_event(&read());
+        assert!(!writes.has_unread_change(&contents));
+        writes.record_event(&read());
+        std::fs::write(&path, "22").expect("written");
+        assert!(writes.has_unread_change(&contents));
+        let ended = TuiOutcome {
+            status: ExitStatus::QUIT,
+            is_write_unanswered: false,
+            summary: "wrote a.png".to_owned(),
+            is_current: true,
+            has_written: true,
+            is_unwritten: false,
+            not_kept: None,
+        };
+        let said = |is_older| closing_lines(&writes, &ended, (true, is_older, &[], "glimt a.toml"));
+        assert_eq!(said(false), ["wrote a.png"]);
+        assert_eq!(said(true), [format!("wrote a.png{OLDER_THAN_EDIT}")]);
     }
 
     #[test]

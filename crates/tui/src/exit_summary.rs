@@ -1,6 +1,7 @@
 //! The summary printed after the terminal is restored.
 
 use super::event::WriteFailure;
+use super::messages;
 use super::state::{KeyOverrides, OwnImage, State, WorkerActivity, WrittenFile};
 use crate::choice::Choice;
 use crate::pipeline::protocol::{OwnImageState, Report, SampleCounts};
@@ -14,6 +15,17 @@ pub(super) fn summary_text(state: &State) -> String {
         Some(failed) => describe_write_failure(state, failed),
         None if state.saving.written.is_empty() => reason_for_no_image(state),
         None => describe_files(&state.saving.written) + &events_since_writing(state),
+    }
+}
+
+/// Whether the summary mentions an image of the scene as it was last saved, and no later events.
+pub(super) fn is_image_current(state: &State) -> bool {
+    match &state.saving.write_failed {
+        Some(_) => false,
+        None if state.saving.written.is_empty() => {
+            !is_scene_broken(state) && state.saving.own.state == OwnImageState::Written
+        }
+        None => events_since_writing(state).is_empty(),
     }
 }
 
@@ -52,8 +64,6 @@ fn reason_for_no_image(state: &State) -> String {
     }
 }
 
-/// Appended to the list of written files if the scene was edited after they were written.
-const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 /// Name for the render that started after the files were written.
 const NEXT_RENDER: &str = "the next render";
 
@@ -69,7 +79,7 @@ fn events_since_writing(state: &State) -> String {
     if !state.request.is_own_image() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            OwnImage { .. } if state.saving.is_older_than_edit() => OLDER_THAN_EDIT.to_owned(),
+            OwnImage { .. } if state.saving.is_older_than_edit() => messages::OLDER_THAN_EDIT.to_owned(),
             OwnImage { .. } if is_by_hand => String::new(),
             OwnImage { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
@@ -162,7 +172,6 @@ mod tests {
     use super::*;
     use crate::Changed;
     use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
-    use crate::messages;
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
@@ -252,7 +261,7 @@ mod tests {
             ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
             ui.finish_render([30, 30, 200]);
             let after = summary_text(&ui.state);
-            assert_eq!(after, format!("{made}{OLDER_THAN_EDIT}"), "{key}");
+            assert_eq!(after, format!("{made}{}", messages::OLDER_THAN_EDIT), "{key}");
             assert_eq!(
                 unsaved_as_options(&ui.state).is_some_and(|it| it.contains("camera.position")),
                 key == 'l'
@@ -454,6 +463,6 @@ mod tests {
         own(&mut ui, OwnImageState::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
-        assert!(summary_text(&ui.state).ends_with(OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
+        assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

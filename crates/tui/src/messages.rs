@@ -258,6 +258,8 @@ pub const LAST_GOOD_RENDER: &str = "showing the last good render";
 pub const WITHOUT_PHOTONS: &str = "preview without photons";
 /// Follows the word "waiting" while the scene file may be incomplete.
 pub const INCOMPLETE_FILE: &str = "for a complete file";
+/// Appended to the summary if the scene was edited after the image was written.
+pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 /// Shown when the scene file does not exist.
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 

@@ -92,6 +92,8 @@ pub struct TuiOutcome {
     pub is_write_unanswered: bool,
     /// One line that lists the written files with their sample counts and render times.
     pub summary: String,
+    /// Whether the summary describes an image of the last saved scene, as far as the UI knows.
+    pub is_current: bool,
     /// Whether any image file was written.
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.

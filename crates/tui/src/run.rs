@@ -159,6 +159,7 @@ impl EventLoop {
             status,
             is_write_unanswered: saving.is_write_requested,
             summary: exit_summary::summary_text(&self.state),
+            is_current: exit_summary::is_image_current(&self.state),
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),
             not_kept: exit_summary::unsaved_as_options(&self.state),

@@ -24,7 +24,8 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use self::change_tracker::ChangeTracker;
-use self::content::{Content, Contents, FileRead};
+use self::content::Content;
+pub use self::content::{Contents, FileRead};
 use self::folders::{Hint, WatchedFolders};
 use self::outputs::UnconfirmedChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
