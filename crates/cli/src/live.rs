@@ -124,7 +124,7 @@ fn closing_lines(
     ended: &TuiOutcome,
     (has_ended, is_older, lost, call): (bool, bool, &[(PathBuf, ExternalChange)], &str),
 ) -> Vec<String> {
-    let mut lines = writes.unreported_lines(ended.is_write_unanswered, has_ended);
+    let mut lines = writes.unreported_lines(ended, has_ended);
     let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
     let has_quit = ended.status == ExitStatus::QUIT;
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
@@ -173,9 +173,10 @@ struct SharedWriteLog(Arc<Mutex<WriteLog>>);
 /// A log of written images.
 #[derive(Debug, Default)]
 struct WriteLog {
-    /// For each image since the last write command, its line and a flag that is set if it was written after
-    /// the UI exited.
-    lines: Vec<(bool, String)>,
+    /// Lines about the images since the last write command, each with the number of its event.
+    lines: Vec<(u64, String)>,
+    /// Number of events about written, failed, and refused images.
+    results: u64,
     /// Whether an image was written since the last write command.
     has_written: bool,
     has_left: bool,
@@ -215,15 +216,16 @@ impl SharedWriteLog {
     fn record_event(&self, event: &Event) {
         let mut log = self.lock_log();
         let has_left = log.has_left;
+        let number = log.results;
+        log.results += u64::from(event.is_write_result());
         match event {
             Event::Written { path, .. } => {
-                log.lines.push((has_left, format!("wrote {}", path.display())));
+                log.lines.push((number, format!("wrote {}", path.display())));
                 log.has_written = true;
             }
-            Event::WriteFailed { message, .. } => log.lines.push((has_left, format!("error: {message}"))),
+            Event::WriteFailed { message, .. } => log.lines.push((number, format!("error: {message}"))),
             Event::Refused { conflicts, .. } => {
-                let lines =
-                    conflicts.iter().map(|conflict| (has_left, format!("error: {}", conflict.message)));
+                let lines = conflicts.iter().map(|conflict| (number, format!("error: {}", conflict.message)));
                 log.lines.extend(lines);
             }
             Event::Stage { stage, .. } => {
@@ -276,11 +278,12 @@ impl SharedWriteLog {
         self.lock_log().checkpoint.clone()
     }
 
-    /// Returns lines about the images that the UI did not report: images written after it exited, or all
-    /// images since an unanswered write command.
-    fn unreported_lines(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
+    /// Returns lines about the images that the UI did not report: those of events that it did not handle, or
+    /// all images since an unanswered write command.
+    fn unreported_lines(&self, ended: &TuiOutcome, has_ended: bool) -> Vec<String> {
         let log = self.lock_log();
-        let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
+        let is_unanswered = ended.is_write_unanswered;
+        let unknown = log.lines.iter().filter(|(number, _)| is_unanswered || *number >= ended.write_results);
         let mut lines: Vec<String> = unknown.map(|(_, line)| line.clone()).collect();
         if !has_ended && (is_unanswered || log.is_last_stage) || is_unanswered && lines.is_empty() {
             lines.push(NOT_WRITTEN.to_owned());
@@ -346,6 +349,7 @@ mod tests {
             is_write_unanswered: true,
             summary: summary.to_owned(),
             is_current: false,
+            write_results: 0,
             has_written,
             is_unwritten: false,
             not_kept: None,
@@ -375,6 +379,7 @@ mod tests {
             is_write_unanswered: false,
             summary: "a.png not finished (10 %)".to_owned(),
             is_current: false,
+            write_results: 0,
             has_written: false,
             is_unwritten: false,
             not_kept: Some("not kept: --shadows off".to_owned()),
@@ -421,6 +426,7 @@ mod tests {
             is_write_unanswered: false,
             summary: "wrote a.png".to_owned(),
             is_current: true,
+            write_results: 0,
             has_written: true,
             is_unwritten: false,
             not_kept: None,
@@ -428,6 +434,29 @@ mod tests {
         let said = |is_older| closing_lines(&writes, &ended, (true, is_older, &[], "glimt a.toml"));
         assert_eq!(said(false), ["wrote a.png"]);
         assert_eq!(said(true), [format!("wrote a.png{OLDER_THAN_EDIT}")]);
+    }
+
+    #[test]
+    fn image_written_before_exit_but_not_shown_is_reported() {
+        let writes = SharedWriteLog::default();
+        let written = || {
+            let path = "a.png".into();
+            Event::Written { generation: 1, path, bytes: 1, is_own: true, unfinished: None }
+        };
+        writes.record_event(&written());
+        let ended = |write_results| TuiOutcome {
+            status: ExitStatus::QUIT,
+            is_write_unanswered: false,
+            summary: "a.png not finished (3 %)".to_owned(),
+            is_current: false,
+            write_results,
+            has_written: false,
+            is_unwritten: false,
+            not_kept: None,
+        };
+        let said = |seen| closing_lines(&writes, &ended(seen), (true, false, &[], "glimt a.toml"));
+        assert_eq!(said(0), ["wrote a.png"]);
+        assert_eq!(said(1), ["a.png not finished (3 %)"]);
     }
 
     #[test]

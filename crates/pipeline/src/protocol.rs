@@ -294,6 +294,13 @@ pub enum Event {
     },
 }
 
+impl Event {
+    /// Whether the event tells whether an image was written.
+    pub fn is_write_result(&self) -> bool {
+        matches!(self, Self::Written { .. } | Self::WriteFailed { .. } | Self::Refused { .. })
+    }
+}
+
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnImageState {

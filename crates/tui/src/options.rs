@@ -94,6 +94,8 @@ pub struct TuiOutcome {
     pub summary: String,
     /// Whether the summary describes an image of the last saved scene, as far as the UI knows.
     pub is_current: bool,
+    /// Number of handled events for which [`Event::is_write_result`] is true.
+    pub write_results: u64,
     /// Whether any image file was written.
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.

@@ -160,6 +160,7 @@ impl EventLoop {
             is_write_unanswered: saving.is_write_requested,
             summary: exit_summary::summary_text(&self.state),
             is_current: exit_summary::is_image_current(&self.state),
+            write_results: saving.write_results,
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),
             not_kept: exit_summary::unsaved_as_options(&self.state),

@@ -103,6 +103,8 @@ pub(crate) struct SavingState {
     /// The last write failure, until a later image is written.
     pub write_failed: Option<WriteFailure>,
     pub written: Vec<WrittenFile>,
+    /// Number of handled events about written, failed, and refused images.
+    pub write_results: u64,
 }
 
 impl SavingState {
@@ -140,6 +142,7 @@ impl SavingState {
             unwritten: None,
             write_failed: None,
             written: Vec::new(),
+            write_results: 0,
         }
     }
 }

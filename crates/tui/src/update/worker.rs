@@ -25,6 +25,7 @@ use crate::state::{
 use crate::window_title;
 
 pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect> {
+    state.saving.write_results += u64::from(event.is_write_result());
     let event = match event {
         // Replies to user actions are never outdated.
         Event::CameraKept { outcome, .. } => return camera::handle_saved_camera(state, outcome),
