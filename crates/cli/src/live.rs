@@ -10,7 +10,7 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
-use crate::pipeline::protocol::{CheckpointUpdate, Command, Event, Failure, Stage, Status};
+use crate::pipeline::protocol::{CheckpointUpdate, Command, Event, Failure, OwnImageState, Stage, Status};
 use crate::pipeline::start;
 use crate::pipeline::watch::{Contents, ExternalChange, FileRead, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
@@ -100,7 +100,7 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     }
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.changed_externally(&contents);
-        let is_older = ended.is_current && writes.has_unread_change(&contents);
+        let is_older = ended.is_current && writes.is_image_outdated(&contents);
         closing_lines(&writes, ended, (has_ended, is_older, &lost, &shell_command_line()))
             .iter()
             .for_each(|line| console.print_message(line));
@@ -184,8 +184,10 @@ struct WriteLog {
     checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is in its last stage.
     is_last_stage: bool,
-    /// The files that the last request before the UI exited has read.
-    files: Vec<FileRead>,
+    /// The last request that read files before the UI exited, and these files.
+    read: (u64, Vec<FileRead>),
+    /// The files from which the scene's own image was rendered. `None` if it is not written.
+    image_files: Option<Vec<FileRead>>,
 }
 
 impl SharedWriteLog {
@@ -219,9 +221,12 @@ impl SharedWriteLog {
         let number = log.results;
         log.results += u64::from(event.is_write_result());
         match event {
-            Event::Written { path, .. } => {
+            Event::Written { generation, path, is_own, unfinished, .. } => {
                 log.lines.push((number, format!("wrote {}", path.display())));
                 log.has_written = true;
+                if *is_own && unfinished.is_none() && *generation == log.read.0 {
+                    log.image_files = Some(log.read.1.clone());
+                }
             }
             Event::WriteFailed { message, .. } => log.lines.push((number, format!("error: {message}"))),
             Event::Refused { conflicts, .. } => {
@@ -253,24 +258,28 @@ impl SharedWriteLog {
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
-            | Event::OwnImage { .. }
             | Event::LastGoodEnded { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
             | Event::Picked { .. } => {}
-            Event::Files { files, .. } if !has_left => log.files.clone_from(files),
-            Event::Files { .. } => {}
+            // Later requests are not finished.
+            Event::Files { .. } | Event::OwnImage { .. } if has_left => {}
+            Event::Files { generation, files, .. } => log.read = (*generation, files.clone()),
+            Event::OwnImage { state, .. } => {
+                let is_written = *state == OwnImageState::Written;
+                log.image_files = is_written.then(|| log.read.1.clone());
+            }
         }
     }
 
-    /// Whether a file has changed since it was read, for example because the user saved the scene and quit at
-    /// once.
-    fn has_unread_change(&self, contents: &Contents) -> bool {
-        let files = std::mem::take(&mut self.lock_log().files);
-        let now = |path| contents.read(path, &CancelToken::new());
-        files.iter().any(|file| now(&file.path) != Ok(file.content))
+    /// Whether the scene's own image is older than the files on disk, for example because the user saved the
+    /// scene and quit at once.
+    fn is_image_outdated(&self, contents: &Contents) -> bool {
+        let files = self.lock_log().image_files.take();
+        let now = |path: &Path| contents.read(path, &CancelToken::new());
+        files.is_none_or(|files| files.iter().any(|file| now(&file.path) != Ok(file.content)))
     }
 
     /// Returns the checkpoint written after the UI exited, or an error message.
@@ -416,11 +425,16 @@ mod tests {
             read: 1,
             since: std::time::Instant::now(),
         };
+        let own = |state| writes.record_event(&Event::OwnImage { generation: 1, state });
         writes.record_event(&read());
-        assert!(!writes.has_unread_change(&contents));
-        writes.record_event(&read());
+        own(OwnImageState::Written);
+        assert!(!writes.is_image_outdated(&contents));
+        own(OwnImageState::Written);
         std::fs::write(&path, "22").expect("written");
-        assert!(writes.has_unread_change(&contents));
+        assert!(writes.is_image_outdated(&contents));
+        // A request has read the new scene, but has not rendered its image.
+        own(OwnImageState::NotBegun);
+        assert!(writes.is_image_outdated(&contents));
         let ended = TuiOutcome {
             status: ExitStatus::QUIT,
             is_write_unanswered: false,

@@ -18,15 +18,10 @@ pub(super) fn summary_text(state: &State) -> String {
     }
 }
 
-/// Whether the summary mentions an image of the scene as it was last saved, and no later events.
+/// Whether the summary claims that the scene's own image is up to date.
 pub(super) fn is_image_current(state: &State) -> bool {
-    match &state.saving.write_failed {
-        Some(_) => false,
-        None if state.saving.written.is_empty() => {
-            !is_scene_broken(state) && state.saving.own.state == OwnImageState::Written
-        }
-        None => events_since_writing(state).is_empty(),
-    }
+    let is_written = state.saving.own.state == OwnImageState::Written;
+    is_written && state.saving.write_failed.is_none() && !is_scene_broken(state)
 }
 
 /// Changes that were made with keys and saved neither to the scene nor in an image, formatted as command-line

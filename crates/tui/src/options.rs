@@ -92,7 +92,7 @@ pub struct TuiOutcome {
     pub is_write_unanswered: bool,
     /// One line that lists the written files with their sample counts and render times.
     pub summary: String,
-    /// Whether the summary describes an image of the last saved scene, as far as the UI knows.
+    /// Whether the summary claims that the scene's own image is up to date.
     pub is_current: bool,
     /// Number of handled events for which [`Event::is_write_result`] is true.
     pub write_results: u64,
