@@ -236,9 +236,14 @@ impl SharedWriteLog {
             Event::Stage { stage, .. } => {
                 log.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
             }
-            Event::Done { .. } | Event::Failed { .. } | Event::Cancelled { .. } => {
+            Event::Done { generation, report, .. } => {
                 log.is_last_stage = false;
+                let is_written = report.stages[Stage::Write as usize].status != Status::Skipped;
+                if is_written && *generation == log.read.0 {
+                    log.image_files = Some(log.read.1.clone());
+                }
             }
+            Event::Failed { .. } | Event::Cancelled { .. } => log.is_last_stage = false,
             Event::Checkpoint { news, .. } if has_left => match news {
                 CheckpointUpdate::Written { path } => log.checkpoint = Some(Ok(path.clone())),
                 CheckpointUpdate::Failed { message } => log.checkpoint = Some(Err(message.clone())),

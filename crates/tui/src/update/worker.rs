@@ -293,6 +293,20 @@ fn record_file(
         is_stale,
         lost,
     });
+    if generation >= state.saving.saved_at && is_own_image_complete(state, generation) {
+        state.saving.own = OwnImage { state: OwnImageState::Written, fraction: 1.0 };
+    }
+}
+
+/// Whether all output files contain the scene's own finished image from this request.
+fn is_own_image_complete(state: &State, generation: u64) -> bool {
+    let is_complete = |written: &WrittenFile| {
+        written.generation == generation && written.shows.is_none() && !written.is_unfinished
+    };
+    let is_written =
+        |path: &PathBuf| state.saving.written.iter().any(|it| it.path == *path && is_complete(it));
+    let outputs = state.request.effective.as_ref().map(|settings| &settings.outputs);
+    outputs.is_some_and(|outputs| !outputs.is_empty() && outputs.iter().all(is_written))
 }
 
 /// Adds a description to the files that contain a finished request's image.
