@@ -353,7 +353,7 @@ impl Texture {
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
         match self.factor {
             // Texels below 0 are clamped before they are averaged.
-            Some(factor) if factor.base.min_element() < 0.0 => {
+            Some(factor) if factor.base.min_element() < 0.0 || factor.gain.min_element() < 0.0 => {
                 self.texels.mean_of(|texel| factor.apply(texel))
             }
             Some(factor) => factor.apply(mean),
@@ -683,6 +683,20 @@ mod tests {
         let uv = [[0.3; PACKET_SIZE], [0.6; PACKET_SIZE]];
         let [row, before] = [&texture, &plain].map(|one| lane(&one.lookup_packet(&uv), 3));
         assert_eq!(row, before * factor);
+    }
+
+    #[test]
+    fn clamped_values_have_a_clamped_mean() {
+        let data = TexelData::Float(vec![Vec3::ZERO, Vec3::ONE]);
+        let texels = Arc::new(Texels { width: 2, height: 1, data, unusable: 0 });
+        let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
+        texture.texels = texels;
+        for (base, gain, expected) in [(-0.5, 1.0, 0.25), (1.0, -2.0, 0.5), (-2.0, 1.0, 0.0)] {
+            texture.factor = ScaleAndOffset::with_base(Vec3::splat(gain), Vec3::splat(base));
+            assert_eq!(texture.mean(), Vec3::splat(expected), "{base} {gain}");
+            let at = TexturePoint::sharp(DVec2::new(0.1, 0.5));
+            assert_eq!(texture.lookup(&at), Vec3::splat(f32::max(base, 0.0)), "{base} {gain}");
+        }
     }
 
     #[test]
