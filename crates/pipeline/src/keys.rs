@@ -23,26 +23,30 @@ pub(crate) fn distinct_lights(mesh: &Key, is_emissive: bool) -> Key {
     FingerprintHasher::new("distinct lights").key(mesh).flag(is_emissive).finish()
 }
 
-/// Returns the key for a mesh's tree. `is_distinct` states whether the mesh's lights were made distinct.
-pub(crate) fn tree(mesh: &Key, accel: Accel, is_distinct: bool) -> Key {
-    FingerprintHasher::new("tree").key(mesh).choice(accel).flag(is_distinct).finish()
+/// Returns the key for a mesh's tree. `distinct` is the key of the mesh with distinct lights if it differs from
+/// the mesh in the file.
+pub(crate) fn tree(mesh: &Key, accel: Accel, distinct: Option<Key>) -> Key {
+    FingerprintHasher::new("tree").key(&distinct.unwrap_or(*mesh)).choice(accel).finish()
 }
 
 /// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is
-/// offset. `are_distinct` states for each mesh file whether its lights were made distinct.
+/// offset. `distinct` contains the keys of the meshes with distinct lights, see [`tree`].
 pub(crate) fn geometry(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     (origin, lifts): (DVec3, &[DVec3]),
-    are_distinct: impl Iterator<Item = bool>,
+    distinct: impl Iterator<Item = Option<Key>>,
 ) -> Key {
     let mut key = FingerprintHasher::new("lifted");
     key.key(&from(&shapes(scene, of), origin));
     for lift in lifts {
         key.dvec3(*lift);
     }
-    for is_distinct in are_distinct {
-        key.flag(is_distinct);
+    for distinct in distinct {
+        key.flag(distinct.is_some());
+        if let Some(distinct) = distinct {
+            key.key(&distinct);
+        }
     }
     with_tree_kind(&key.finish(), scene.render.accel)
 }
@@ -56,7 +60,8 @@ pub(crate) fn coplanar(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     for object in scene.objects.iter().filter(|object| !is_round(object)) {
         let material = object.material.map(|index| &scene.materials[index]);
         let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
-        key.flag(object.material.is_some()).flag(emission.is_some());
+        let is_glass = material.is_some_and(|material| material.kind.is_glass());
+        key.flag(object.material.is_some()).flag(is_glass).flag(emission.is_some());
         if let Some(sides) = emission {
             key.choice(sides);
         }
@@ -367,5 +372,23 @@ mod tests {
         for (i, key) in keys.iter().enumerate() {
             assert!(!keys[..i].contains(key), "key {i} is not unique");
         }
+    }
+
+    #[test]
+    fn trees_of_meshes_with_distinct_lights_differ() {
+        let mesh = FingerprintHasher::new("mesh").finish();
+        let distinct = [false, true].map(|is_emissive| Some(distinct_lights(&mesh, is_emissive)));
+        let trees = [None, distinct[0], distinct[1]].map(|distinct| tree(&mesh, Accel::Bvh, distinct));
+        assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);
+    }
+
+    #[test]
+    fn glass_affects_the_search_for_coplanar_lights() {
+        let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
+        let key = |kind: &str| {
+            let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
+            coplanar(&scene, &referents(&scene, &[], None))
+        };
+        assert_ne!(key("phong"), key("glass"));
     }
 }

@@ -14,6 +14,9 @@ use crate::scene::description::Scene;
 use crate::scene::fingerprint::{FingerprintContext, Key};
 use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, with_distinct_lights};
 
+/// A mesh with distinct lights, and its key.
+type DistinctMesh = (Key, Arc<LoadedMesh>);
+
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
@@ -77,8 +80,8 @@ pub(crate) fn accel(
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
-    let are_distinct = distinct.iter().map(Option::is_some);
-    let key = keys::geometry(scene, of, (origin, &lifts), are_distinct);
+    let changed = distinct.iter().map(|distinct| distinct.as_ref().map(|(key, _)| *key));
+    let key = keys::geometry(scene, of, (origin, &lifts), changed);
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
@@ -101,7 +104,7 @@ pub(crate) fn accel(
 }
 
 /// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
-fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Vec<Option<Arc<LoadedMesh>>> {
+fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Vec<Option<DistinctMesh>> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
         let key = keys::distinct_lights(&mesh.key, is_emissive);
         let found = cache.distinct.get(&key, key).unwrap_or_else(|| {
@@ -110,7 +113,7 @@ fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Ve
             cache.distinct.insert(key, key, (found.clone(), bytes));
             found
         });
-        (*found).clone()
+        (*found).clone().map(|distinct| (key, distinct))
     };
     meshes.iter().zip(emissive_meshes(scene)).map(distinct).collect()
 }
@@ -118,7 +121,7 @@ fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Ve
 /// Returns the trees for all meshes, and how many of them were cached.
 fn trees(
     scene: &Scene,
-    (meshes, distinct): (&Meshes, &[Option<Arc<LoadedMesh>>]),
+    (meshes, distinct): (&Meshes, &[Option<DistinctMesh>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
@@ -126,14 +129,14 @@ fn trees(
     let accel = scene.render.accel;
     let mut trees = Vec::with_capacity(meshes.len());
     for (mesh, distinct) in meshes.iter().zip(distinct) {
-        let key = keys::tree(&mesh.key, accel, distinct.is_some());
+        let key = keys::tree(&mesh.key, accel, distinct.as_ref().map(|(key, _)| *key));
         let tree = match cache.trees.get(&key, key) {
             Some(tree) => {
                 kept += 1;
                 tree
             }
             None => {
-                let loaded = distinct.as_ref().unwrap_or(&mesh.mesh).clone();
+                let loaded = distinct.as_ref().map_or(&mesh.mesh, |(_, distinct)| distinct).clone();
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.
