@@ -385,6 +385,9 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
     let lifted = with_distinct_lights(&loaded, false).expect("a coplanar light").mesh;
+    // Another instance, whose material makes all faces emit, does not change this.
+    let emissive = with_distinct_lights(&loaded, true).expect("a coplanar light").mesh;
+    assert_eq!(emissive.triangles, lifted.triangles);
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
     let down = (lifted.positions[1] - lifted.positions[0]).cross(lifted.positions[2] - lifted.positions[0]).y;

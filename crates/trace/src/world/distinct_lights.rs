@@ -33,17 +33,17 @@ pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<Loade
     if !all_emit && !loaded.materials.iter().any(FileMaterial::emits) {
         return None;
     }
-    let emits = |triangle: u32| {
+    let emits_in_file = |triangle: u32| {
         let material = loaded.mesh.materials.get(triangle as usize);
-        all_emit
-            || material.and_then(|own| loaded.materials.get(*own as usize)).is_some_and(FileMaterial::emits)
+        material.and_then(|own| loaded.materials.get(*own as usize)).is_some_and(FileMaterial::emits)
     };
+    let emits = |triangle: u32| all_emit || emits_in_file(triangle);
     let mut mesh = Cow::Borrowed(&loaded.mesh);
     let repeated = repeated_triangles(&loaded.mesh, emits);
     for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
         mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
     }
-    let (lifts, height) = lifted_triangles(&mesh, emits);
+    let (lifts, height) = lifted_triangles(&mesh, emits, emits_in_file);
     if !lifts.is_empty() {
         lift(mesh.to_mut(), &lifts, height);
     }
@@ -73,7 +73,11 @@ pub(super) fn repeated_triangles(
 
 /// Finds the emissive triangles that must be moved off the plane of other faces. Returns their normals and
 /// the distance to move them.
-fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeMap<usize, DVec3>, f64) {
+fn lifted_triangles(
+    mesh: &TriangleMesh,
+    emits: impl Fn(u32) -> bool,
+    emits_in_file: impl Fn(u32) -> bool,
+) -> (BTreeMap<usize, DVec3>, f64) {
     let reach =
         |face: &FlatFace| face.corners.iter().fold(0.0, |most: f64, at| most.max(at.abs().max_element()));
     let face = |triangle: u32| {
@@ -90,7 +94,10 @@ fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeM
             break;
         }
         for light in lights.near(&other, &mut pairs) {
-            if (!is_light || light.faces_against(&other)) && are_coplanar_and_overlap(light, &other) {
+            // Other instances of the mesh may use the file's materials, in which only some faces emit.
+            let is_dark =
+                !is_light || emits_in_file(light.object as u32) && !emits_in_file(other.object as u32);
+            if (is_dark || light.faces_against(&other)) && are_coplanar_and_overlap(light, &other) {
                 found.insert(light.object, light.normal);
                 // A light that consists of two sheets may be seen from a distance much greater than its size.
                 sizes = if is_light { SURROUNDINGS } else { sizes };
