@@ -318,6 +318,45 @@ fn check_warns_about_unlit_meshes() {
 }
 
 #[test]
+fn check_names_lights_in_the_plane_of_a_surface() {
+    let dir = TestDir::new();
+    let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.lamp]\nemission = 1\n[materials.wall]\n";
+    let quad = |name: &str, size: i32, material: &str| {
+        format!(
+            "[[quad]]\nname = \"{name}\"\ncorner = [0, 2, 0]\nu = [{size}, 0, 0]\nv = [0, 0, {size}]\nmaterial = \"{material}\"\n"
+        )
+    };
+    let (lamp, ceiling) = (quad("panel", 1, "lamp"), quad("ceiling", 3, "wall"));
+    for (objects, light, other) in [([&lamp, &ceiling], 7, 13), ([&ceiling, &lamp], 13, 7)] {
+        dir.write("a.toml", format!("{scene}{}", objects.map(String::as_str).concat()));
+        let said = String::from_utf8_lossy(&dir.run("check a.toml").stderr).into_owned();
+        assert_mentions(
+            &said,
+            &["warning", "plane", "ceiling", &format!("line {other}"), &format!("a.toml:{light}")],
+        );
+    }
+}
+
+#[test]
+fn check_json_is_not_ok_if_warnings_hide_an_error() {
+    use std::fmt::Write;
+    let dir = TestDir::new();
+    let mut scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n".to_owned();
+    for number in 0..600 {
+        write!(scene, "[materials.m{number}]\nnormal_strength = 2\n").expect("written");
+    }
+    for (error, is_ok) in [("", true), ("[[sphere]]\nradius = -1\n", false)] {
+        dir.write("a.toml", format!("{scene}{error}"));
+        let output = dir.run("check a.toml --json");
+        assert_eq!(output.status.code(), Some(if is_ok { 0 } else { 2 }), "{output:?}");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(report["ok"], is_ok, "{error}");
+        let said = report.to_string();
+        assert_eq!(said.contains("\"error\""), !is_ok, "{error}");
+    }
+}
+
+#[test]
 fn check_names_lights_counted_twice() {
     let dir = TestDir::new();
     let vertices = "v 0 2 0\nv 1 2 0\nv 1 2 1\nv 0 2 1\n";

@@ -188,8 +188,10 @@ fn mismatched_parts_are_rejected() {
     refused("1.part 2.part room.toml", &["room.toml", "part"]);
     let other = |options: &str, facts: &[&str]| {
         dir.expect(&format!("room.toml --once --progress none -o other.part {options}"), 0);
-        refused("1.part other.part 3.part", facts);
+        refused("1.part other.part 3.part", facts)
     };
+    let said = other("--shard 2/3 --view depth", &["view", "depth", "beauty"]);
+    assert_eq!(said.matches("view").count(), 1, "{said}");
     other("--shard 2/3 --seed 7", &["seed", "7", "0"]);
     other("--shard 2/3 --samples 4", &["samples", "4", "3"]);
     other("--shard 2/3 --integrator path", &["integrator", "path", "whitted"]);

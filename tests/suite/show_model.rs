@@ -179,6 +179,31 @@ fn with_image(uri: &str) -> Vec<u8> {
     }))
 }
 
+#[test]
+fn embedded_and_linked_images_render_identically() {
+    let dir = TestDir::new();
+    dir.write("c.png", checker());
+    for mode in ["OPAQUE", "MASK", "BLEND"] {
+        let model = |is_embedded: bool| {
+            let mut glb = Glb::default();
+            let mut cube = cube(&mut glb);
+            cube["material"] = json!(0);
+            let image = if is_embedded {
+                json!({"bufferView": glb.view(&checker()), "mimeType": "image/png"})
+            } else {
+                json!({"uri": "c.png"})
+            };
+            dir.write("a.glb", glb.finish(json!({
+                "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}],
+                "materials": [{"alphaMode": mode, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+                "textures": [{"source": 0}], "images": [image]
+            })));
+            picture(&dir, "a.glb")
+        };
+        assert!(model(true) == model(false), "{mode}");
+    }
+}
+
 /// Importing an untrusted model must not copy arbitrary local files into the scene's folder.
 #[test]
 fn import_copies_only_images() {

@@ -139,13 +139,16 @@ fn color_chunks_have_a_fixed_precedence() {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
     assert!(is_plain(&srgb));
-    // The encoder writes only an sRGB chunk. Insert a gAMA chunk, including its checksum, before the sRGB
-    // chunk.
+    // The encoder writes only an sRGB chunk. Insert other chunks, including their checksums, before it.
     let at = srgb.windows(4).position(|name| name == b"sRGB").expect("a chunk") - 4;
-    let other = png(gamma(1.0));
-    let from = other.windows(4).position(|name| name == b"gAMA").expect("a chunk") - 4;
-    let both = [&srgb[..at], &other[from..from + 16], &srgb[at..]].concat();
-    assert!(is_plain(&both));
+    let wide = |info: &mut Info<'static>| info.source_chromaticities = Some(p3());
+    let others = [(png(gamma(1.0)), b"gAMA"), (png(wide), b"cHRM"), (png(profile(linear())), b"iCCP")];
+    for (other, name) in others {
+        let from = other.windows(4).position(|found| found == name).expect("a chunk") - 4;
+        let length = u32::from_be_bytes(*other[from..].first_chunk().expect("a length")) as usize;
+        let both = [&srgb[..at], &other[from..from + 12 + length], &srgb[at..]].concat();
+        assert!(is_plain(&both), "{}", String::from_utf8_lossy(name));
+    }
 }
 
 #[test]
@@ -230,19 +233,23 @@ const HEADER_END: usize = 33;
 
 #[test]
 fn scene_encoding_overrides_the_file() {
-    let file = png(|info| {
+    let chunks = png(|info| {
         gamma(1.0)(info);
         info.source_chromaticities = Some(p3());
     });
-    for (encoding, data) in [
-        (ImageEncoding::Srgb, TexelData::Srgb8(vec![[188, 128, 64]])),
-        (ImageEncoding::Linear, TexelData::Linear8(vec![[188, 128, 64]])),
-    ] {
-        assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
+    for file in [chunks, png(profile(rgb_profile(SRGB, curv(&[]))))] {
+        assert!(!is_plain(&file));
+        // Normal maps are read as linear.
+        for (encoding, data) in [
+            (ImageEncoding::Srgb, TexelData::Srgb8(vec![[188, 128, 64]])),
+            (ImageEncoding::Linear, TexelData::Linear8(vec![[188, 128, 64]])),
+        ] {
+            assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
+        }
+        let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
+        let scalar = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
+        assert_eq!(scalar(&file), scalar(&png(|_| {})));
     }
-    let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
-    let scalar = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
-    assert_eq!(scalar(&file), scalar(&png(|_| {})));
 }
 
 #[test]

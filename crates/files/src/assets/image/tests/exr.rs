@@ -297,3 +297,16 @@ fn luminance_and_chroma_are_converted_to_rgb() {
         let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
     }
 }
+
+#[test]
+fn premultiplied_colors_of_cutouts_are_unmultiplied() {
+    let channel = |value: f32| floats([value; 4]);
+    let file = single_layer(vec![
+        ("R", channel(0.5)),
+        ("G", channel(0.25)),
+        ("B", channel(0.0)),
+        ("A", channel(0.5)),
+    ]);
+    let cut_out = load_bytes("a.exr", &file, ImageEncoding::CutOut(ColorCurve::Linear)).expect("an EXR");
+    assert!((cut_out.get(1, 1) - Vec3::new(1.0, 0.5, 0.0)).length() < 1e-3, "{}", cut_out.get(1, 1));
+}
