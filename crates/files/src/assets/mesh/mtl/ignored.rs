@@ -1,5 +1,6 @@
 //! Warnings about MTL statements that are ignored or approximated.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use super::map::{Map, MapKind};
@@ -22,15 +23,19 @@ pub(in crate::assets::mesh) fn warnings<'a>(
     of_file: Vec<IgnoredStatement>,
     materials: impl Iterator<Item = &'a MtlMaterial>,
 ) -> Vec<String> {
-    let mut all = of_file;
-    let of_file = all.len();
-    all.extend(materials.flat_map(material_warnings));
     let mut warnings: Vec<(IgnoredStatement, usize)> = Vec::new();
-    for (index, ignored) in all.into_iter().enumerate() {
-        let known = warnings.iter_mut().find(|(known, _)| index >= of_file && known.words == ignored.words);
-        match known {
-            Some((_, more)) => *more += 1,
-            None => warnings.push((ignored, 0)),
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for ignored in of_file {
+        known.entry(ignored.words.clone()).or_insert(warnings.len());
+        warnings.push((ignored, 0));
+    }
+    for ignored in materials.flat_map(material_warnings) {
+        match known.get(&ignored.words) {
+            Some(index) => warnings[*index].1 += 1,
+            None => {
+                known.insert(ignored.words.clone(), warnings.len());
+                warnings.push((ignored, 0));
+            }
         }
     }
     let text = |(IgnoredStatement { line, words }, more)| {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::super::MeshSource;
 use super::super::parsed::ParsedMesh;
 use super::build::FaceRun;
-use super::statements::{CornerIndices, NONE, Statements, face_start};
+use super::statements::{CornerIndices, NONE, Statements, face_lines, face_start};
 use crate::assets::FileMaterial;
 
 /// Faces that have corners without texture coordinates.
@@ -58,8 +58,11 @@ impl MissingUvs {
 
     /// Warnings about textured objects without texture coordinates, one for each material.
     pub(super) fn material_warnings(&self, source: &MeshSource<'_>, parsed: &ParsedMesh) -> Vec<String> {
+        let mut faces: Vec<usize> = self.textured.values().copied().collect();
+        faces.sort_unstable();
+        let lines = face_lines(source, &faces);
         let warning = |(material, face): (&u32, &usize)| {
-            let line = source.line(face_start(source, *face));
+            let line = faces.binary_search(face).map_or(0, |index| lines[index]);
             let name = &parsed.materials[*material as usize].name;
             if parsed.uvs.is_empty() { half_of_texture(line, name) } else { corner_of_texture(line, name) }
         };

@@ -221,22 +221,39 @@ pub(super) fn free_form(line: usize, keyword: &str) -> String {
     format!("line {line}: free-form curves and surfaces (`{keyword}`) are not supported and are skipped")
 }
 
+/// Line numbers of faces, given their indices in ascending order. Reads the file once.
+pub(super) fn face_lines(source: &MeshSource<'_>, faces: &[usize]) -> Vec<usize> {
+    let mut starts = face_starts(source);
+    let (mut passed, mut at, mut line) = (0, 0, 1);
+    let mut line_of = |face: usize| {
+        let start = starts.nth(face - passed).unwrap_or(source.bytes.len());
+        line += memchr::memchr_iter(b'\n', &source.bytes[at..start]).count();
+        (passed, at) = (face + 1, start);
+        line
+    };
+    faces.iter().map(|face| line_of(*face)).collect()
+}
+
 /// Byte offset of a face.
 pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
+    face_starts(source).nth(face).unwrap_or(0)
+}
+
+/// Byte offsets of all faces.
+fn face_starts<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use<'a> {
     let mut words = Words::new(source.bytes);
-    let mut faces = 0;
-    while words.next_statement() {
-        let start = words.at();
-        if words.word().is_some_and(|word| word.eq_ignore_ascii_case(b"f")) {
-            if faces == face {
-                return start;
+    std::iter::from_fn(move || {
+        while words.next_statement() {
+            let start = words.at();
+            let is_face = words.word().is_some_and(|word| word.eq_ignore_ascii_case(b"f"));
+            while is_face && words.word().is_some() {}
+            words.line();
+            if is_face {
+                return Some(start);
             }
-            faces += 1;
-            while words.word().is_some() {}
         }
-        words.line();
-    }
-    0
+        None
+    })
 }
 
 /// Parses `min` to `max` numbers in a statement. Missing numbers are 0.
