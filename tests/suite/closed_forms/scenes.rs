@@ -157,7 +157,7 @@ impl Build {
 
     /// Adds an instance of a mesh that was read from a file.
     pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
-        let loaded = with_distinct_lights(&loaded, material.emits()).unwrap_or(loaded);
+        let loaded = distinct_lights(loaded, material.emits());
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("not cancelled");
         self.parts.meshes.push(Arc::new(tree));
@@ -182,7 +182,7 @@ impl Build {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
-        let loaded = with_distinct_lights(&loaded, false).unwrap_or(loaded);
+        let loaded = distinct_lights(loaded, false);
         let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not cancelled");
         build.parts.meshes[file] = Arc::new(tree);
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
@@ -466,3 +466,9 @@ pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> Tr
 
 /// The identity transform.
 pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
+
+/// The mesh as the pipeline prepares it for its tree.
+fn distinct_lights(loaded: LoadedMesh, all_emit: bool) -> LoadedMesh {
+    let distinct = with_distinct_lights(&loaded, all_emit, &CancelToken::new()).expect("never canceled");
+    distinct.unwrap_or(loaded)
+}

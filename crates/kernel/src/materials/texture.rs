@@ -347,6 +347,12 @@ impl Texture {
         colors
     }
 
+    /// Whether the texture is 0 everywhere, with its scale and offset applied.
+    pub fn is_black(&self) -> bool {
+        let has_offset = self.factor.is_some_and(|factor| factor.base.max_element() > 0.0);
+        self.texels.is_black() && !has_offset
+    }
+
     /// Mean of the image. This is the mean of the texture if a whole number of tiles fits into [0, 1]².
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
@@ -696,6 +702,12 @@ mod tests {
             assert_eq!(texture.mean(), Vec3::splat(expected), "{base} {gain}");
             let at = TexturePoint::sharp(DVec2::new(0.1, 0.5));
             assert_eq!(texture.lookup(&at), Vec3::splat(f32::max(base, 0.0)), "{base} {gain}");
+        }
+        let black = TexelData::Float(vec![Vec3::ZERO; 2]);
+        texture.texels = Arc::new(Texels { width: 2, height: 1, data: black, unusable: 0 });
+        for (base, is_black) in [(-0.5, true), (0.0, true), (1.0, false)] {
+            texture.factor = ScaleAndOffset::with_base(Vec3::ONE, Vec3::splat(base));
+            assert_eq!(texture.is_black(), is_black, "{base}");
         }
     }
 

@@ -9,6 +9,7 @@ use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, Meshes};
 use super::{FileReadContext, StageResult, Stop};
 use crate::assets::LoadedMesh;
+use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{FingerprintContext, Key};
@@ -75,7 +76,7 @@ pub(crate) fn accel(
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<AccelResult>, Stop> {
-    let distinct = distinct_lights(scene, meshes, cache);
+    let distinct = distinct_lights(scene, meshes, cache, reading.token)?;
     let (meshes, kept) = trees(scene, (meshes, &distinct), cache, reading)?;
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
@@ -104,16 +105,24 @@ pub(crate) fn accel(
 }
 
 /// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
-fn distinct_lights(scene: &Scene, meshes: &Meshes, cache: &mut AccelCache) -> Vec<Option<DistinctMesh>> {
+fn distinct_lights(
+    scene: &Scene,
+    meshes: &Meshes,
+    cache: &mut AccelCache,
+    token: &CancelToken,
+) -> Result<Vec<Option<DistinctMesh>>, Stop> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
         let key = keys::distinct_lights(&mesh.key, is_emissive);
-        let found = cache.distinct.get(&key, key).unwrap_or_else(|| {
-            let found = Arc::new(with_distinct_lights(&mesh.mesh, is_emissive).map(Arc::new));
-            let bytes = found.as_ref().as_ref().map_or(0, |distinct| distinct.mesh.memory_bytes());
-            cache.distinct.insert(key, key, (found.clone(), bytes));
-            found
-        });
-        (*found).clone().map(|distinct| (key, distinct))
+        let found = match cache.distinct.get(&key, key) {
+            Some(found) => found,
+            None => {
+                let found = Arc::new(with_distinct_lights(&mesh.mesh, is_emissive, token)?.map(Arc::new));
+                let bytes = found.as_ref().as_ref().map_or(0, |distinct| distinct.mesh.memory_bytes());
+                cache.distinct.insert(key, key, (found.clone(), bytes));
+                found
+            }
+        };
+        Ok((*found).clone().map(|distinct| (key, distinct)))
     };
     meshes.iter().zip(emissive_meshes(scene)).map(distinct).collect()
 }

@@ -75,6 +75,10 @@ const SURFACES: [&str; 6] = [
     "[[mesh]]\nfile = '../../assets/gem.off'\nscale = 4\nmaterial = 'w'\n",
 ];
 
+fn distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
+    with_distinct_lights(loaded, all_emit, &CancelToken::new()).expect("never canceled")
+}
+
 #[test]
 fn coplanar_lights_are_found_in_any_order() {
     for light in LIGHTS {
@@ -174,8 +178,8 @@ fn rays_hit_the_first_of_repeated_faces() {
         positions.extend(positions.clone());
         let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-        assert!(with_distinct_lights(&loaded, false).is_none());
-        let distinct = with_distinct_lights(&loaded, true).expect("repeated faces");
+        assert!(distinct_lights(&loaded, false).is_none());
+        let distinct = distinct_lights(&loaded, true).expect("repeated faces");
         let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct.clone());
         let mut hits = 0;
         for _ in 0..4000 {
@@ -202,7 +206,7 @@ fn opposite_faces_are_hit_from_their_fronts() {
             let triangles = [[[0, 1, 2], [0, 2, 3]], reversed].concat();
             let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
             let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-            let distinct = with_distinct_lights(&loaded, true).expect("reversed faces");
+            let distinct = distinct_lights(&loaded, true).expect("reversed faces");
             let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct);
             for round in 0..100 {
                 let target = corner([0.5, 0.5]).as_dvec3() + (x * vector().x + y * vector().x) * 0.45;
@@ -384,9 +388,9 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
         physical: None,
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
-    let lifted = with_distinct_lights(&loaded, false).expect("a coplanar light").mesh;
+    let lifted = distinct_lights(&loaded, false).expect("a coplanar light").mesh;
     // Another instance, whose material makes all faces emit, does not change this.
-    let emissive = with_distinct_lights(&loaded, true).expect("a coplanar light").mesh;
+    let emissive = distinct_lights(&loaded, true).expect("a coplanar light").mesh;
     assert_eq!(emissive.triangles, lifted.triangles);
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
@@ -402,8 +406,8 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
     }
     // Meshes without coplanar lights are unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
-    assert!(with_distinct_lights(&dark, false).is_none());
+    assert!(distinct_lights(&dark, false).is_none());
     let mut below = loaded;
     below.mesh.positions[4..].iter_mut().for_each(|position| position.y = 1.9);
-    assert!(with_distinct_lights(&below, false).is_none());
+    assert!(distinct_lights(&below, false).is_none());
 }

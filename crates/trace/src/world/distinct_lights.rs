@@ -11,6 +11,7 @@ use super::coplanar::{
     EmissiveFaces, FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, are_coplanar_and_overlap,
 };
 use crate::assets::{FileMaterial, LoadedMesh};
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
@@ -29,9 +30,16 @@ pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
 /// Returns a copy of the mesh in which camera rays, shadow rays and light samples agree on which coincident
 /// emissive triangle they reach. `None` if there are no such triangles. If `all_emit` is false, the file's
 /// materials determine the emissive triangles.
-pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn with_distinct_lights(
+    loaded: &LoadedMesh,
+    all_emit: bool,
+    token: &CancelToken,
+) -> Result<Option<LoadedMesh>, Cancelled> {
     if !all_emit && !loaded.materials.iter().any(FileMaterial::emits) {
-        return None;
+        return Ok(None);
     }
     let emits_in_file = |triangle: u32| {
         let material = loaded.mesh.materials.get(triangle as usize);
@@ -43,14 +51,14 @@ pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<Loade
     for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
         mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
     }
-    let (lifts, height) = lifted_triangles(&mesh, emits, emits_in_file);
+    let (lifts, height) = lifted_triangles(&mesh, emits, emits_in_file, token)?;
     if !lifts.is_empty() {
         lift(mesh.to_mut(), &lifts, height);
     }
-    match mesh {
+    Ok(match mesh {
         Cow::Borrowed(_) => None,
         Cow::Owned(mesh) => Some(LoadedMesh { mesh, ..loaded.clone() }),
-    }
+    })
 }
 
 /// Emissive triangles with the same corners and orientation as an earlier triangle, and the rotation that
@@ -77,7 +85,8 @@ fn lifted_triangles(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
     emits_in_file: impl Fn(u32) -> bool,
-) -> (BTreeMap<usize, DVec3>, f64) {
+    token: &CancelToken,
+) -> Result<(BTreeMap<usize, DVec3>, f64), Cancelled> {
     let reach =
         |face: &FlatFace| face.corners.iter().fold(0.0, |most: f64, at| most.max(at.abs().max_element()));
     let face = |triangle: u32| {
@@ -88,8 +97,9 @@ fn lifted_triangles(
     let all = 0..mesh.triangles.len() as u32;
     let (mut found, mut pairs, mut sizes) = (BTreeMap::new(), 0, 1.0);
     let emissive = all.clone().filter(|id| emits(*id)).filter_map(face).collect();
-    let Some(lights) = EmissiveFaces::new(emissive) else { return (found, 0.0) };
+    let Some(lights) = EmissiveFaces::new(emissive) else { return Ok((found, 0.0)) };
     for (other, is_light) in all.filter_map(|id| Some((face(id)?, emits(id)))) {
+        token.check()?;
         if pairs > MAX_PAIRS {
             break;
         }
@@ -97,15 +107,16 @@ fn lifted_triangles(
             // Other instances of the mesh may use the file's materials, in which only some faces emit.
             let is_dark =
                 !is_light || emits_in_file(light.object as u32) && !emits_in_file(other.object as u32);
-            if (is_dark || light.faces_against(&other)) && are_coplanar_and_overlap(light, &other) {
+            let is_against = light.faces_against(&other);
+            if (is_dark || is_against) && are_coplanar_and_overlap(light, &other) {
                 found.insert(light.object, light.normal);
                 // A light that consists of two sheets may be seen from a distance much greater than its size.
-                sizes = if is_light { SURROUNDINGS } else { sizes };
+                sizes = if is_light && is_against { SURROUNDINGS } else { sizes };
             }
         }
     }
     let greatest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
-    (found, LIFT * greatest)
+    Ok((found, LIFT * greatest))
 }
 
 /// Moves triangles along these directions. The moved triangles get separate vertices.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::distinct_lights::repeated_triangles;
 use super::lower::{emission, file_emission, file_opacity, opacity};
 use super::{Geometry, Images, MeshInstance, Object};
+use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
@@ -110,7 +111,7 @@ fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Ligh
 /// Returns the emission, or [`Emission::NONE`] if its texture is entirely black.
 fn without_black_texture(emission: Emission) -> Emission {
     match &emission.texture {
-        Some(texture) if emission.is_emissive() && texture.texels.is_black() => Emission::NONE,
+        Some(texture) if emission.is_emissive() && texture.is_black() => Emission::NONE,
         Some(_) | None => emission,
     }
 }
@@ -206,8 +207,8 @@ fn mesh_lights(
     };
     // Rays always hit the first of several repeated faces, so only the first face emits.
     let emits = |id: u32| {
-        let own = |index: &u32| all.get(*index as usize).is_some_and(|(_, own)| !own.sides().is_empty());
-        if emissive.is_some() { true } else { loaded.mesh.materials.get(id as usize).is_some_and(own) }
+        let own = |index: &u32| loaded.materials.get(*index as usize).is_some_and(FileMaterial::emits);
+        emissive.is_some() || loaded.mesh.materials.get(id as usize).is_some_and(own)
     };
     let is_lit = all.iter().any(|(_, emissive)| !emissive.sides().is_empty());
     let repeated: HashSet<u32> = if is_lit {
