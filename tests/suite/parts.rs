@@ -307,16 +307,16 @@ fn merge_never_replaces_an_unread_input() {
 #[test]
 fn merge_never_replaces_an_unread_input_of_an_option() {
     let dir = room_dir();
-    fs::create_dir_all(dir.path("shared")).expect("a folder");
+    fs::create_dir_all(dir.path("common")).expect("a folder");
     let image = "P3 1 1 255 9 9 9\n";
-    for name in ["other.ppm", "shared/far.ppm"] {
+    for name in ["other.ppm", "common/far.ppm"] {
         dir.write(name, image);
     }
     dir.write(
         "room.toml",
         ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"tiles.ppm\"\n[textures.tiles]"),
     );
-    for (file, out) in [("other.ppm", "other.ppm"), ("shared/../shared/far.ppm", "shared/far.ppm")] {
+    for (file, out) in [("other.ppm", "other.ppm"), ("common/../common/far.ppm", "common/far.ppm")] {
         parts(&dir, 2, &format!("--view depth --set textures.u.file=\"{file}\" --force"));
         let said = dir.expect(&format!("merge {out} 1.part 2.part --progress none"), 2);
         assert_mentions(&said, &[out]);

@@ -295,7 +295,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Whether the event tells whether an image was written.
+    /// Whether this is the result of an attempt to write an image.
     pub fn is_write_result(&self) -> bool {
         matches!(self, Self::Written { .. } | Self::WriteFailed { .. } | Self::Refused { .. })
     }

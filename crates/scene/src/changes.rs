@@ -5,7 +5,7 @@ mod keys;
 
 use super::sanitize::shortened;
 
-/// Maximum size of scenes to compare, in bytes. Nobody edits larger scenes by hand.
+/// Maximum size of scenes to compare, in bytes. Larger scenes are not edited by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
 /// Maximum number of characters shown per line.

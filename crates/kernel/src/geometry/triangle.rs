@@ -6,8 +6,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle is considered huge if its coordinates exceed those of the ray's origin and of the hit by this
-/// factor.
+/// A triangle is considered huge if its coordinates are larger by this factor than the coordinates of the ray's
+/// origin and of the hit.
 const HUGE: f64 = 1024.0;
 
 /// A triangle. The front faces along (b − a) × (c − a).

@@ -63,7 +63,7 @@ fn pieces(line: &str) -> ReportLine {
     pieces
 }
 
-/// Returns the role that a color code stands for in [`lines`].
+/// Returns the role that a color code marks in [`lines`].
 fn role_of(codes: &str) -> SpanRole {
     match codes {
         "31" => SpanRole::Error,

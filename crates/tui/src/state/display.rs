@@ -32,7 +32,7 @@ pub(crate) struct DisplayState {
     pub is_light: bool,
     /// The user's request to draw pixels, while the terminal has not confirmed it.
     pub pixels: Option<ImageProtocolRequest>,
-    /// Time at which the user will be told that confirmation is missing.
+    /// Time at which a missing confirmation is reported.
     pub pixels_until: Option<Instant>,
     /// Bytes and round-trip time for sending the last preview.
     pub frame: Option<FrameReport>,

@@ -97,7 +97,7 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Whether `w` can replace the output files, as far as glimt knows.
+    /// Whether nothing is known that would keep `w` from replacing the output files.
     pub(super) fn can_write(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
         let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);

@@ -28,7 +28,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
     perform_action(state, action).then(Vec::new)
 }
 
-/// Performs the action if an open overlay uses it, and returns true if so.
+/// Performs the action if an open overlay uses it. Returns whether it was performed.
 pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
     match action {
         OverlayAction::Close => close_topmost(state),

@@ -67,8 +67,8 @@ fn draw_view_line(
     put_text(buffer, place, &pieces, state.display.depth);
 }
 
-/// Returns the area for the list. The list has one column if the panel is tall enough, and as many as
-/// necessary otherwise.
+/// Returns the area for the list. If the panel is not tall enough for one column, the list has as many as
+/// necessary.
 fn list_area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;

@@ -46,7 +46,7 @@ pub enum LitFrom {
     /// By refraction. Contains the index of refraction on the light's side divided by the index on the
     /// viewer's side.
     Refracted(f64),
-    /// By transmission. The direction is that of a reflection, mirrored to the other side of the surface.
+    /// By transmission, in the direction of reflection mirrored at the surface.
     Through,
 }
 

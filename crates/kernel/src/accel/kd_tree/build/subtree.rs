@@ -40,7 +40,7 @@ impl KdSubtree {
 /// Builds a subtree, reusing the same buffers for all cells.
 struct KdSubtreeBuilder<'a, C> {
     built: KdSubtree,
-    /// References of all pending cells. Those of the next cell are last.
+    /// References of all pending cells. The last ones belong to the next cell.
     references: Vec<TriangleReference>,
     scratch: PartitionBuffers,
     corners: &'a C,
