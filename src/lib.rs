@@ -87,7 +87,7 @@
 //! 3. `transport/packet.rs` intersects a packet with the scene: `world/geometry.rs`, then the trees in
 //!    `accel/wide_bvh/`, or `geometry/triangle_list.rs` if there are few triangles.
 //! 4. `transport/packet.rs` collects hits on simple materials in packets of sixteen vertices
-//!    (`transport/batch.rs`). All BSDFs in a packet are of the same kind (`materials/rough/mod.rs`).
+//!    (`transport/batch.rs`). All BSDFs in a packet are of the same kind (`materials/bxdfs/mod.rs`).
 //! 5. Other hits are handled one at a time: `transport/walk.rs` skips boundaries within a single glass body
 //!    (`transport/crossing.rs`), and `transport/vertex.rs` evaluates the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` generates the rays for the next round.

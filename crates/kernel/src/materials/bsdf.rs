@@ -2,15 +2,14 @@
 //! integrators.
 //!
 //! To add a kind of BSDF, add a file that implements [`RoughMaterial`], [`RoughPoint`], and
-//! [`Bxdf`](super::bxdf::Bxdf), and a line in the table in [`rough`](super::rough). No other code
+//! [`Bxdf`](super::bxdf::Bxdf), and a line in the table in [`bxdfs`](super::bxdfs). No other code
 //! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfRow`](super::BsdfRow) for all
 //! lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
 
-use super::footprint::TexturePoint;
-use super::texture::Texture;
+use super::lookup::ParameterLookup;
+use super::texture::Color;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Vec3x16};
 
@@ -136,34 +135,31 @@ pub trait RoughMaterial {
     /// The material at a single point.
     type Point: RoughPoint;
 
-    /// Looks up the textures and returns the material at a single point. Counts texture lookups in `lookups`.
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Self::Point;
+    /// Looks up all parameters. Parameters that do not affect the result need not be looked up.
+    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Self::Point;
 
-    /// The material with all textures replaced by white ones.
-    fn with_white_textures(&self) -> Self::Point;
-
-    /// The material's values if it has no textures.
-    fn constant(&self) -> Option<Self::Point>;
-
-    /// The material's main color. Counts texture lookups in `lookups`.
-    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
+    /// The material's main color.
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3;
 
     /// Reflectance for ambient light.
-    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
+    fn ambient<'m>(&'m self, _lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        Vec3::ZERO
+    }
 
-    /// All textures of the material.
-    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>>;
-
-    /// Whether packets can be filled with the material by looking up at most one texture,
-    /// [`RoughMaterial::row_texture`].
-    fn supports_packets(&self) -> bool;
-
-    /// The texture that packets look up. `None` if there is no such texture.
-    fn row_texture(&self) -> Option<&Texture>;
+    /// The color that can be looked up for packets and set with
+    /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color). `None` if there is no such color.
+    fn packet_color(&self) -> Option<&Color> {
+        None
+    }
 
     /// Whether the material depends on [`SurfaceDirections::tangent`](super::bxdf::SurfaceDirections::tangent).
     #[inline]
     fn has_direction(&self) -> bool {
+        false
+    }
+
+    /// Whether the material may scatter light to the other side.
+    fn is_transmissive(&self) -> bool {
         false
     }
 }

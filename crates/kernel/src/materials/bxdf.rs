@@ -117,8 +117,8 @@ pub trait Bxdf: Soa + Default {
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`RoughMaterial::row_texture`](super::bsdf::RoughMaterial::row_texture) looks
-    /// up. Not called for materials without such a texture.
+    /// Replaces the color that [`RoughMaterial::packet_color`](super::bsdf::RoughMaterial::packet_color)
+    /// returns. Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
 

@@ -2,8 +2,8 @@
 
 use super::bsdf::{BsdfValues, LobeSet, NarrowLobe, ShownLobes, SideSamples, UvRow};
 use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
-use super::frosted::DielectricBxdf;
 use super::microfacet::rotate_toward_viewer;
+use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{

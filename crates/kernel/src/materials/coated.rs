@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use super::bxdfs::Rough;
 use super::footprint::TexturePoint;
 use super::fresnel::dielectric;
-use super::rough::Rough;
 use super::texture::{Color, Texture};
 use crate::math::Vec3;
 

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::conductor::ConductorFresnel;
 use super::footprint::TexturePoint;
-use super::metal::ConductorFresnel;
+use super::lookup::{ParameterLookup, PointLookup, TextureCollector, WhiteLookup};
 use super::texture::{Color, Texture};
 use crate::math::Vec3;
 
@@ -24,8 +25,8 @@ impl Mirror {
         match self {
             Self::Constant(color) => color.at(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => {
-                let own = fresnel.at(at, lookups);
-                tint.map_or(own, |tint| own.tinted(tint)).reflectance(cosine)
+                let fresnel = fresnel.point(&mut PointLookup { point: at, lookups });
+                tint.map_or(fresnel, |tint| fresnel.tinted(tint)).reflectance(cosine)
             }
         }
     }
@@ -34,17 +35,22 @@ impl Mirror {
     pub fn with_white_textures(&self, cosine: f32) -> Vec3 {
         match self {
             Self::Constant(color) => color.constant().unwrap_or(Vec3::ONE),
-            Self::Conductor(fresnel) => fresnel.with_white_textures().reflectance(cosine),
+            Self::Conductor(fresnel) => fresnel.point(&mut WhiteLookup).reflectance(cosine),
         }
     }
 
     /// All textures of the mirror.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let (color, fresnel) = match self {
-            Self::Constant(color) => (color.texture(), None),
-            Self::Conductor(fresnel) => (None, Some(fresnel)),
-        };
-        color.into_iter().chain(fresnel.into_iter().flat_map(ConductorFresnel::textures))
+        let mut textures = TextureCollector::default();
+        match self {
+            Self::Constant(color) => {
+                textures.color(color);
+            }
+            Self::Conductor(fresnel) => {
+                fresnel.point(&mut textures);
+            }
+        }
+        textures.scattering.into_iter()
     }
 }
 

@@ -3,24 +3,26 @@
 pub mod bsdf;
 pub mod bxdf;
 pub mod bxdf_packet;
+pub mod bxdfs;
 pub mod coated;
 pub mod dielectric;
 pub mod emission;
 pub mod footprint;
 pub mod fresnel;
 pub mod lobe_albedo;
+pub mod lookup;
 pub mod microfacet;
 pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
 pub mod normal_perturbation;
 pub mod opacity;
-pub mod rough;
 pub mod scalar;
 pub mod texels;
 pub mod texture;
 pub mod thin_dielectric;
 
+pub use bxdfs::*;
 pub use coated::Coated;
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
@@ -30,11 +32,13 @@ pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use normal_perturbation::{Bump, NormalPerturbation};
 pub use opacity::Opacity;
-pub use rough::*;
 pub use scalar::{Channel, Number, PixelValue};
 pub use thin_dielectric::ThinDielectric;
 
+use std::sync::Arc;
+
 use crate::math::Vec3;
+use texture::Texture;
 
 /// A material that is ready for texture lookups.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,18 +56,7 @@ pub struct Material {
 impl Material {
     /// Whether any material property depends on texture coordinates or tangents.
     pub fn is_textured(&self) -> bool {
-        let in_bsdf = match &self.bsdf {
-            Bsdf::Rough(rough) => rough.has_textures() || rough.has_direction(),
-            Bsdf::Mirror(mirror) => mirror.textures().next().is_some(),
-            Bsdf::Coated(coated) => coated.textures().next().is_some() || coated.base.has_textures(),
-            Bsdf::Dielectric(glass) => glass.roughness.texture().is_some(),
-            Bsdf::ThinDielectric(pane) => pane.tint.texture().is_some(),
-        };
-        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
-        in_bsdf
-            || self.normal_perturbation.is_some()
-            || self.emission.texture.is_some()
-            || of_opacity.is_some()
+        self.normal_perturbation.is_some() || self.bsdf.has_direction() || !self.textures().is_empty()
     }
 
     /// Whether light may pass through the surface undeflected, because the surface is a thin pane or is
@@ -93,23 +86,22 @@ impl Material {
 
     /// Whether any of the textures has mip levels.
     pub fn is_mipmapped(&self) -> bool {
-        let in_bsdf = match &self.bsdf {
-            Bsdf::Rough(rough) => rough.is_mipmapped(),
-            Bsdf::Mirror(mirror) => mirror.textures().any(|texture| texture.mipmaps.is_some()),
-            Bsdf::Coated(coated) => {
-                coated.base.is_mipmapped() || coated.textures().any(|texture| texture.mipmaps.is_some())
-            }
-            Bsdf::Dielectric(glass) => {
-                glass.roughness.texture().is_some_and(|texture| texture.mipmaps.is_some())
-            }
-            Bsdf::ThinDielectric(pane) => {
-                pane.tint.texture().is_some_and(|texture| texture.mipmaps.is_some())
-            }
+        self.textures().iter().any(|texture| texture.mipmaps.is_some())
+    }
+
+    /// All textures except those of a coat over an emitting surface.
+    fn textures(&self) -> Vec<&Arc<Texture>> {
+        let mut textures: Vec<_> = match &self.bsdf {
+            Bsdf::Rough(rough) => rough.textures().collect(),
+            Bsdf::Mirror(mirror) => mirror.textures().collect(),
+            Bsdf::Coated(coated) => coated.textures().chain(coated.base.textures()).collect(),
+            Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
+            Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
         };
-        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
-        let of_relief = self.normal_perturbation.iter().flat_map(NormalPerturbation::textures);
-        let mut others = [self.emission.texture.as_ref(), of_opacity].into_iter().flatten().chain(of_relief);
-        in_bsdf || others.any(|texture| texture.mipmaps.is_some())
+        textures.extend(&self.emission.texture);
+        textures.extend(self.opacity.as_ref().and_then(|opacity| opacity.value.texture()));
+        textures.extend(self.normal_perturbation.iter().flat_map(NormalPerturbation::textures));
+        textures
     }
 }
 
@@ -170,11 +162,7 @@ impl Bsdf {
 
     /// Whether the surface also scatters light to the other side.
     pub fn is_transmissive(&self) -> bool {
-        match self {
-            Self::Rough(rough) => rough.is_transmissive(),
-            Self::Coated(coated) => coated.base.is_transmissive(),
-            Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => false,
-        }
+        self.rough().is_some_and(Rough::is_transmissive)
     }
 
     /// The surface's main color. Counts texture lookups in `lookups`.

@@ -10,7 +10,7 @@ use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::choice;
-use crate::materials::metal::elements::Element;
+use crate::materials::conductor::elements::Element;
 use crate::math::{DVec3, Vec3};
 
 /// The materials defined in a file.

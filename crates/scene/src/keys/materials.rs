@@ -7,7 +7,7 @@ use super::key::ValueKind::{
 use super::key::{TableInfo, TableSyntax, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::description::EmissionSides;
-use crate::materials::metal::elements::Element;
+use crate::materials::conductor::elements::Element;
 
 pub(super) const MATERIALS: TableInfo = TableInfo {
     name: "materials",

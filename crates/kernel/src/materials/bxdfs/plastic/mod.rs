@@ -7,14 +7,13 @@
 mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
 
 use crate::materials::bsdf::{RoughMaterial, RoughPoint};
-use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo, dielectric, under_coat};
+use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::Number;
-use crate::materials::texture::{Color, Texture};
+use crate::materials::texture::Color;
 use crate::math::Vec3;
 pub use bxdf::PlasticBxdf;
 
@@ -65,19 +64,6 @@ impl Plastic {
     fn is_smooth(&self) -> bool {
         self.roughness.constant() == Some(0.0)
     }
-
-    fn point(&self, diffuse: Vec3, specular: Vec3, roughness: f32) -> PlasticPoint {
-        let (albedo, is_smooth) = (self.albedos.at(roughness), self.is_smooth());
-        let (diffuse, specular) = (diffuse.min(Vec3::ONE), specular.min(Vec3::ONE));
-        PlasticPoint {
-            diffuse,
-            base: base(diffuse, self.ior, &albedo),
-            specular: if is_smooth { Vec3::ZERO } else { specular },
-            ior: self.ior,
-            alpha: if is_smooth { 0.0 } else { microfacet::alphas(roughness, 0.0)[0] },
-            albedo,
-        }
-    }
 }
 
 /// Computes f in sr⁻¹ of a base from its kd, for light that passes through the coat in both directions.
@@ -90,46 +76,34 @@ fn base(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
 impl RoughMaterial for Plastic {
     type Point = PlasticPoint;
 
-    #[inline]
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PlasticPoint {
-        let (diffuse, specular) = (self.diffuse.at(at, lookups), self.specular.at(at, lookups));
-        self.point(diffuse, specular, self.roughness.at(at, lookups))
-    }
-
-    fn with_white_textures(&self) -> PlasticPoint {
-        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
-        let roughness = self.roughness.constant().unwrap_or(1.0);
-        self.point(with_white_textures(&self.diffuse), with_white_textures(&self.specular), roughness)
-    }
-
-    #[inline]
-    fn constant(&self) -> Option<PlasticPoint> {
-        Some(self.point(self.diffuse.constant()?, self.specular.constant()?, self.roughness.constant()?))
-    }
-
-    #[inline]
-    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.diffuse.at(at, lookups)
-    }
-
-    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.diffuse.at(at, lookups)
-    }
-
-    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let colors = [&self.diffuse, &self.specular].into_iter().filter_map(Color::texture);
-        colors.chain(self.roughness.texture())
+    #[inline(always)]
+    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PlasticPoint {
+        let diffuse = lookup.color(&self.diffuse).min(Vec3::ONE);
+        let specular = lookup.color(&self.specular).min(Vec3::ONE);
+        let roughness = lookup.number(&self.roughness);
+        let (albedo, is_smooth) = (self.albedos.at(roughness), self.is_smooth());
+        PlasticPoint {
+            diffuse,
+            base: base(diffuse, self.ior, &albedo),
+            specular: if is_smooth { Vec3::ZERO } else { specular },
+            ior: self.ior,
+            alpha: if is_smooth { 0.0 } else { microfacet::alphas(roughness, 0.0)[0] },
+            albedo,
+        }
     }
 
     #[inline]
-    fn supports_packets(&self) -> bool {
-        let has_no_levels = self.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
-        has_no_levels && self.specular.texture().is_none() && self.roughness.texture().is_none()
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.color(&self.diffuse)
+    }
+
+    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.color(&self.diffuse)
     }
 
     #[inline]
-    fn row_texture(&self) -> Option<&Texture> {
-        self.diffuse.texture().map(|texture| &**texture)
+    fn packet_color(&self) -> Option<&Color> {
+        Some(&self.diffuse)
     }
 }
 

@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::rough::lobe_tests::{
+use crate::materials::lookup::WhiteLookup;
+use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, LitFrom, Subject, check_neighbors, check_neighbors_lit, check_values, direction,
     reference,
 };
@@ -29,7 +30,7 @@ fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat:
 }
 
 fn point(principled: &Principled) -> PrincipledPoint {
-    principled.constant().expect("there should be no textures")
+    principled.point(&mut WhiteLookup)
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);

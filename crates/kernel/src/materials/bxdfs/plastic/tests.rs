@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::rough::lobe_tests::{
+use crate::materials::lookup::WhiteLookup;
+use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
 };
 use crate::math::DVec3;
@@ -13,7 +14,7 @@ fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
 }
 
 fn point(plastic: &Plastic) -> PlasticPoint {
-    plastic.constant().expect("there should be no textures")
+    plastic.point(&mut WhiteLookup)
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);

@@ -19,6 +19,7 @@ use std::sync::{Arc, LazyLock};
 use crate::materials::bsdf::{RoughMaterial, RoughPoint};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo};
+use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
@@ -180,25 +181,7 @@ fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     [normal, AlbedoTable::new(roughness, alpha, weight)]
 }
 
-/// The parameters of a principled material at a point.
-#[derive(Clone, Copy)]
-struct PointInputs {
-    color: Vec3,
-    metallic: f32,
-    roughness: f32,
-    specular: f32,
-    specular_color: Vec3,
-    transmission: f32,
-    clearcoat: f32,
-    clearcoat_roughness: f32,
-}
-
 impl Principled {
-    /// Whether the material may transmit light.
-    pub fn is_transmissive(&self) -> bool {
-        self.inputs.transmission.constant() != Some(0.0)
-    }
-
     /// Creates a material from its parameters.
     pub fn new(inputs: PrincipledInputs) -> Self {
         let has_coat = inputs.clearcoat.constant() != Some(0.0);
@@ -208,20 +191,27 @@ impl Principled {
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
+}
 
-    fn point(&self, inputs: &PointInputs) -> PrincipledPoint {
-        let unit = |number: f32| number.clamp(0.0, 1.0);
-        let (color, metallic) = (inputs.color.min(Vec3::ONE), unit(inputs.metallic));
-        let specular = unit(inputs.specular);
-        let ior = self.inputs.ior;
-        let ratio = (ior - 1.0) / (ior + 1.0);
-        let reflectance = (inputs.specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
+impl RoughMaterial for Principled {
+    type Point = PrincipledPoint;
+
+    #[inline]
+    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PrincipledPoint {
+        let inputs = &self.inputs;
+        let mut unit = |number: &'m Number| lookup.number(number).clamp(0.0, 1.0);
+        let (metallic, roughness) = (unit(&inputs.metallic), unit(&inputs.roughness));
+        let (specular, through) = (unit(&inputs.specular), unit(&inputs.transmission));
+        let (coat, coat_roughness) = (unit(&inputs.clearcoat), unit(&inputs.clearcoat_roughness));
+        let color = lookup.color(&inputs.color).min(Vec3::ONE);
+        let ratio = (inputs.ior - 1.0) / (inputs.ior + 1.0);
+        let specular_color = lookup.color(&inputs.specular_color);
+        let reflectance = (specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
         let [specular_albedo, coat_albedo] = self.albedos;
-        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::between(unit(inputs.roughness)));
-        let of_coat = || SchlickAlbedo::between(unit(inputs.clearcoat_roughness));
+        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::between(roughness));
+        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedo::between(coat_roughness));
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
         let below = color * (1.0 - metallic);
-        let through = unit(inputs.transmission);
         let diffuse = below * (1.0 - through);
         PrincipledPoint {
             base: diffuse * FRAC_1_PI / (Vec3::ONE - mean).max(Vec3::splat(1e-3)),
@@ -230,90 +220,29 @@ impl Principled {
             grazing: specular + (1.0 - specular) * metallic,
             dielectric: (reflectance, specular),
             transmission: below * through,
-            alpha: microfacet::alphas(unit(inputs.roughness), 0.0)[0],
+            alpha: microfacet::alphas(roughness, 0.0)[0],
             albedo,
-            coat: unit(inputs.clearcoat),
-            coat_alpha: microfacet::alphas(unit(inputs.clearcoat_roughness), 0.0)[0],
-            coat_albedo: coat_albedo.unwrap_or_else(of_coat).of_coat(COAT_REFLECTANCE),
+            coat,
+            coat_alpha: microfacet::alphas(coat_roughness, 0.0)[0],
+            coat_albedo: coat_albedo.of_coat(COAT_REFLECTANCE),
             ambient: diffuse,
         }
     }
-}
-
-impl RoughMaterial for Principled {
-    type Point = PrincipledPoint;
 
     #[inline]
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PrincipledPoint {
-        let inputs = PointInputs {
-            color: self.inputs.color.at(at, lookups),
-            metallic: self.inputs.metallic.at(at, lookups),
-            roughness: self.inputs.roughness.at(at, lookups),
-            specular: self.inputs.specular.at(at, lookups),
-            specular_color: self.inputs.specular_color.at(at, lookups),
-            transmission: self.inputs.transmission.at(at, lookups),
-            clearcoat: self.inputs.clearcoat.at(at, lookups),
-            clearcoat_roughness: self.inputs.clearcoat_roughness.at(at, lookups),
-        };
-        self.point(&inputs)
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.color(&self.inputs.color)
     }
 
-    fn with_white_textures(&self) -> PrincipledPoint {
-        let color = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
-        let number = |number: &Number| number.constant().unwrap_or(1.0);
-        self.point(&PointInputs {
-            color: color(&self.inputs.color),
-            metallic: number(&self.inputs.metallic),
-            roughness: number(&self.inputs.roughness),
-            specular: number(&self.inputs.specular),
-            specular_color: color(&self.inputs.specular_color),
-            transmission: number(&self.inputs.transmission),
-            clearcoat: number(&self.inputs.clearcoat),
-            clearcoat_roughness: number(&self.inputs.clearcoat_roughness),
-        })
+    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        let PrincipledInputs { color, metallic, transmission, .. } = &self.inputs;
+        let [metallic, transmission] =
+            [metallic, transmission].map(|number| lookup.number(number).clamp(0.0, 1.0));
+        lookup.color(color) * (1.0 - metallic) * (1.0 - transmission)
     }
 
-    fn constant(&self) -> Option<PrincipledPoint> {
-        Some(self.point(&PointInputs {
-            color: self.inputs.color.constant()?,
-            metallic: self.inputs.metallic.constant()?,
-            roughness: self.inputs.roughness.constant()?,
-            specular: self.inputs.specular.constant()?,
-            specular_color: self.inputs.specular_color.constant()?,
-            transmission: self.inputs.transmission.constant()?,
-            clearcoat: self.inputs.clearcoat.constant()?,
-            clearcoat_roughness: self.inputs.clearcoat_roughness.constant()?,
-        }))
-    }
-
-    #[inline]
-    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.inputs.color.at(at, lookups)
-    }
-
-    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        let [metallic, transmission] = [&self.inputs.metallic, &self.inputs.transmission]
-            .map(|number| number.at(at, lookups).clamp(0.0, 1.0));
-        self.inputs.color.at(at, lookups) * (1.0 - metallic) * (1.0 - transmission)
-    }
-
-    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let PrincipledInputs { color, metallic, roughness, specular, specular_color, .. } = &self.inputs;
-        let PrincipledInputs { ior: _, transmission, clearcoat, clearcoat_roughness, .. } = &self.inputs;
-        let numbers = [metallic, roughness, specular, transmission, clearcoat, clearcoat_roughness];
-        let colors = [color, specular_color].into_iter().filter_map(Color::texture);
-        colors.chain(numbers.into_iter().filter_map(Number::texture))
-    }
-
-    #[inline]
-    fn supports_packets(&self) -> bool {
-        // Packets are lit from only one side.
-        !self.is_transmissive() && self.textures().next().is_none()
-    }
-
-    #[inline]
-    fn row_texture(&self) -> Option<&Texture> {
-        None
+    fn is_transmissive(&self) -> bool {
+        self.inputs.transmission.constant() != Some(0.0)
     }
 }
 

@@ -5,7 +5,7 @@ use super::elements::Element;
 use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::rough::lobe_tests::{
+use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
 };
 use crate::math::DVec3;

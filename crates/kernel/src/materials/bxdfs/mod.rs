@@ -1,18 +1,20 @@
 //! The table of non-specular BSDFs, and enums over all of them for materials, points, and packets.
 
-pub mod frosted;
+pub mod conductor;
 #[cfg(test)]
 mod lobe_tests;
-pub mod metal;
 pub mod phong;
 pub mod plastic;
 pub mod principled;
+pub mod rough_dielectric;
 
-pub use frosted::GlassPoint;
-pub use metal::{Conductor, ConductorFresnel};
+pub use conductor::{Conductor, ConductorFresnel};
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
+pub use rough_dielectric::GlassPoint;
+
+use std::sync::Arc;
 
 use crate::materials::bsdf::{
     BsdfValues, LobeSet, NarrowLobe, RoughMaterial, RoughPoint, ShownLobes, SideSamples, UvRow,
@@ -20,14 +22,15 @@ use crate::materials::bsdf::{
 use crate::materials::bxdf::{Bxdf, SurfaceDirections, facing_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
-use crate::materials::texture::Texture;
+use crate::materials::lookup::{PointLookup, TextureCollector, WhiteLookup};
+use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
-use frosted::DielectricBxdf;
-use metal::ConductorBxdf;
+use conductor::ConductorBxdf;
 use phong::PhongBxdf;
 use plastic::PlasticBxdf;
 use principled::PrincipledBxdf;
+use rough_dielectric::DielectricBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for part of their
@@ -71,63 +74,55 @@ macro_rules! kinds {
                 match self { $(Self::$kind(_) => RoughKind::$kind),+ }
             }
 
-            /// [`RoughMaterial::at`].
+            /// Looks up the textures at a point. Counts texture lookups in `lookups`.
             #[inline(always)]
-            pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> RoughBsdf {
-                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.at(at, lookups))),+ }
+            pub fn at(&self, point: &TexturePoint, lookups: &mut u64) -> RoughBsdf {
+                let lookup = &mut PointLookup { point, lookups };
+                match self { $(Self::$kind(material) => RoughBsdf::$kind(material.point(lookup))),+ }
             }
 
-            /// [`RoughMaterial::with_white_textures`].
+            /// The material with white textures.
             #[inline]
             pub fn with_white_textures(&self) -> RoughBsdf {
-                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.with_white_textures())),+ }
+                match self { $(Self::$kind(material) => RoughBsdf::$kind(material.point(&mut WhiteLookup))),+ }
             }
 
-            /// [`RoughMaterial::constant`].
+            /// The material's main color. Counts texture lookups in `lookups`.
             #[inline]
-            pub fn constant(&self) -> Option<RoughBsdf> {
-                match self { $(Self::$kind(own) => own.constant().map(RoughBsdf::$kind)),+ }
+            pub fn albedo(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
+                let lookup = &mut PointLookup { point, lookups };
+                match self { $(Self::$kind(material) => material.albedo(lookup)),+ }
             }
 
-            /// [`RoughMaterial::albedo`].
+            /// Reflectance for ambient light. Counts texture lookups in `lookups`.
             #[inline]
-            pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-                match self { $(Self::$kind(own) => own.albedo(at, lookups)),+ }
+            pub fn ambient_at(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
+                let lookup = &mut PointLookup { point, lookups };
+                match self { $(Self::$kind(material) => material.ambient(lookup)),+ }
             }
 
-            /// [`RoughMaterial::ambient_at`].
+            /// All textures, by use.
+            fn collect_textures(&self) -> TextureCollector<'_> {
+                let mut textures = TextureCollector::default();
+                match self { $(Self::$kind(material) => { material.point(&mut textures); }),+ }
+                textures
+            }
+
+            /// [`RoughMaterial::packet_color`].
             #[inline]
-            pub fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-                match self { $(Self::$kind(own) => own.ambient_at(at, lookups)),+ }
-            }
-
-            /// Whether any of the textures has mip levels.
-            pub fn is_mipmapped(&self) -> bool {
-                match self { $(Self::$kind(own) => own.textures().any(|texture| texture.mipmaps.is_some())),+ }
-            }
-
-            /// Whether there are any textures.
-            #[inline]
-            pub fn has_textures(&self) -> bool {
-                match self { $(Self::$kind(own) => own.textures().next().is_some()),+ }
-            }
-
-            /// [`RoughMaterial::supports_packets`].
-            #[inline]
-            pub fn supports_packets(&self) -> bool {
-                match self { $(Self::$kind(own) => own.supports_packets()),+ }
+            fn packet_color(&self) -> Option<&Color> {
+                match self { $(Self::$kind(material) => material.packet_color()),+ }
             }
 
             /// [`RoughMaterial::has_direction`].
             #[inline]
             pub fn has_direction(&self) -> bool {
-                match self { $(Self::$kind(own) => own.has_direction()),+ }
+                match self { $(Self::$kind(material) => material.has_direction()),+ }
             }
 
-            /// [`RoughMaterial::row_texture`].
-            #[inline]
-            pub fn row_texture(&self) -> Option<&Texture> {
-                match self { $(Self::$kind(own) => own.row_texture()),+ }
+            /// [`RoughMaterial::is_transmissive`].
+            pub fn is_transmissive(&self) -> bool {
+                match self { $(Self::$kind(material) => material.is_transmissive()),+ }
             }
         }
 
@@ -243,8 +238,9 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> u32 {
                 $(if let (Self::$kind(row), Rough::$kind(material)) = (&mut *self, material) {
-                    let point = material.constant().unwrap_or_else(|| material.with_white_textures());
-                    return row.fill(&point, material.row_texture().zip(uv), shown, simd);
+                    let point = material.point(&mut WhiteLookup);
+                    let texture = material.packet_color().and_then(Color::texture);
+                    return row.fill(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0
             }
@@ -391,12 +387,32 @@ kinds! {
 }
 
 impl Rough {
-    /// Whether the material may scatter light to the other side.
-    pub fn is_transmissive(&self) -> bool {
-        match self {
-            Self::Principled(principled) => principled.is_transmissive(),
-            Self::Phong(_) | Self::Conductor(_) | Self::BrushedConductor(_) | Self::Plastic(_) => false,
-        }
+    /// All textures.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let TextureCollector { scattering, ambient } = self.collect_textures();
+        scattering.into_iter().chain(ambient)
+    }
+
+    /// The BSDF, if the material has no textures.
+    pub fn constant(&self) -> Option<RoughBsdf> {
+        self.textures().next().is_none().then(|| self.with_white_textures())
+    }
+
+    /// Whether packets can be filled with the material by looking up at most one texture,
+    /// [`Rough::row_texture`].
+    pub fn supports_packets(&self) -> bool {
+        let color = self.row_texture();
+        // Packets are lit from only one side.
+        !self.has_direction()
+            && !self.is_transmissive()
+            && color.is_none_or(|color| color.mipmaps.is_none())
+            && self.collect_textures().scattering.len() == usize::from(color.is_some())
+    }
+
+    /// The texture that packets look up. `None` if there is no such texture.
+    #[inline]
+    pub fn row_texture(&self) -> Option<&Texture> {
+        self.packet_color()?.texture().map(|texture| &**texture)
     }
 }
 

@@ -5,11 +5,10 @@ mod bxdf;
 pub mod lobes;
 
 use std::f32::consts::{FRAC_1_PI, PI};
-use std::sync::Arc;
 
 use crate::materials::bsdf::{RoughMaterial, RoughPoint};
-use crate::materials::footprint::TexturePoint;
-use crate::materials::texture::{Color, Texture};
+use crate::materials::lookup::ParameterLookup;
+use crate::materials::texture::Color;
 use crate::math::Vec3;
 pub use bxdf::PhongBxdf;
 use lobes::{Lobes, gloss};
@@ -43,61 +42,29 @@ pub struct PhongBsdf {
 impl RoughMaterial for Phong {
     type Point = PhongBsdf;
 
-    #[inline]
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
-        let diffuse = self.diffuse.at(at, lookups);
+    #[inline(always)]
+    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PhongBsdf {
+        let diffuse = lookup.color(&self.diffuse);
         PhongBsdf {
             diffuse,
-            specular: self.specular.at(at, lookups),
+            specular: lookup.color(&self.specular),
             shininess: self.shininess,
-            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| ambient.at(at, lookups)),
-        }
-    }
-
-    fn with_white_textures(&self) -> PhongBsdf {
-        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
-        PhongBsdf {
-            diffuse: with_white_textures(&self.diffuse),
-            specular: with_white_textures(&self.specular),
-            shininess: self.shininess,
-            ambient: with_white_textures(self.ambient.as_ref().unwrap_or(&self.diffuse)),
+            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| lookup.ambient(ambient)),
         }
     }
 
     #[inline]
-    fn constant(&self) -> Option<PhongBsdf> {
-        let diffuse = self.diffuse.constant()?;
-        Some(PhongBsdf {
-            diffuse,
-            specular: self.specular.constant()?,
-            shininess: self.shininess,
-            ambient: self.ambient.as_ref().map_or(Some(diffuse), Color::constant)?,
-        })
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.color(&self.diffuse)
+    }
+
+    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.ambient(self.ambient.as_ref().unwrap_or(&self.diffuse))
     }
 
     #[inline]
-    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.diffuse.at(at, lookups)
-    }
-
-    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.ambient.as_ref().unwrap_or(&self.diffuse).at(at, lookups)
-    }
-
-    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let Self { diffuse, specular, shininess: _, ambient } = self;
-        [Some(diffuse), Some(specular), ambient.as_ref()].into_iter().flatten().filter_map(Color::texture)
-    }
-
-    #[inline]
-    fn supports_packets(&self) -> bool {
-        let has_no_levels = self.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
-        has_no_levels && self.specular.texture().is_none()
-    }
-
-    #[inline]
-    fn row_texture(&self) -> Option<&Texture> {
-        self.diffuse.texture().map(|texture| &**texture)
+    fn packet_color(&self) -> Option<&Color> {
+        Some(&self.diffuse)
     }
 }
 

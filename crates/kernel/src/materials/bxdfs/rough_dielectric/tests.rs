@@ -4,10 +4,10 @@ use super::*;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::bxdf::Bxdf;
 use crate::materials::bxdf_packet::BxdfPacket;
-use crate::materials::fresnel::dielectric;
-use crate::materials::rough::lobe_tests::{
+use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbors, check_neighbors_lit, direction, reference,
 };
+use crate::materials::fresnel::dielectric;
 use crate::math::DVec3;
 use crate::math::random::unit as random;
 

@@ -3,14 +3,12 @@
 mod bxdf;
 pub mod elements;
 
-use std::sync::Arc;
-
 use crate::materials::bsdf::{RoughMaterial, RoughPoint};
-use crate::materials::footprint::TexturePoint;
 use crate::materials::fresnel::{conductor, schlick_weight};
+use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::Number;
-use crate::materials::texture::{Color, Texture};
+use crate::materials::texture::Color;
 use crate::math::Vec3;
 pub use bxdf::ConductorBxdf;
 
@@ -58,40 +56,13 @@ pub struct ConductorPoint {
 }
 
 impl ConductorFresnel {
-    /// Looks up the textures and returns the reflectance at a single point. Counts texture lookups in
-    /// `lookups`.
+    /// The reflectance at a single point.
     #[inline]
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
+    pub fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> FresnelPoint {
         match self {
-            Self::Schlick(color) => FresnelPoint::schlick(color.at(at, lookups)),
-            Self::Index { eta, k } => FresnelPoint::index(eta.at(at, lookups), k.at(at, lookups)),
+            Self::Schlick(color) => FresnelPoint::schlick(lookup.color(color)),
+            Self::Index { eta, k } => FresnelPoint::index(lookup.color(eta), lookup.color(k)),
         }
-    }
-
-    /// The conductor with all textures replaced by white ones.
-    pub fn with_white_textures(&self) -> FresnelPoint {
-        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
-        match self {
-            Self::Schlick(color) => FresnelPoint::schlick(with_white_textures(color)),
-            Self::Index { eta, k } => FresnelPoint::index(with_white_textures(eta), with_white_textures(k)),
-        }
-    }
-
-    /// The conductor's values if it has no textures.
-    pub fn constant(&self) -> Option<FresnelPoint> {
-        match self {
-            Self::Schlick(color) => color.constant().map(FresnelPoint::schlick),
-            Self::Index { eta, k } => Some(FresnelPoint::index(eta.constant()?, k.constant()?)),
-        }
-    }
-
-    /// All textures of the conductor.
-    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let colors = match self {
-            Self::Schlick(color) => [Some(color), None],
-            Self::Index { eta, k } => [Some(eta), Some(k)],
-        };
-        colors.into_iter().flatten().filter_map(Color::texture)
     }
 }
 
@@ -133,52 +104,18 @@ impl RoughMaterial for Conductor {
     type Point = ConductorPoint;
 
     #[inline]
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> ConductorPoint {
-        let roughness = self.roughness.at(at, lookups);
-        let anisotropy = self.anisotropy.at(at, lookups);
+    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> ConductorPoint {
+        let roughness = lookup.number(&self.roughness);
+        let anisotropy = lookup.signed(&self.anisotropy).clamp(-1.0, 1.0);
         ConductorPoint {
-            fresnel: self.fresnel.at(at, lookups),
-            alphas: microfacet::alphas(roughness, anisotropy.clamp(-1.0, 1.0)),
-        }
-    }
-
-    fn with_white_textures(&self) -> ConductorPoint {
-        let roughness = self.roughness.constant().unwrap_or(1.0);
-        let anisotropy = self.anisotropy.constant().unwrap_or(0.0);
-        ConductorPoint {
-            fresnel: self.fresnel.with_white_textures(),
+            fresnel: self.fresnel.point(lookup),
             alphas: microfacet::alphas(roughness, anisotropy),
         }
     }
 
     #[inline]
-    fn constant(&self) -> Option<ConductorPoint> {
-        let alphas = microfacet::alphas(self.roughness.constant()?, self.anisotropy.constant()?);
-        Some(ConductorPoint { fresnel: self.fresnel.constant()?, alphas })
-    }
-
-    #[inline]
-    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.fresnel.at(at, lookups).reflectance(1.0)
-    }
-
-    fn ambient_at(&self, _: &TexturePoint, _: &mut u64) -> Vec3 {
-        Vec3::ZERO
-    }
-
-    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let numbers = [&self.roughness, &self.anisotropy].into_iter().filter_map(Number::texture);
-        self.fresnel.textures().chain(numbers)
-    }
-
-    #[inline]
-    fn supports_packets(&self) -> bool {
-        !self.has_direction() && self.constant().is_some()
-    }
-
-    #[inline]
-    fn row_texture(&self) -> Option<&Texture> {
-        None
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.fresnel.point(lookup).reflectance(1.0)
     }
 
     #[inline]

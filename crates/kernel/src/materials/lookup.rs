@@ -1,0 +1,103 @@
+//! Sources of parameter values. A material lists its parameters once, in [`RoughMaterial::point`], for
+//! texture lookups, for renders with white textures, and for finding the textures that it uses.
+//!
+//! [`RoughMaterial::point`]: super::bsdf::RoughMaterial::point
+
+use std::sync::Arc;
+
+use super::footprint::TexturePoint;
+use super::scalar::Number;
+use super::texture::{Color, Texture};
+use crate::math::Vec3;
+
+/// A source of parameter values for materials that live for `'m`.
+pub trait ParameterLookup<'m> {
+    /// The value of a color.
+    fn color(&mut self, color: &'m Color) -> Vec3;
+
+    /// The value of a number.
+    fn number(&mut self, number: &'m Number) -> f32;
+
+    /// The value of a number whose neutral value is 0 instead of 1.
+    #[inline(always)]
+    fn signed(&mut self, number: &'m Number) -> f32 {
+        self.number(number)
+    }
+
+    /// The value of a color that is used only for ambient light.
+    #[inline(always)]
+    fn ambient(&mut self, color: &'m Color) -> Vec3 {
+        self.color(color)
+    }
+}
+
+/// Looks up textures at a point.
+pub struct PointLookup<'a> {
+    /// The point.
+    pub point: &'a TexturePoint,
+    /// Counts texture lookups.
+    pub lookups: &'a mut u64,
+}
+
+impl ParameterLookup<'_> for PointLookup<'_> {
+    #[inline(always)]
+    fn color(&mut self, color: &Color) -> Vec3 {
+        color.at(self.point, self.lookups)
+    }
+
+    #[inline(always)]
+    fn number(&mut self, number: &Number) -> f32 {
+        number.at(self.point, self.lookups)
+    }
+}
+
+/// Replaces textures with white ones. Anisotropy is an exception: its textures are replaced with 0.
+pub struct WhiteLookup;
+
+impl ParameterLookup<'_> for WhiteLookup {
+    #[inline(always)]
+    fn color(&mut self, color: &Color) -> Vec3 {
+        color.constant().unwrap_or(Vec3::ONE)
+    }
+
+    #[inline(always)]
+    fn number(&mut self, number: &Number) -> f32 {
+        number.constant().unwrap_or(1.0)
+    }
+
+    #[inline(always)]
+    fn signed(&mut self, number: &Number) -> f32 {
+        number.constant().unwrap_or(0.0)
+    }
+}
+
+/// Collects a material's textures. The values are those of [`WhiteLookup`].
+#[derive(Default)]
+pub struct TextureCollector<'m> {
+    /// Textures of parameters that affect how the surface scatters light.
+    pub scattering: Vec<&'m Arc<Texture>>,
+    /// Textures that are used only for ambient light.
+    pub ambient: Vec<&'m Arc<Texture>>,
+}
+
+impl<'m> ParameterLookup<'m> for TextureCollector<'m> {
+    fn color(&mut self, color: &'m Color) -> Vec3 {
+        self.scattering.extend(color.texture());
+        WhiteLookup.color(color)
+    }
+
+    fn number(&mut self, number: &'m Number) -> f32 {
+        self.scattering.extend(number.texture());
+        WhiteLookup.number(number)
+    }
+
+    fn signed(&mut self, number: &'m Number) -> f32 {
+        self.scattering.extend(number.texture());
+        WhiteLookup.signed(number)
+    }
+
+    fn ambient(&mut self, color: &'m Color) -> Vec3 {
+        self.ambient.extend(color.texture());
+        WhiteLookup.color(color)
+    }
+}
