@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use glimt::system::abort::Allocator;
+use glimt::system::abort::AbortingAllocator;
 
 #[global_allocator]
-static ALLOCATOR: Allocator = Allocator;
+static ALLOCATOR: AbortingAllocator = AbortingAllocator;
 
 fn main() -> ExitCode {
     glimt::cli::run(std::env::args_os()).into()

@@ -21,13 +21,16 @@ pub fn compare(tree: &WideBvh, mesh: &TriangleMesh, rays: &Path, answers: &Path)
     } else {
         let occluded: Vec<bool> = std::fs::read(answers)?.iter().map(|&byte| byte != 0).collect();
         let pairs = rays_read.iter().zip(&occluded);
-        report(mesh, pairs.filter(|(ray, occluded)| tree.any(ray, None) != **occluded).map(|(ray, _)| ray));
+        report(
+            mesh,
+            pairs.filter(|(ray, occluded)| tree.any_hit(ray, None) != **occluded).map(|(ray, _)| ray),
+        );
     }
     Ok(())
 }
 
 fn closest(tree: &WideBvh, mesh: &TriangleMesh, rays: &[Ray], answers: &[Option<(f32, u32)>]) {
-    let found: Vec<_> = rays.iter().map(|ray| tree.closest(ray)).collect();
+    let found: Vec<_> = rays.iter().map(|ray| tree.closest_hit(ray)).collect();
     let pairs = || rays.iter().zip(&found).zip(answers);
     report(
         mesh,

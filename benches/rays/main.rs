@@ -120,7 +120,8 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
     let quality = if options.high { Quality::High } else { Quality::Medium };
     let build = || {
         let corners = |id| mesh.corners(id);
-        WideBvh::build_with(quality, count, corners, &CancelToken::new()).expect("the token is not cancelled")
+        WideBvh::build_with_quality(quality, count, corners, &CancelToken::new())
+            .expect("the token is not cancelled")
     };
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
@@ -159,12 +160,12 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
         kd_tree(mesh, &rays);
     }
     for instructions in InstructionSet::ALL {
-        if instructions.available() != instructions
+        if instructions.or_best_supported() != instructions
             || options.instructions.is_some_and(|only| only != instructions)
         {
             continue;
         }
-        tree = tree.with(instructions);
+        tree = tree.with_instruction_set(instructions);
         println!("  {instructions:?}, single rays");
         closest("primary", &tree, scene.as_ref(), &rays.primary);
         closest("diffuse", &tree, scene.as_ref(), &rays.diffuse);
@@ -190,16 +191,16 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
 fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit: bool) {
     let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
     let mut single = |rays: &[Ray]| match any_hit {
-        true => rays.iter().filter(|ray| tree.any(ray, None)).count(),
-        false => rays.iter().filter(|ray| tree.closest(ray).is_some()).count(),
+        true => rays.iter().filter(|ray| tree.any_hit(ray, None)).count(),
+        false => rays.iter().filter(|ray| tree.closest_hit(ray).is_some()).count(),
     };
     let mut packets = |rays: &[Ray]| {
         let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
             if any_hit {
-                return tree.any_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
+                return tree.any_hit_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
             }
-            tree.closest_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
+            tree.closest_hit_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
         rays.chunks(PACKET_SIZE).map(&mut found).sum()
@@ -235,24 +236,24 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
         }
         rays.len() as f64 / best / 1e6
     };
-    println!("  {:?}, {threads} threads: packets, single diffuse rays", tree.instructions());
+    println!("  {:?}, {threads} threads: packets, single diffuse rays", tree.instruction_set());
     let closest = |rays: &[Ray]| {
         let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
-            tree.closest_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
+            tree.closest_hit_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
         rays.chunks(PACKET_SIZE).map(&mut found).sum()
     };
     let any = |rays: &[Ray]| {
-        let found = |some: &[Ray]| tree.any_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
+        let found = |some: &[Ray]| tree.any_hit_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
         rays.chunks(PACKET_SIZE).map(found).sum()
     };
     line("primary", "Mrays/s", chunks(&rays.primary, &closest), None);
     line(
         "diffuse",
         "Mrays/s",
-        chunks(&rays.diffuse, &|rays| rays.iter().filter_map(|ray| tree.closest(ray)).count()),
+        chunks(&rays.diffuse, &|rays| rays.iter().filter_map(|ray| tree.closest_hit(ray)).count()),
         None,
     );
     line("shadow", "Mrays/s", chunks(&rays.shadow, &any), None);
@@ -275,8 +276,8 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     println!("  kd-tree, single rays; a random line visits {nodes:.2} nodes and {triangles:.2} triangles");
     line("build", "s", best, None);
     line("memory", "MB", tree.memory_bytes() as f64 / 1e6, None);
-    let mut closest = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest(ray).is_some()).count();
-    let mut any = |rays: &[Ray]| rays.iter().filter(|ray| tree.any(ray, None)).count();
+    let mut closest = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest_hit(ray).is_some()).count();
+    let mut any = |rays: &[Ray]| rays.iter().filter(|ray| tree.any_hit(ray, None)).count();
     line("primary", "Mrays/s", rates(&rays.primary, [&mut closest])[0], None);
     line("diffuse", "Mrays/s", rates(&rays.diffuse, [&mut closest])[0], None);
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
@@ -291,7 +292,7 @@ fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
 }
 
 fn closest(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]) {
-    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest(ray).is_some()).count();
+    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest_hit(ray).is_some()).count();
     match scene {
         None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
         Some(scene) => {
@@ -303,7 +304,7 @@ fn closest(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[
 }
 
 fn any(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]) {
-    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.any(ray, None)).count();
+    let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.any_hit(ray, None)).count();
     match scene {
         None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
         Some(scene) => {
@@ -320,17 +321,17 @@ fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays)
         let mut found = 0;
         let mut hits = [None; PACKET_SIZE];
         for sixteen in rays.chunks(PACKET_SIZE) {
-            tree.closest_packet(sixteen, &packet_t_max(sixteen), &mut hits[..sixteen.len()]);
+            tree.closest_hit_packet(sixteen, &packet_t_max(sixteen), &mut hits[..sixteen.len()]);
             found += hits.iter().filter(|hit| hit.is_some()).count();
         }
         found
     };
     let mut any = |rays: &[Ray]| {
         let found =
-            |sixteen: &[Ray]| tree.any_packet(sixteen, &packet_t_max(sixteen), &[]).count_ones() as usize;
+            |sixteen: &[Ray]| tree.any_hit_packet(sixteen, &packet_t_max(sixteen), &[]).count_ones() as usize;
         rays.chunks(PACKET_SIZE).map(found).sum()
     };
-    println!("  {:?}, packets of {PACKET_SIZE}", tree.instructions());
+    println!("  {:?}, packets of {PACKET_SIZE}", tree.instruction_set());
     if let Some(scene) = scene {
         let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
         let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);

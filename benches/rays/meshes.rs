@@ -95,7 +95,7 @@ pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
         let place = Vec2::new(x as f32, y as f32) / SIDE as f32 - Vec2::splat(0.5);
         let ray = Ray::new(eye, (frame.n + frame.s * place.x + frame.t * place.y).normalize());
         rays.primary.push(ray);
-        let Some(hit) = tree.closest(&ray) else { continue };
+        let Some(hit) = tree.closest_hit(&ray) else { continue };
         let [a, b, c] = mesh.corners(hit.primitive);
         let normal = (b - a).cross(c - a).normalize();
         let normal = if normal.dot(ray.direction) < 0.0 { normal } else { -normal };

@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use glimt::film::Picture;
+use glimt::film::Srgb8Image;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_to_linear;
 use glimt::tui::{ColorDepth, PreviewChoice, draw_for_dark_xterm, filled_squares, xterm_rgb};
@@ -104,11 +104,11 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
 /// Returns the sharp and blurred errors of the cells that `draw` produces for an image, excluding a border.
 fn errors(
     file: &Path,
-    draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
+    draw: impl Fn(&Srgb8Image, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
 ) -> Result<Option<[f32; 2]>, Box<dyn Error>> {
     let image = image::open(file)?.to_rgb8();
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
-    let picture = Picture { width: image.width(), height: image.height(), pixels };
+    let picture = Srgb8Image { width: image.width(), height: image.height(), pixels };
     let place =
         place(&draw_for_dark_xterm(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
     let Some(buffer) = draw(&picture, place)? else { return Ok(None) };
@@ -212,7 +212,7 @@ impl LinearImage {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
 
-    fn of_picture(picture: &Picture, width: usize, height: usize) -> Self {
+    fn of_picture(picture: &Srgb8Image, width: usize, height: usize) -> Self {
         let linear = picture.pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
         let image =
             glimt::film::RadianceImage { width: picture.width, height: picture.height, pixels: linear };

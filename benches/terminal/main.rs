@@ -21,7 +21,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use glimt::film::Picture;
+use glimt::film::Srgb8Image;
 use glimt::pipeline::protocol::PreviewSize;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{Fidelity, FrameTiming, PacingAdvice, Painter, advise};
@@ -134,7 +134,7 @@ struct Window {
     painter: Painter,
     plain: PlainRatatui,
     /// Image on the screen.
-    last: Option<Picture>,
+    last: Option<Srgb8Image>,
 }
 
 impl Window {
@@ -224,25 +224,25 @@ impl Window {
     }
 
     /// Bytes required to draw an image on a screen with unknown contents.
-    fn exact(&self, picture: &Picture) -> usize {
+    fn exact(&self, picture: &Srgb8Image) -> usize {
         let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
         painter.set_target(&buffer, place, Fidelity::Still);
         drain(&mut painter)
     }
 
-    fn others(&self, picture: &Picture) -> Result<(usize, Option<usize>), Box<dyn Error>> {
+    fn others(&self, picture: &Srgb8Image) -> Result<(usize, Option<usize>), Box<dyn Error>> {
         Ok((PlainRatatui::new(self.area).draw(&self.cells(picture).0), chafa(picture)?))
     }
 
-    fn aim(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
+    fn aim(&mut self, picture: &Srgb8Image, fidelity: Fidelity) -> usize {
         let (buffer, place) = self.cells(picture);
         self.painter.set_target(&buffer, place, fidelity);
         drain(&mut self.painter)
     }
 
     /// The image as half blocks, and its position.
-    fn cells(&self, picture: &Picture) -> (Buffer, Rect) {
+    fn cells(&self, picture: &Srgb8Image) -> (Buffer, Rect) {
         let mut buffer = Buffer::empty(self.area);
         let place = Rect::new(0, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
         let color = |x: u16, y: u32| {
@@ -261,11 +261,11 @@ impl Window {
 
 /// Sends all pending output of the painter. Returns the number of bytes.
 fn drain(painter: &mut Painter) -> usize {
-    std::iter::from_fn(|| Some(painter.slice(24_000).len()).filter(|bytes| *bytes > 0)).sum()
+    std::iter::from_fn(|| Some(painter.next_slice(24_000).len()).filter(|bytes| *bytes > 0)).sum()
 }
 
 /// Returns the number of cells that differ, or of all cells if nothing was shown before.
-fn changed(before: Option<&Picture>, after: &Picture) -> usize {
+fn changed(before: Option<&Srgb8Image>, after: &Srgb8Image) -> usize {
     let width = after.width as usize;
     let differs = |i: usize| match before.and_then(|before| before.pixels.get(i)) {
         Some(old) => after.pixels.get(i).is_some_and(|new| (0..3).any(|k| old[k].abs_diff(new[k]) > SAME)),

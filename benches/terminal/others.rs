@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::process::{Command, Stdio};
 use std::rc::Rc;
 
-use glimt::film::Picture;
+use glimt::film::Srgb8Image;
 use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -52,7 +52,7 @@ impl PlainRatatui {
 }
 
 /// Bytes that chafa writes for the image in 24-bit half blocks. `None` if chafa is not installed.
-pub(crate) fn chafa(picture: &Picture) -> Result<Option<usize>, Box<dyn Error>> {
+pub(crate) fn chafa(picture: &Srgb8Image) -> Result<Option<usize>, Box<dyn Error>> {
     let file = tempfile::Builder::new().suffix(".png").tempfile()?;
     let pixels = picture.pixels.as_flattened();
     image::save_buffer(file.path(), pixels, picture.width, picture.height, image::ColorType::Rgb8)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::PoisonError;
 use std::time::Instant;
 
-use glimt::film::Picture;
+use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
 use glimt::pipeline::settings::Overrides;
@@ -16,7 +16,7 @@ pub(crate) struct RecordedPreview {
     pub(crate) seconds: f64,
     /// Mean samples per pixel; 0 for the coarse first image.
     pub(crate) samples: f64,
-    pub(crate) picture: Picture,
+    pub(crate) picture: Srgb8Image,
     pub(crate) is_final: bool,
 }
 

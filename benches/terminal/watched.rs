@@ -53,7 +53,7 @@ pub(crate) struct FarEnd {
 impl FarEnd {
     /// Colors of the image's pixels, or of its cell subdivisions.
     pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
-        if let Some(picture) = self.pixels.shown() {
+        if let Some(picture) = self.pixels.displayed_image() {
             return picture.pixels.clone();
         }
         let (rows, columns) = self.cells.screen().size();
@@ -215,7 +215,7 @@ fn process_arrivals(
         thread::sleep(when.saturating_duration_since(Instant::now()));
         let mut far = lock(far);
         far.cells.process(&bytes);
-        far.pixels.take(&bytes);
+        far.pixels.process_output(&bytes);
         for byte in bytes {
             far.came += 1;
             tail.push(byte);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
-use glimt::film::Picture;
+use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
 use glimt::pipeline::settings::Overrides;
@@ -38,7 +38,7 @@ impl PreviewRenderer {
 
     /// Returns the last preview of a scene. If `samples` is `None`, this is the coarse preview with one sample
     /// per preview pixel.
-    fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
+    fn preview(&mut self, scene: &str, samples: Option<u32>) -> Srgb8Image {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
         let side = if samples.is_some() { FILM } else { self.preview.height };
@@ -72,7 +72,7 @@ impl PreviewRenderer {
     }
 
     /// All previews of a render.
-    fn pictures(&mut self, scene: &str) -> Vec<(Picture, Fidelity)> {
+    fn pictures(&mut self, scene: &str) -> Vec<(Srgb8Image, Fidelity)> {
         let steps = [
             (None, Fidelity::First),
             (Some(1), Fidelity::Moving),
@@ -100,7 +100,7 @@ impl PaintedScreen {
     }
 
     /// Shows an image. Returns the number of bytes sent.
-    fn show(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
+    fn show(&mut self, picture: &Srgb8Image, fidelity: Fidelity) -> usize {
         let mut buffer = Buffer::empty(self.window);
         let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
         for y in 0..place.height {
@@ -117,7 +117,7 @@ impl PaintedScreen {
         self.painter.set_target(&buffer, place, fidelity);
         let mut sent = 0;
         loop {
-            let bytes = self.painter.slice(8192);
+            let bytes = self.painter.next_slice(8192);
             if bytes.is_empty() {
                 return sent;
             }
@@ -127,7 +127,7 @@ impl PaintedScreen {
     }
 
     /// The largest channel difference between the screen and an image.
-    fn difference(&self, picture: &Picture) -> u8 {
+    fn difference(&self, picture: &Srgb8Image) -> u8 {
         let pixels = picture.pixels.iter().enumerate();
         let off = pixels.map(|(i, wanted)| {
             let (x, y) = (i % picture.width as usize, i / picture.width as usize);
@@ -165,7 +165,7 @@ fn scene(name: &str) -> String {
 }
 
 /// Number of cells in which a color channel differs by more than 1.
-fn changed(a: &Picture, b: &Picture) -> usize {
+fn changed(a: &Srgb8Image, b: &Srgb8Image) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
     let tops = (0..a.pixels.len()).filter(|i| (i / width).is_multiple_of(2));
@@ -174,7 +174,7 @@ fn changed(a: &Picture, b: &Picture) -> usize {
 
 /// Shows all previews of a render. Returns the number of bytes for the first preview and for all
 /// previews.
-fn through(screen: &mut PaintedScreen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
+fn through(screen: &mut PaintedScreen, pictures: &[(Srgb8Image, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");

@@ -15,7 +15,7 @@ use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
 /// Random number generator for values in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {
-    let mut next = glimt::math::random::unit(seed);
+    let mut next = glimt::math::random::unit_generator(seed);
     move || f64::from(next())
 }
 

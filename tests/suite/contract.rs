@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use glimt::scene::description::{Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
-use glimt::scene::{parse, starter};
+use glimt::scene::{parse, starter_scene};
 
 /// Whether a key is optional, and whether its example value is the default.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -530,11 +530,11 @@ fn starter_has_every_key() {
     for (header, keys) in TABLES {
         for (key, ..) in *keys {
             let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
-            assert!(starter().lines().any(has), "starter: {header} {key}");
+            assert!(starter_scene().lines().any(has), "starter: {header} {key}");
         }
     }
     // `name` is an optional key of every shape.
-    assert!(starter().contains("# name = "), "name");
+    assert!(starter_scene().contains("# name = "), "name");
 }
 
 #[test]
@@ -555,7 +555,7 @@ fn starter_lines_can_be_uncommented() {
         }
         _ => format!("{line}\n"),
     };
-    let text: String = starter().lines().map(uncommented).collect();
+    let text: String = starter_scene().lines().map(uncommented).collect();
     assert!(text.lines().filter(|line| line.starts_with('#')).count() < 12, "{text}");
     let outcome = parse(text.into(), &folder.path().join("scene.toml"));
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);

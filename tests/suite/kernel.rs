@@ -85,7 +85,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
 
 /// Number of rays that escape from a closed mesh. Each ray starts inside and is aimed at a vertex or an edge.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
-    let tree = tree(mesh).with(instructions);
+    let tree = tree(mesh).with_instruction_set(instructions);
     let mut random = UnitRandom(rays as u64);
     let mut leaks = 0;
     for i in 0..rays / PACKET_SIZE {
@@ -101,12 +101,15 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
         });
         if i % 2 == 0 {
             let mut hits = [None; PACKET_SIZE];
-            tree.closest_packet(&packet, &packet_t_max(&packet), &mut hits);
+            tree.closest_hit_packet(&packet, &packet_t_max(&packet), &mut hits);
             leaks += hits.iter().filter(|hit| hit.is_none()).count();
             leaks +=
-                PACKET_SIZE - tree.any_packet(&packet, &packet_t_max(&packet), &[]).count_ones() as usize;
+                PACKET_SIZE - tree.any_hit_packet(&packet, &packet_t_max(&packet), &[]).count_ones() as usize;
         } else {
-            leaks += packet.iter().filter(|ray| tree.closest(ray).is_none() || !tree.any(ray, None)).count();
+            leaks += packet
+                .iter()
+                .filter(|ray| tree.closest_hit(ray).is_none() || !tree.any_hit(ray, None))
+                .count();
         }
     }
     leaks
@@ -124,7 +127,7 @@ fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -
         let corners = mesh.corners(random.below(mesh.triangles.len()) as u32);
         let target = if i % 2 == 0 { corners[i / 2 % 3] } else { corners[0].lerp(corners[1], random.next()) };
         let ray = Ray::new(origin, target - origin);
-        leaks += usize::from(tree.closest(&ray).is_none() || !tree.any(&ray, None));
+        leaks += usize::from(tree.closest_hit(&ray).is_none() || !tree.any_hit(&ray, None));
     }
     leaks
 }
@@ -204,7 +207,7 @@ fn boxes_do_not_speckle_from_any_direction() {
         let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
         let mut random = UnitRandom(u64::from(side));
         for instructions in InstructionSet::ALL {
-            let tree = tree(&mesh).with(instructions);
+            let tree = tree(&mesh).with_instruction_set(instructions);
             for view in 0..1000 {
                 // The first views are along the axes and diagonals, where rays lie in face planes.
                 let away = match view {
@@ -244,7 +247,7 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     };
     let exact = first_box(ray, side);
     let (least, greatest) = shifted(1e-4).into_iter().fold((exact, exact), |(a, b), t| (a.min(t), b.max(t)));
-    match tree.closest(ray) {
+    match tree.closest_hit(ray) {
         Some(hit) => {
             let t = f64::from(hit.t);
             assert!(
@@ -302,7 +305,7 @@ fn hits_close_to_the_ray_origin_are_found() {
     let corners = |id: u32| slivers[id as usize];
     let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("the token is not cancelled");
     let planes = KdTree::build(count, corners, &CancelToken::new()).expect("the token is not cancelled");
-    let trees = InstructionSet::ALL.map(|instructions| boxes.clone().with(instructions));
+    let trees = InstructionSet::ALL.map(|instructions| boxes.clone().with_instruction_set(instructions));
     let (mut before, mut behind, mut missed, mut wrong) = (0, 0, 0, 0);
     for i in 0..40_000 {
         let id = random.below(slivers.len());
@@ -324,11 +327,16 @@ fn hits_close_to_the_ray_origin_are_found() {
         before += u32::from(is_hit);
         behind += u32::from(is_free);
         let (rays, mut hits) = ([ray; PACKET_SIZE], [None; PACKET_SIZE]);
-        let mut answers = vec![planes.any(&ray, None), planes.closest(&ray).is_some()];
+        let mut answers = vec![planes.any_hit(&ray, None), planes.closest_hit(&ray).is_some()];
         for tree in &trees {
-            tree.closest_packet(&rays, &packet_t_max(&rays), &mut hits);
-            let any = tree.any_packet(&rays, &packet_t_max(&rays), &[]) != 0;
-            answers.extend([tree.any(&ray, None), tree.closest(&ray).is_some(), any, hits[3].is_some()]);
+            tree.closest_hit_packet(&rays, &packet_t_max(&rays), &mut hits);
+            let any = tree.any_hit_packet(&rays, &packet_t_max(&rays), &[]) != 0;
+            answers.extend([
+                tree.any_hit(&ray, None),
+                tree.closest_hit(&ray).is_some(),
+                any,
+                hits[3].is_some(),
+            ]);
         }
         missed += u32::from(is_hit && answers.contains(&false));
         wrong += u32::from(is_free && answers.contains(&true));

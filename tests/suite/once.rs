@@ -600,11 +600,11 @@ fn new_writes_to_stdout_for_a_dash() {
     let dir = TestDir::new();
     let output = dir.run("new -");
     assert_eq!(output.status.code(), Some(0));
-    assert_eq!(output.stdout, glimt::scene::starter().as_bytes());
+    assert_eq!(output.stdout, glimt::scene::starter_scene().as_bytes());
     assert!(output.stderr.is_empty());
     assert!(!dir.path("-").exists());
     dir.expect("new ./-", 0);
-    assert_eq!(dir.bytes("-"), glimt::scene::starter().as_bytes());
+    assert_eq!(dir.bytes("-"), glimt::scene::starter_scene().as_bytes());
     // A scene on stdout has no folder for the schema, so the message shows how to write it.
     let output = dir.run("new --schema -");
     assert_eq!(output.status.code(), Some(0));

@@ -17,13 +17,15 @@ pub use self::bench::BenchArgs;
 pub use self::parts::{FarmArgs, MergeArgs, Scheduler};
 use crate::choice;
 use crate::choice::Choice;
-use crate::console::answer_columns;
+use crate::console::stdout_columns;
 use crate::environment;
 use crate::film::Rect;
 use crate::output::{AnimationFormat, Format};
-use crate::pipeline::settings::{Checkpoints, OutputLayer, Overrides, Resume, Side, UpAxis, View};
+use crate::pipeline::settings::{
+    CheckpointSettings, OutputLayer, Overrides, ResumeMode, UpAxis, ViewMode, ViewSide,
+};
 use crate::pipeline::turntable::{self, TurntableFrame};
-use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
+use crate::scene::description::{Accel, Integrator, KeyRange, RenderOptions, ShadowMode, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
 /// Examples for the long help and the manual page, in lines of at most 80 columns.
@@ -53,7 +55,7 @@ pub(super) const EXIT_CODES: &str = "\
 /// Returns the help width in columns: `COLUMNS` if set, else the terminal's width, else 80.
 fn help_columns() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
-    columns.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
+    columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns)
 }
 
 /// Text after the options in `-h`.
@@ -117,13 +119,13 @@ pub enum Subcommand {
         #[arg(add = candidates::scene_completer())]
         scene: PathBuf,
         /// Override a scene key
-        #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE")]
+        #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
         /// Colors: auto, truecolor, 256, 16, none
-        #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+        #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
     },
     /// Write a commented starter scene; never overwrites a file
@@ -158,7 +160,7 @@ pub enum Subcommand {
     #[command(after_long_help = COMPLETIONS_HELP)]
     Completions {
         /// The shell
-        #[arg(value_parser = one_of::<Shell>(), value_name = "SHELL")]
+        #[arg(value_parser = choice_parser::<Shell>(), value_name = "SHELL")]
         shell: Shell,
     },
     /// Print the manual page for glimt or a command as roff
@@ -178,8 +180,8 @@ pub enum Subcommand {
     #[command(after_long_help = SCHEMA_HELP)]
     Schema {
         /// JSON Schema draft
-        #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
-        draft: Draft,
+        #[arg(long, value_parser = choice_parser::<SchemaDraft>(), default_value = "4", value_name = "DRAFT")]
+        draft: SchemaDraft,
     },
     /// Run the language server on stdin and stdout
     #[command(after_long_help = LSP_HELP)]
@@ -225,7 +227,7 @@ only by `glimt check`.";
 
 choice! {
     /// JSON Schema drafts.
-    pub enum Draft {
+    pub enum SchemaDraft {
         /// Draft 4, which Taplo supports.
         Four = "4",
         /// Draft 2020-12.
@@ -233,9 +235,9 @@ choice! {
     }
 }
 
-impl Draft {
+impl SchemaDraft {
     /// Returns the schema keyword under which definitions are stored.
-    pub(super) fn definitions(self) -> &'static str {
+    pub(super) fn definitions_keyword(self) -> &'static str {
         match self {
             Self::Four => "definitions",
             Self::Latest => "$defs",
@@ -243,7 +245,7 @@ impl Draft {
     }
 
     /// Returns the draft's URI, the value of `$schema`.
-    pub(super) fn uri(self) -> &'static str {
+    pub(super) fn schema_uri(self) -> &'static str {
         match self {
             Self::Four => "http://json-schema.org/draft-04/schema#",
             Self::Latest => "https://json-schema.org/draft/2020-12/schema",
@@ -295,7 +297,7 @@ pub struct ImportArgs {
     #[arg(long)]
     pub strict: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
 }
 
@@ -314,7 +316,7 @@ pub struct InfoArgs {
     #[arg(long)]
     pub json: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
 }
 
@@ -344,7 +346,7 @@ pub struct CompareArgs {
     /// The reference image, with the same size
     pub b: PathBuf,
     /// Exit with code 1 if relMSE is above X
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = error_bound)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_error_bound)]
     pub max_relmse: Option<f64>,
     /// Write the error as an image
     ///
@@ -358,10 +360,10 @@ pub struct CompareArgs {
     #[arg(long)]
     pub json: bool,
     /// Show the images and their difference: auto, on, off
-    #[arg(long, value_parser = one_of::<Pictures>(), hide_possible_values = true, long_help = listed::<Pictures>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub pictures: Pictures,
+    #[arg(long, value_parser = choice_parser::<ImageDisplayMode>(), hide_possible_values = true, long_help = choice_long_help::<ImageDisplayMode>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub pictures: ImageDisplayMode,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
 }
 
@@ -379,7 +381,7 @@ pub struct RenderArgs {
     ///
     /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
     /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
-    #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE")]
+    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
     /// Output file; can be given several times
@@ -389,10 +391,10 @@ pub struct RenderArgs {
     ///
     /// All, or a comma-separated list of albedo, normal, depth, variance, samples, ambient, diffuse, specular
     /// and emission.
-    #[arg(long, value_name = "all|LIST", value_parser = layers, help_heading = "Output")]
-    pub layers: Option<Layers>,
+    #[arg(long, value_name = "all|LIST", value_parser = parse_layers, help_heading = "Output")]
+    pub layers: Option<OutputLayers>,
     /// Bits per channel of PNG files: 8 or 16
-    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
+    #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = parse_bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
     /// Write settings, timings and counters as JSON
     ///
@@ -408,12 +410,12 @@ pub struct RenderArgs {
     /// Render part I of N, with --once
     ///
     /// -o names the file for this part. `glimt merge` merges the parts.
-    #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = shard, help_heading = "Long renders")]
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = parse_shard, help_heading = "Long renders")]
     pub shard: Option<(u32, u32)>,
     /// Interval between checkpoints; 0 disables them
     ///
     /// Checkpoints are saved next to the output as FILE.checkpoint.
-    #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = checkpoint_interval, help_heading = "Long renders")]
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = parse_checkpoint_interval, help_heading = "Long renders")]
     pub checkpoint: f64,
     /// Resume from a checkpoint (automatic without --once)
     #[arg(long, help_heading = "Long renders")]
@@ -424,91 +426,91 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Long renders")]
     pub keep_checkpoint: bool,
     /// Memory limit, such as 8GiB or 500MB; larger renders are refused
-    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = memory, help_heading = "Long renders")]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = parse_byte_size, help_heading = "Long renders")]
     pub memory: Option<u64>,
 
     /// Width in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("width"), help_heading = "Image")]
     pub width: Option<u32>,
     /// Height in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("height"), help_heading = "Image")]
     pub height: Option<u32>,
     /// Maximum samples per pixel
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
     /// Noise threshold for finishing a tile; 0 disables it
-    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Image")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = render_number_parser("error", ERROR), help_heading = "Image")]
     pub error: Option<f32>,
     /// Stop after this time
     ///
     /// Until then, glimt takes more samples wherever they reduce the error most.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Image")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive_seconds, help_heading = "Image")]
     pub time: Option<f64>,
     /// Render only this rectangle: left, top, width, height
-    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Image")]
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = parse_crop, help_heading = "Image")]
     pub crop: Option<Rect>,
     /// Render a view (AOV), such as normal or albedo
-    #[arg(long, value_parser = one_of::<View>(), hide_possible_values = true, long_help = listed::<View>("Render a view: the beauty image or an AOV"), value_name = "NAME", help_heading = "Image")]
-    pub view: Option<View>,
+    #[arg(long, value_parser = choice_parser::<ViewMode>(), hide_possible_values = true, long_help = choice_long_help::<ViewMode>("Render a view: the beauty image or an AOV"), value_name = "NAME", help_heading = "Image")]
+    pub view: Option<ViewMode>,
     /// Side of a model: front, back, left, right, top, bottom, iso
-    #[arg(long, value_parser = one_of::<Side>(), hide_possible_values = true, long_help = listed::<Side>("View a model from this side instead of through its own camera"), value_name = "SIDE", help_heading = "Image")]
-    pub from: Option<Side>,
+    #[arg(long, value_parser = choice_parser::<ViewSide>(), hide_possible_values = true, long_help = choice_long_help::<ViewSide>("View a model from this side instead of through its own camera"), value_name = "SIDE", help_heading = "Image")]
+    pub from: Option<ViewSide>,
     /// Up axis of a model: x, y, z
-    #[arg(long, value_parser = one_of::<UpAxis>(), hide_possible_values = true, long_help = listed::<UpAxis>("Up axis of a model. The default is z for STL and for PLY files from Blender, otherwise y"), value_name = "AXIS", help_heading = "Image")]
+    #[arg(long, value_parser = choice_parser::<UpAxis>(), hide_possible_values = true, long_help = choice_long_help::<UpAxis>("Up axis of a model. The default is z for STL and for PLY files from Blender, otherwise y"), value_name = "AXIS", help_heading = "Image")]
     pub up: Option<UpAxis>,
     /// Render N frames around look_at, with --once
     ///
     /// -o is either a pattern for one file per frame, such as name_####.png, or an animation (.gif or .apng).
     /// --samples, --error and --time apply to each frame.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_turntable_frames, help_heading = "Image")]
     pub turntable: Option<u32>,
     /// Random seed
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("seed"), help_heading = "Image")]
     pub seed: Option<u32>,
 
     /// Integrator: whitted, path
-    #[arg(long, value_parser = one_of::<Integrator>(), hide_possible_values = true, long_help = listed::<Integrator>("Integrator"), value_name = "NAME", help_heading = "Rendering")]
+    #[arg(long, value_parser = choice_parser::<Integrator>(), hide_possible_values = true, long_help = choice_long_help::<Integrator>("Integrator"), value_name = "NAME", help_heading = "Rendering")]
     pub integrator: Option<Integrator>,
     /// Maximum bounces per path; 1 is direct light only
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "Rendering")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("max_depth"), help_heading = "Rendering")]
     pub max_depth: Option<u32>,
     /// Shadows: off, hard, soft
-    #[arg(long, value_parser = one_of::<Shadows>(), hide_possible_values = true, long_help = listed::<Shadows>("Shadows, in whitted"), value_name = "HOW", help_heading = "Rendering")]
-    pub shadows: Option<Shadows>,
+    #[arg(long, value_parser = choice_parser::<ShadowMode>(), hide_possible_values = true, long_help = choice_long_help::<ShadowMode>("Shadows, in whitted"), value_name = "HOW", help_heading = "Rendering")]
+    pub shadows: Option<ShadowMode>,
     /// Limit indirect radiance per bounce (removes fireflies, biased)
     ///
     /// Applies after the first diffuse or glossy reflection of a path. 0 disables the limit.
-    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Rendering")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = render_number_parser("clamp", CLAMP), help_heading = "Rendering")]
     pub clamp: Option<f32>,
     /// Photon mapping in whitted: indirect light and caustics
-    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
+    #[arg(long, value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub photons: Option<Switch>,
     /// Depth of field, if the camera has an aperture
-    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
+    #[arg(long, value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub dof: Option<Switch>,
     /// Acceleration structure: bvh, bvh-high, kdtree
-    #[arg(long, value_parser = one_of::<Accel>(), hide_possible_values = true, long_help = listed::<Accel>("Acceleration structure"), value_name = "NAME", help_heading = "Rendering")]
+    #[arg(long, value_parser = choice_parser::<Accel>(), hide_possible_values = true, long_help = choice_long_help::<Accel>("Acceleration structure"), value_name = "NAME", help_heading = "Rendering")]
     pub accel: Option<Accel>,
     /// Rendering threads; 0 is one per core
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Rendering")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_thread_count, help_heading = "Rendering")]
     pub threads: Option<usize>,
     /// Scheduling niceness, 0–19 [default: 0 with --once, else 10]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Rendering")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_niceness, help_heading = "Rendering")]
     pub nice: Option<u8>,
 
     /// Progress with --once: auto, plain, json, none
-    #[arg(long, value_parser = one_of::<Progress>(), hide_possible_values = true, long_help = listed::<Progress>("Progress on stderr with --once"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub progress: Progress,
+    #[arg(long, value_parser = choice_parser::<ProgressMode>(), hide_possible_values = true, long_help = choice_long_help::<ProgressMode>("Progress on stderr with --once"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub progress: ProgressMode,
     /// Preview: auto, halfblock, sextant, kitty, …
-    #[arg(long, value_parser = one_of::<PreviewChoice>(), hide_possible_values = true, long_help = listed::<PreviewChoice>("How the preview is drawn"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<PreviewChoice>(), hide_possible_values = true, long_help = choice_long_help::<PreviewChoice>("How the preview is drawn"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
     /// Minimum render time for notifications; 0 disables them
     ///
     /// When a longer render ends while the window is not focused, the terminal shows a desktop notification.
-    #[arg(long, allow_negative_numbers = true, value_parser = notification_time, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
+    #[arg(long, allow_negative_numbers = true, value_parser = parse_notification_time, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
     pub notify_after: f64,
     /// Poll files instead of using system notifications
     #[arg(long, help_heading = "Terminal")]
@@ -529,20 +531,20 @@ impl RenderArgs {
             view: self.view,
             from: self.from,
             up: self.up,
-            layers: self.layers.clone().map_or_else(Vec::new, |Layers(layers)| layers),
+            layers: self.layers.clone().map_or_else(Vec::new, |OutputLayers(layers)| layers),
             turn: self.turntable.map(|of| TurntableFrame { number: 0, of }),
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,
             shard: self.shard,
             memory: self.memory,
-            checkpoints: Checkpoints {
+            checkpoints: CheckpointSettings {
                 seconds: self.checkpoint,
                 resume: match (self.resume, self.once) {
-                    (true, true) => Resume::Asked,
-                    (false, true) => Resume::No,
+                    (true, true) => ResumeMode::Asked,
+                    (false, true) => ResumeMode::No,
                     // Continue after a dropped connection. If the scene was edited, no checkpoint matches it.
-                    (_, false) => Resume::IfSame,
+                    (_, false) => ResumeMode::IfSame,
                 },
                 are_kept: self.keep_checkpoint,
             },
@@ -562,7 +564,7 @@ impl RenderArgs {
 
 choice! {
     /// Progress reports.
-    pub enum Progress {
+    pub enum ProgressMode {
         /// Bars on a terminal, plain lines elsewhere.
         Auto = "auto",
         /// Occasional lines.
@@ -577,7 +579,7 @@ choice! {
 
 choice! {
     /// Whether `compare` shows images.
-    pub enum Pictures {
+    pub enum ImageDisplayMode {
         /// On a terminal with at least 30 columns.
         Auto = "auto",
         /// Always; 80 columns wide without a terminal.
@@ -604,7 +606,7 @@ impl From<Switch> for bool {
 }
 
 /// Creates a parser that accepts the names of a choice's values.
-fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
+fn choice_parser<C: Choice>() -> impl TypedValueParser<Value = C> {
     let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
     let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
     PossibleValuesParser::new(known.chain(other)).try_map(|name| {
@@ -616,7 +618,7 @@ fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
 const UNAVAILABLE: &str = "not available in this version";
 
 /// Returns long help that lists a choice's values, in clap's format.
-fn listed<C: Choice>(about: &str) -> String {
+fn choice_long_help<C: Choice>(about: &str) -> String {
     let values: String = C::ALL.iter().map(|one| format!("\n- {}: {}", one.name(), one.meaning())).collect();
     format!("{about}\n\nPossible values:{values}")
 }
@@ -635,7 +637,7 @@ fn outputs_help() -> String {
     )
 }
 
-fn bit_depth(text: &str) -> Result<u8, String> {
+fn parse_bit_depth(text: &str) -> Result<u8, String> {
     match text {
         "8" => Ok(8),
         "16" => Ok(16),
@@ -643,14 +645,16 @@ fn bit_depth(text: &str) -> Result<u8, String> {
     }
 }
 
-fn any_whole(text: &str) -> Result<u32, String> {
-    whole(text, 0..=u32::MAX)
+fn parse_u32(text: &str) -> Result<u32, String> {
+    parse_integer_in_range(text, 0..=u32::MAX)
 }
 
 /// Parses an option that overrides an integer key in `[render]`.
-fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
-    move |text| match Render::key(key).map(|key| key.range) {
-        Some(KeyRange::Whole(range)) => whole(text, range),
+fn render_integer_parser(
+    key: &'static str,
+) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| match RenderOptions::find_key_spec(key).map(|key| key.range) {
+        Some(KeyRange::Whole(range)) => parse_integer_in_range(text, range),
         Some(KeyRange::Number(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
             Err(format!("`{key}` is not an integer key of [render]"))
         }
@@ -659,12 +663,12 @@ fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone +
 
 /// Parses an option that overrides a number key in `[render]`. `expected` is the error message for an invalid
 /// value.
-fn number_of(
+fn render_number_parser(
     key: &'static str,
     expected: &'static str,
 ) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
     move |text| {
-        let range = match Render::key(key).map(|key| key.range) {
+        let range = match RenderOptions::find_key_spec(key).map(|key| key.range) {
             Some(KeyRange::Number(range)) => range,
             Some(KeyRange::Whole(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
                 return Err(format!("`{key}` is not a number key of [render]"));
@@ -680,12 +684,12 @@ const ERROR: &str = "expected a relative error, such as 0.02, or 0 to disable it
 /// Error message for `--clamp`.
 const CLAMP: &str = "expected a radiance from 0 to 1e18 (0 disables the limit)";
 
-fn whole(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
+fn parse_integer_in_range(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));
     number.ok_or_else(|| format!("expected a whole number from {} to {}", range.start(), range.end()))
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
@@ -693,7 +697,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a checkpoint interval.
-fn checkpoint_interval(text: &str) -> Result<f64, String> {
+fn parse_checkpoint_interval(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no checkpoints".to_owned()),
@@ -701,7 +705,7 @@ fn checkpoint_interval(text: &str) -> Result<f64, String> {
 }
 
 /// Parses the minimum render time for notifications.
-fn notification_time(text: &str) -> Result<f64, String> {
+fn parse_notification_time(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no notifications".to_owned()),
@@ -709,7 +713,7 @@ fn notification_time(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a size in bytes, with an optional unit.
-fn memory(text: &str) -> Result<u64, String> {
+fn parse_byte_size(text: &str) -> Result<u64, String> {
     let expected = || "expected a size, such as 8GiB, 500MB or 1000000".to_owned();
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let number: f64 = digits.trim().parse().map_err(|_| expected())?;
@@ -730,7 +734,7 @@ fn memory(text: &str) -> Result<u64, String> {
 }
 
 /// Parses `I/N`: the number of a part and the total number of parts.
-fn shard(text: &str) -> Result<(u32, u32), String> {
+fn parse_shard(text: &str) -> Result<(u32, u32), String> {
     let numbers =
         text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
     match numbers {
@@ -744,7 +748,7 @@ fn shard(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-fn error_bound(text: &str) -> Result<f64, String> {
+fn parse_error_bound(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a nonnegative number".to_owned()),
@@ -753,11 +757,11 @@ fn error_bound(text: &str) -> Result<f64, String> {
 
 /// Layers to write to EXR files, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layers(pub Vec<OutputLayer>);
+pub struct OutputLayers(pub Vec<OutputLayer>);
 
-fn layers(text: &str) -> Result<Layers, String> {
+fn parse_layers(text: &str) -> Result<OutputLayers, String> {
     if text == "all" {
-        return Ok(Layers(OutputLayer::ALL.to_vec()));
+        return Ok(OutputLayers(OutputLayer::ALL.to_vec()));
     }
     let mut layers = Vec::new();
     for name in text.split(',').map(str::trim) {
@@ -769,14 +773,14 @@ fn layers(text: &str) -> Result<Layers, String> {
             layers.push(layer);
         }
     }
-    Ok(Layers(layers))
+    Ok(OutputLayers(layers))
 }
 
-fn turntable(text: &str) -> Result<u32, String> {
-    whole(text, 1..=turntable::MAX_FRAMES)
+fn parse_turntable_frames(text: &str) -> Result<u32, String> {
+    parse_integer_in_range(text, 1..=turntable::MAX_FRAMES)
 }
 
-fn threads(text: &str) -> Result<usize, String> {
+fn parse_thread_count(text: &str) -> Result<usize, String> {
     const MAX_THREADS: usize = 4096;
     match text.parse::<usize>() {
         Ok(count) if count <= MAX_THREADS => Ok(count),
@@ -784,11 +788,11 @@ fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
-fn nice(text: &str) -> Result<u8, String> {
-    whole(text, 0..=19).map(|steps| steps as u8)
+fn parse_niceness(text: &str) -> Result<u8, String> {
+    parse_integer_in_range(text, 0..=19).map(|steps| steps as u8)
 }
 
-fn crop(text: &str) -> Result<Rect, String> {
+fn parse_crop(text: &str) -> Result<Rect, String> {
     let numbers: Vec<u32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
     match (numbers.as_slice(), text.split(',').count()) {
         (&[x, y, width, height], 4) if width > 0 && height > 0 => Ok(Rect { x, y, width, height }),

@@ -8,15 +8,15 @@ use std::rc::Rc;
 
 use crate::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::report::{Style, render};
-use crate::scene::sanitize::visible;
+use crate::scene::report::{ReportStyle, render_report};
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::system::describe_error;
 use crate::tui::ColorChoice;
 
 /// Writes to stderr and stdout.
 #[derive(Clone, Debug)]
 pub(super) struct Console {
-    style: Style,
+    style: ReportStyle,
     pub(super) is_terminal: bool,
     /// The first error from writing to stdout, other than a closed pipe.
     stdout_error: Rc<RefCell<Option<io::Error>>>,
@@ -35,21 +35,21 @@ impl Console {
             ColorChoice::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
             ColorChoice::TrueColor | ColorChoice::Indexed256 | ColorChoice::Ansi16 => true,
         };
-        let style = if colored { Style::Ansi } else { Style::Plain };
+        let style = if colored { ReportStyle::Ansi } else { ReportStyle::Plain };
         Self { style, is_terminal: is_terminal && !is_dumb, stdout_error: Rc::default() }
     }
 
     /// Whether messages are colored.
     pub(super) fn is_colored(&self) -> bool {
         match self.style {
-            Style::Ansi => true,
-            Style::Plain => false,
+            ReportStyle::Ansi => true,
+            ReportStyle::Plain => false,
         }
     }
 
     /// Prints a line to stderr. Makes line breaks within the text visible.
     pub(super) fn print_message(&self, text: &str) {
-        let line = format!("{}\n", visible(text));
+        let line = format!("{}\n", escape_invisible_chars(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
@@ -60,11 +60,11 @@ impl Console {
 
     /// Prints a line to stdout.
     pub(super) fn print_line(&self, text: &str) {
-        self.print_trusted_text(&format!("{}\n", visible(text)));
+        self.print_trusted_text(&format!("{}\n", escape_invisible_chars(text)));
     }
 
     /// Width of stdout in columns, if it is a terminal.
-    pub(super) fn answer_columns(&self) -> Option<usize> {
+    pub(super) fn stdout_columns(&self) -> Option<usize> {
         terminal_columns(io::stdout().is_terminal())
     }
 
@@ -86,17 +86,17 @@ impl Console {
     }
 
     /// Returns the program's exit code: `exit`, or failure if writing to stdout failed.
-    pub(super) fn end(&self, exit: Exit) -> Exit {
+    pub(super) fn final_exit_code(&self, exit: Exit) -> Exit {
         match self.stdout_error.take() {
             Some(error) if exit == Exit::DONE => {
-                self.fail(Exit::FAILED, &format!("cannot write to stdout: {}", describe_error(&error)))
+                self.print_error(Exit::FAILED, &format!("cannot write to stdout: {}", describe_error(&error)))
             }
             Some(_) | None => exit,
         }
     }
 
     /// Prints `error: …` to stderr and returns `exit`.
-    pub(super) fn fail(&self, exit: Exit, message: &str) -> Exit {
+    pub(super) fn print_error(&self, exit: Exit, message: &str) -> Exit {
         self.print_message(&format!("error: {message}"));
         exit
     }
@@ -104,18 +104,18 @@ impl Console {
     /// Prints errors and warnings with their source lines to stderr.
     pub(super) fn print_diagnostics(&self, diagnostics: &[Diagnostic]) {
         if !diagnostics.is_empty() {
-            let text = render(diagnostics, columns(), self.style);
+            let text = render_report(diagnostics, stderr_columns(), self.style);
             let _ = writeln!(std::io::stderr().lock(), "{}", text.trim_end());
         }
     }
 }
 
-fn columns() -> usize {
+fn stderr_columns() -> usize {
     terminal_columns(io::stderr().is_terminal()).unwrap_or(DEFAULT_COLUMNS)
 }
 
 /// Text width on stdout in columns: the terminal's width, or 80.
-pub(super) fn answer_columns() -> usize {
+pub(super) fn stdout_columns() -> usize {
     terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
 }
 

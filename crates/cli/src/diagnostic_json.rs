@@ -3,11 +3,11 @@
 use serde_json::{Value, json};
 
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::Locator;
+use crate::scene::report::LineColumnLocator;
 
 /// Converts a diagnostic. Lines and columns start at 1. Columns are counted in characters, ends are
 /// exclusive, and missing values are null.
-pub(super) fn diagnostic_to_json(one: &Diagnostic, places: &mut Locator) -> Value {
+pub(super) fn diagnostic_to_json(one: &Diagnostic, places: &mut LineColumnLocator) -> Value {
     let severity = match one.severity {
         Severity::Error => "error",
         Severity::Warning => "warning",
@@ -40,7 +40,7 @@ mod tests {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
         let outcome = crate::scene::parse(text.into(), Path::new("a.toml"));
         let error = outcome.diagnostics.iter().find(|one| one.severity == Severity::Error).expect("an error");
-        let value = diagnostic_to_json(error, &mut Locator::default());
+        let value = diagnostic_to_json(error, &mut LineColumnLocator::default());
         let places = ["line", "column", "end_line", "end_column"].map(|key| value[key].as_u64());
         assert_eq!(places, [Some(5), Some(8), Some(5), Some(14)], "{value}");
         assert_eq!((&value["file"], &value["severity"]), (&json!("a.toml"), &json!("error")));

@@ -15,7 +15,7 @@ impl Exit {
     pub const WRONG: Self = Self(2);
 
     /// Terminated by a signal.
-    pub fn signal(number: i32) -> Self {
+    pub fn from_signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }
 }

@@ -33,8 +33,8 @@ use clap::Parser;
 use self::args::{Args, Subcommand};
 use self::console::Console;
 pub use self::exit::Exit;
-use crate::scene::nearest::nearest;
-use crate::scene::sanitize::visible;
+use crate::scene::nearest::nearest_name;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Makes any use of rayon's global thread pool panic in debug builds, because that pool ignores `--threads`
 /// and panics if the system is out of threads. The initialization here fails, and rayon does not retry it.
@@ -80,19 +80,19 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Schema { draft }) => commands::schema::run(draft, &console),
         Some(Subcommand::Lsp { .. }) => commands::lsp::run(&console),
         Some(Subcommand::Doctor) => commands::doctor::run(&console),
-        None => match lower::lower(args.render) {
-            Ok(order) => match mistyped_command(&order.scene) {
-                Some(message) => console.fail(Exit::WRONG, &message),
+        None => match lower::lower_args(args.render) {
+            Ok(order) => match mistyped_command_error(&order.scene) {
+                Some(message) => console.print_error(Exit::WRONG, &message),
                 None => render(order, &console),
             },
-            Err(message) => console.fail(Exit::WRONG, &message),
+            Err(message) => console.print_error(Exit::WRONG, &message),
         },
     };
-    console.end(exit)
+    console.final_exit_code(exit)
 }
 
 fn render(order: lower::RenderRequest, console: &Console) -> Exit {
-    match commands::info::report_image_instead_of_scene(&order.scene, order.is_in_json(), console) {
+    match commands::info::report_image_instead_of_scene(&order.scene, order.reports_json_errors(), console) {
         Some(exit) => exit,
         None if order.is_once => once::run(&order, console),
         None => live::run(order, console),
@@ -120,18 +120,19 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
     let console = Console::new(crate::tui::ColorChoice::Auto);
     if !error.use_stderr() {
         console.record_stdout_error(error.print().and_then(|()| io::stdout().flush()));
-        return console.end(Exit::DONE);
+        return console.final_exit_code(Exit::DONE);
     }
-    if let Some(message) = extra_argument(error).and_then(|_| unknown_command(arguments)) {
-        return console.fail(Exit::WRONG, &message);
+    if let Some(message) = extra_argument(error).and_then(|_| unknown_command_error(arguments)) {
+        return console.print_error(Exit::WRONG, &message);
     }
     if let Some(second) = extra_argument(error) {
         let message = format!("glimt takes one scene; got a second: {second:?}");
-        return console.fail(Exit::WRONG, &message);
+        return console.print_error(Exit::WRONG, &message);
     }
     // clap's message contains the arguments. Parse sanitized arguments to get a message that is safe to
     // print.
-    let shown = arguments.iter().map(|argument| visible(&argument.to_string_lossy()).into_owned());
+    let shown =
+        arguments.iter().map(|argument| escape_invisible_chars(&argument.to_string_lossy()).into_owned());
     match Args::try_parse_from(shown) {
         Err(error) if error.use_stderr() => {
             let _ = error.print();
@@ -142,24 +143,24 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
 }
 
 /// Returns an error message if the first argument looks like a mistyped command.
-fn unknown_command(arguments: &[OsString]) -> Option<String> {
+fn unknown_command_error(arguments: &[OsString]) -> Option<String> {
     // A later argument may be the value of an option.
-    mistyped_command(Path::new(arguments.get(1)?))
+    mistyped_command_error(Path::new(arguments.get(1)?))
 }
 
 /// Returns an error message if the scene argument looks like a mistyped command.
-fn mistyped_command(word: &Path) -> Option<String> {
+fn mistyped_command_error(word: &Path) -> Option<String> {
     let first = word.to_string_lossy();
     if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
         return None;
     }
     let commands = <Args as clap::CommandFactory>::command();
     let names: Vec<&str> = commands.get_subcommands().map(clap::Command::get_name).collect();
-    let help = match nearest(&first, names.iter().copied()) {
+    let help = match nearest_name(&first, names.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("expected one of {}", names.join(", ")),
     };
-    Some(format!("no such command or scene: {:?}; {help}", visible(&first)))
+    Some(format!("no such command or scene: {:?}; {help}", escape_invisible_chars(&first)))
 }
 
 /// Returns an extra argument after the scene that is neither an option nor a command.

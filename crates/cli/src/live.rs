@@ -10,12 +10,14 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
-use crate::pipeline::protocol::{CheckpointUpdate, Command, Event, Failure, OwnImageState, Stage, Status};
+use crate::pipeline::protocol::{
+    CheckpointUpdate, Command, Event, Failure, SavedSceneImageState, Stage, Status,
+};
 use crate::pipeline::start;
-use crate::pipeline::watch::{Contents, ExternalChange, FileRead, Watcher, missing_folder};
+use crate::pipeline::watch::{ExternalChange, FileHashCache, FileRead, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::sanitize::visible;
-use crate::scene::{SAME_TEXT, is_absence, text_now};
+use crate::scene::sanitize::escape_invisible_chars;
+use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
 use crate::system::threads::{describe_start_failure, spawn};
 use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
@@ -35,17 +37,17 @@ pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
         console.print_diagnostics(&[absent]);
         return Exit::WRONG;
     }
-    match live(order, console) {
+    match run_terminal_ui(order, console) {
         Ok(exit) => exit,
-        Err((exit, message)) => console.fail(exit, &message),
+        Err((exit, message)) => console.print_error(exit, &message),
     }
 }
 
-fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
+fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure(1, false, &error));
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
-    let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
+    let watcher = Watcher::start(order.poll, worker.file_hashes(), move |said| {
         // Ignore the error if the front end has exited.
         let _ = sender.send(said);
     })
@@ -57,7 +59,7 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     let forward_all =
         move || forward_events(&from_worker, &watcher, &recorder, |event| forward.send(event).is_ok());
     let forwarder = spawn("glimt-events", forward_all).map_err(no_thread)?;
-    let (remote, contents) = (worker.remote(), worker.contents());
+    let (remote, contents) = (worker.command_sender(), worker.file_hashes());
     let asked = writes.clone();
     let outcome = tui::run(Options {
         scene: order.scene,
@@ -89,10 +91,10 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
     };
     let has_ended = if worker.stop_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
-        worker.finish(Duration::ZERO)
+        worker.stop_or_abandon(Duration::ZERO)
     } else {
         console.print_message("waiting for the image to be written; press ctrl-c to quit without it");
-        worker.finish(Duration::MAX)
+        worker.stop_or_abandon(Duration::MAX)
     };
     if has_ended {
         // The thread ends with the worker. Ignore a panic.
@@ -101,7 +103,7 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.changed_externally(&contents);
         let is_older = ended.is_current && writes.is_image_outdated(&contents);
-        closing_lines(&writes, ended, (has_ended, is_older, &lost, &shell_command_line()))
+        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &shell_command_line()))
             .iter()
             .for_each(|line| console.print_message(line));
     }
@@ -119,7 +121,7 @@ fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)>
 /// lost changes. The summary is printed only after `q`, and only if all writes were reported or if a write
 /// failed but earlier files exist. `is_older` is true if the images are older than the scene. `lost` contains
 /// the outputs changed by other programs. `call` is this command line.
-fn closing_lines(
+fn exit_summary_lines(
     writes: &SharedWriteLog,
     ended: &TuiOutcome,
     (has_ended, is_older, lost, call): (bool, bool, &[(PathBuf, ExternalChange)], &str),
@@ -129,12 +131,12 @@ fn closing_lines(
     let has_quit = ended.status == ExitStatus::QUIT;
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
     if has_summary {
-        let lost = lost.iter().map(|(path, lost)| format!("; {} {} since", path.display(), lost.words()));
+        let lost = lost.iter().map(|(path, lost)| format!("; {} {} since", path.display(), lost.describe()));
         let older = if is_older { OLDER_THAN_EDIT } else { "" };
         lines.push(ended.summary.clone() + older + &lost.collect::<String>());
     }
     // After SIGHUP the terminal is gone.
-    match writes.checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
+    match writes.exit_checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
         Some(Ok(_)) if has_summary => {
             lines.iter_mut().rev().take(1).for_each(|line| *line = format!("{line}; {call} continues"));
         }
@@ -163,7 +165,7 @@ fn missing_scene_error(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
-    text_now(scene).err().map(|problem| *problem).filter(is_absence)
+    read_current_text(scene).err().map(|problem| *problem).filter(is_file_not_found)
 }
 
 /// A log of written images, shared between threads.
@@ -273,7 +275,7 @@ impl SharedWriteLog {
             Event::Files { .. } | Event::OwnImage { .. } if has_left => {}
             Event::Files { generation, files, .. } => log.read = (*generation, files.clone()),
             Event::OwnImage { state, .. } => {
-                let is_written = *state == OwnImageState::Written;
+                let is_written = *state == SavedSceneImageState::Written;
                 log.image_files = is_written.then(|| log.read.1.clone());
             }
         }
@@ -281,14 +283,14 @@ impl SharedWriteLog {
 
     /// Whether the scene's own image is older than the files on disk, for example because the user saved the
     /// scene and quit at once.
-    fn is_image_outdated(&self, contents: &Contents) -> bool {
+    fn is_image_outdated(&self, contents: &FileHashCache) -> bool {
         let files = self.lock_log().image_files.take();
         let now = |path: &Path| contents.read(path, &CancelToken::new());
         files.is_none_or(|files| files.iter().any(|file| now(&file.path) != Ok(file.content)))
     }
 
     /// Returns the checkpoint written after the UI exited, or an error message.
-    fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
+    fn exit_checkpoint(&self) -> Option<Result<PathBuf, String>> {
         self.lock_log().checkpoint.clone()
     }
 
@@ -328,15 +330,15 @@ fn forward_events(
             watcher.set_files(read.to_vec(), before.to_vec(), *since);
         }
         if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
-            all.iter_mut().for_each(await_scene);
+            all.iter_mut().for_each(add_waiting_help);
         }
         is_connected = forward(event);
     }
 }
 
 /// Changes the help text for a missing scene to say that the UI waits for the scene to appear.
-fn await_scene(problem: &mut Diagnostic) {
-    if is_absence(problem) {
+fn add_waiting_help(problem: &mut Diagnostic) {
+    if is_file_not_found(problem) {
         // Keep a suggestion for a typo or a renamed scene.
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
@@ -344,7 +346,7 @@ fn await_scene(problem: &mut Diagnostic) {
         problem.help = Some(match missing_folder(&problem.path) {
             Some(folder) => format!(
                 "waiting for the folder {} and the scene to appear{file}",
-                visible(&folder.to_string_lossy())
+                escape_invisible_chars(&folder.to_string_lossy())
             ),
             None => format!("{WAITING_FOR_FILE}{file}"),
         });
@@ -379,7 +381,8 @@ mod tests {
         let message = "the latest image is not written".to_owned();
         writes.record_event(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the latest image is not written";
-        let said = |ended: TuiOutcome| closing_lines(&writes, &ended, (true, false, &[], "glimt a.toml"));
+        let said =
+            |ended: TuiOutcome| exit_summary_lines(&writes, &ended, (true, false, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
         writes.record_event(&written(2));
@@ -401,7 +404,7 @@ mod tests {
         let writes = SharedWriteLog::default();
         let lost = [(PathBuf::from("a.png"), ExternalChange::Removed)];
         let said = |status, lost: &[(PathBuf, ExternalChange)]| {
-            closing_lines(&writes, &ended(status), (true, false, lost, "glimt a.toml --seed 1"))
+            exit_summary_lines(&writes, &ended(status), (true, false, lost, "glimt a.toml --seed 1"))
         };
         let not_kept = "not kept: --shadows off";
         assert_eq!(said(ExitStatus::QUIT, &[]), ["a.png not finished (10 %)", not_kept]);
@@ -422,7 +425,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "1").expect("written");
-        let (writes, contents) = (SharedWriteLog::default(), Contents::default());
+        let (writes, contents) = (SharedWriteLog::default(), FileHashCache::default());
         let content = contents.read(&path, &CancelToken::new()).expect("never canceled");
         let read = || Event::Files {
             generation: 1,
@@ -432,13 +435,13 @@ mod tests {
         };
         let own = |state| writes.record_event(&Event::OwnImage { generation: 1, state });
         writes.record_event(&read());
-        own(OwnImageState::Written);
+        own(SavedSceneImageState::Written);
         assert!(!writes.is_image_outdated(&contents));
-        own(OwnImageState::Written);
+        own(SavedSceneImageState::Written);
         std::fs::write(&path, "22").expect("written");
         assert!(writes.is_image_outdated(&contents));
         // A request has read the new scene, but has not rendered its image.
-        own(OwnImageState::NotBegun);
+        own(SavedSceneImageState::NotBegun);
         assert!(writes.is_image_outdated(&contents));
         let ended = TuiOutcome {
             status: ExitStatus::QUIT,
@@ -450,7 +453,7 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
-        let said = |is_older| closing_lines(&writes, &ended, (true, is_older, &[], "glimt a.toml"));
+        let said = |is_older| exit_summary_lines(&writes, &ended, (true, is_older, &[], "glimt a.toml"));
         assert_eq!(said(false), ["wrote a.png"]);
         assert_eq!(said(true), [format!("wrote a.png{OLDER_THAN_EDIT}")]);
     }
@@ -473,7 +476,7 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
-        let said = |seen| closing_lines(&writes, &ended(seen), (true, false, &[], "glimt a.toml"));
+        let said = |seen| exit_summary_lines(&writes, &ended(seen), (true, false, &[], "glimt a.toml"));
         assert_eq!(said(0), ["wrote a.png"]);
         assert_eq!(said(1), ["a.png not finished (3 %)"]);
     }
@@ -486,13 +489,14 @@ mod tests {
                 .expect_err("the scene is missing")
                 .try_into()
                 .expect("one problem");
-            await_scene(&mut problem);
+            add_waiting_help(&mut problem);
             problem.help.expect("a help text")
         };
         assert_eq!(said("room.toml"), WAITING_FOR_FILE);
-        let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("the scene is missing");
+        let mut renamed =
+            *crate::scene::read_current_text(Path::new("none.toml")).expect_err("the scene is missing");
         renamed.help = Some(format!("third.toml {SAME_TEXT}"));
-        await_scene(&mut renamed);
+        add_waiting_help(&mut renamed);
         assert!(renamed.help.is_some_and(|help| help.contains("third.toml")));
         let name = "gone/room.toml";
         assert!(said(name).contains("/gone ") && said(name).starts_with("waiting"), "{}", said(name));

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use crate::args::{Progress, RenderArgs};
+use crate::args::{ProgressMode, RenderArgs};
 use crate::output::AnimationFormat;
 use crate::output::Format;
 use crate::output::write::STDOUT;
@@ -23,7 +23,7 @@ pub(super) struct RenderRequest {
     pub(super) scene: PathBuf,
     pub(super) overrides: Overrides,
     pub(super) is_once: bool,
-    pub(super) progress: Progress,
+    pub(super) progress: ProgressMode,
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
@@ -34,8 +34,8 @@ pub(super) struct RenderRequest {
 
 impl RenderRequest {
     /// Whether errors are reported as JSON lines.
-    pub(super) fn is_in_json(&self) -> bool {
-        self.is_once && self.progress == Progress::Json
+    pub(super) fn reports_json_errors(&self) -> bool {
+        self.is_once && self.progress == ProgressMode::Json
     }
 }
 
@@ -43,7 +43,7 @@ impl RenderRequest {
 ///
 /// # Errors
 /// An error message with a hint.
-pub(super) fn lower(args: RenderArgs) -> Result<RenderRequest, String> {
+pub(super) fn lower_args(args: RenderArgs) -> Result<RenderRequest, String> {
     match args.shard {
         Some(_) if !args.once => {
             return Err("--shard needs --once: the terminal UI renders complete images".to_owned());
@@ -111,7 +111,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
                 .map_err(|error| format!("{error}; a turntable also accepts .gif and .apng"))?;
         }
         turntable::check_frame_pattern(path)?;
-        check_once(path, &mut known)?;
+        reject_duplicate_path(path, &mut known)?;
     }
     if let Some(twin) = turntable::first_repeated_file(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
@@ -127,7 +127,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
 }
 
 /// Adds a path to `known`. Rejects duplicates.
-fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
+fn reject_duplicate_path<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
     if !known.insert(path) {
         return Err(format!("-o {} is specified twice", path.display()));
     }
@@ -145,7 +145,7 @@ fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
             ));
         }
         Format::from_path(path).map_err(|error| error.to_string())?;
-        check_once(path, &mut known)?;
+        reject_duplicate_path(path, &mut known)?;
     }
     Ok(())
 }
@@ -158,12 +158,12 @@ mod tests {
     use crate::args::{Args, Subcommand};
     use crate::choice::Choice;
     use crate::film::Rect;
-    use crate::pipeline::settings::{Checkpoints, Resume, View};
+    use crate::pipeline::settings::{CheckpointSettings, ResumeMode, ViewMode};
     use crate::scene::description::{self, KeyRange};
 
     fn lowered(line: &str) -> Result<RenderRequest, String> {
         let words = std::iter::once("glimt").chain(line.split_whitespace());
-        lower(Args::try_parse_from(words).map_err(|error| error.to_string())?.render)
+        lower_args(Args::try_parse_from(words).map_err(|error| error.to_string())?.render)
     }
 
     #[test]
@@ -174,10 +174,10 @@ mod tests {
     #[test]
     fn default_arguments_change_no_settings() {
         let order = lowered("a.toml").expect("valid arguments");
-        let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
+        let checkpoints = CheckpointSettings { seconds: 60.0, resume: ResumeMode::IfSame, are_kept: false };
         assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
         let once = lowered("a.toml --once").expect("valid arguments").overrides.checkpoints;
-        assert_eq!(once, Checkpoints { resume: Resume::No, ..checkpoints });
+        assert_eq!(once, CheckpointSettings { resume: ResumeMode::No, ..checkpoints });
         assert!(!order.is_once && !order.poll);
     }
 
@@ -202,24 +202,24 @@ mod tests {
             time_seconds: Some(0.5),
             max_depth: Some(0),
             integrator: Some(description::Integrator::Path),
-            shadows: Some(description::Shadows::Hard),
+            shadows: Some(description::ShadowMode::Hard),
             clamp: Some(2.5),
             photons: Some(true),
             dof: Some(false),
             accel: Some(description::Accel::Bvh),
-            view: Some(View::Normal),
+            view: Some(ViewMode::Normal),
             seed: Some(7),
             crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
             threads: Some(2),
             bit_depth: Some(16),
             memory: Some(3 << 29),
-            checkpoints: Checkpoints { seconds: 5.0, resume: Resume::Asked, are_kept: true },
+            checkpoints: CheckpointSettings { seconds: 5.0, resume: ResumeMode::Asked, are_kept: true },
             ..Default::default()
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
         assert_eq!((order.nice, order.notify_after), (3, 7.0));
-        assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
+        assert_eq!((order.progress, order.color), (ProgressMode::Json, ColorChoice::Indexed256));
     }
 
     #[test]
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn options_have_the_same_ranges_as_keys() {
         let command = Args::command();
-        for key in description::Render::keys() {
+        for key in description::RenderOptions::key_specs() {
             let name = key.name.replace('_', "-");
             let option = command.get_arguments().find(|option| option.get_long() == Some(&*name));
             assert_eq!(option.is_some(), key.has_option, "--{name}");
@@ -304,7 +304,7 @@ mod tests {
 
     #[test]
     fn every_view_has_a_name() {
-        for &view in View::ALL {
+        for &view in ViewMode::ALL {
             let order = lowered(&format!("a.toml --view {}", view.name())).expect("valid arguments");
             assert_eq!(order.overrides.view, Some(view));
         }

@@ -34,9 +34,9 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure(1, false, &error)),
+        Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
     };
-    let remote = worker.remote();
+    let remote = worker.command_sender();
     let is_again = AtomicBool::new(false);
     let ended = match signals::install_signal_handlers(move || {
         // Stop rendering and save a checkpoint. Finish a file that is being written unless a second signal
@@ -47,7 +47,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         }
     }) {
         Ok(ended) => ended,
-        Err(message) => return console.fail(Exit::FAILED, &message),
+        Err(message) => return console.print_error(Exit::FAILED, &message),
     };
     let mut deadline = ExitDeadline::default();
     let mut written = ImagesWrittenSoFar::default();
@@ -56,7 +56,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         let now = Instant::now();
         // Without checkpoints, the image being written would be lost.
         let is_lost = is_writing && !has_checkpoints;
-        if ended.signal_number().is_some() && !is_lost && deadline.takes_write_timeout(now, is_writing) {
+        if ended.signal_number().is_some() && !is_lost && deadline.claim_write_timeout(now, is_writing) {
             worker.send(Command::Cancel);
         }
         ended.signal_number().is_some() && deadline.is_over(now)
@@ -67,7 +67,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     let mut image_reporter = reporter();
     for overrides in render_requests(&order.overrides) {
         let turn = overrides.turn;
-        if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.says_results()) {
+        if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
             console.print_message(&format!("frame {} of {of}", number + 1));
         }
         worker.send(Command::Render(Box::new(Request {
@@ -84,20 +84,20 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
         exit = handle_events(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
-        reporter.end();
+        reporter.clear_output();
         is_whole = exit == Exit::DONE && turn.is_none_or(TurntableFrame::is_last);
         if exit != Exit::DONE || ended.signal_number().is_some() {
             break;
         }
     }
     let reporter = image_reporter;
-    if !reporter.says_diagnostics()
+    if !reporter.reports_diagnostics()
         && let Some(signal) = ended.signal_number().and_then(signals::signal_name)
     {
         console.print_message(&format!("terminated by {signal}: {}", describe_written(is_whole, &written)));
     }
-    worker.finish(deadline.time_left(Instant::now()));
-    ended.signal_number().map_or(exit, Exit::signal)
+    worker.stop_or_abandon(deadline.time_left(Instant::now()));
+    ended.signal_number().map_or(exit, Exit::from_signal)
 }
 
 /// Returns the render requests: a single request, or one per turntable frame.
@@ -149,7 +149,7 @@ impl ExitDeadline {
 
     /// Returns true the first time it is called after writing has taken too long. If an image was being
     /// written, extends the deadline so that a checkpoint can be written.
-    fn takes_write_timeout(&mut self, now: Instant, is_image: bool) -> bool {
+    fn claim_write_timeout(&mut self, now: Instant, is_image: bool) -> bool {
         let end = *self.end.get_or_insert(now + EXIT_TIMEOUT);
         if self.is_write_stopped || now + EXIT_TIMEOUT < end + WRITE_TIMEOUT {
             return false;
@@ -190,7 +190,7 @@ fn handle_events(
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => {
-                return console.fail(Exit::FAILED, "internal error: the worker thread has exited");
+                return console.print_error(Exit::FAILED, "internal error: the worker thread has exited");
             }
         };
         // Report warnings about the arguments together with warnings about the scene.
@@ -201,9 +201,9 @@ fn handle_events(
             && rereads_changed_file(stage)
         {
             worker.send(Command::Cancel);
-            reporter.end();
+            reporter.clear_output();
             let what = "the scene or one of its files changed during the turntable";
-            return console.fail(Exit::FAILED, what);
+            return console.print_error(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
             report_checkpoint(news, &mut call_warnings, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
@@ -215,7 +215,7 @@ fn handle_events(
         if let Event::Stage { stage, .. } = &event {
             is_writing = stage.name == Stage::Write && stage.status == Status::Running;
         }
-        reporter.event(&event);
+        reporter.handle_event(&event);
         match event {
             Event::Written { path, .. } => written.images.push(path),
             Event::Checkpoint { news: CheckpointUpdate::Written { path }, .. } => {
@@ -225,8 +225,8 @@ fn handle_events(
             // request fails.
             Event::WriteFailed { message, .. } => unwritten.push(message),
             Event::Done { report, warnings, .. } => {
-                reporter.end();
-                if !reporter.says_diagnostics() {
+                reporter.clear_output();
+                if !reporter.reports_diagnostics() {
                     console.print_diagnostics(&warnings);
                 }
                 return report_done(
@@ -238,8 +238,8 @@ fn handle_events(
                 );
             }
             Event::Failed { failure, .. } => {
-                reporter.end();
-                if reporter.says_diagnostics() {
+                reporter.clear_output();
+                if reporter.reports_diagnostics() {
                     return exit_code(&failure);
                 }
                 unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
@@ -282,12 +282,12 @@ fn report_checkpoint(
     console: &Console,
 ) {
     let say = |text: String| {
-        if reporter.says_results() {
+        if reporter.allows_text_results() {
             console.print_message(&text);
         }
     };
     let mut warn = |message: &str, help: &str| {
-        if reporter.says_diagnostics() {
+        if reporter.reports_diagnostics() {
             call_warnings.push(warning(message, help));
         } else {
             console.print_diagnostics(&[warning(message, help)]);
@@ -352,16 +352,16 @@ fn report_done(
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
-    if reporter.says_results() {
+    if reporter.allows_text_results() {
         written.iter().for_each(|path| console.print_message(&describe_written_image(path, report, turn)));
     }
     if let Some(turn) = turn.filter(|turn| turn.is_last()) {
         written
             .iter()
-            .filter_map(|path| left_over_warning(path, turn))
+            .filter_map(|path| leftover_frames_warning(path, turn))
             .for_each(|message| console.print_message(&message));
     }
-    if !reporter.says_diagnostics() {
+    if !reporter.reports_diagnostics() {
         unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
     }
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
@@ -369,7 +369,7 @@ fn report_done(
 
 /// Returns a warning about files left over from an earlier, longer turntable. `None` if there are no such
 /// files.
-fn left_over_warning(last: &Path, turn: TurntableFrame) -> Option<String> {
+fn leftover_frames_warning(last: &Path, turn: TurntableFrame) -> Option<String> {
     let left = leftover_frames(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);
     let more = if more == 0 { String::new() } else { format!(" and {more} more") };
@@ -402,7 +402,7 @@ fn describe_written_image(path: &Path, report: &Report, turn: Option<TurntableFr
         (min, max) if min == max => format!("{max} samples"),
         (min, max) => format!("{min} to {max} samples"),
     };
-    let seconds = progress::seconds(report.seconds);
+    let seconds = progress::format_seconds(report.seconds);
     format!("wrote {} ({}×{}, {samples}, {seconds})", path.display(), image.width, image.height)
 }
 
@@ -427,7 +427,7 @@ mod tests {
         let signal = Instant::now();
         for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
             let mut deadline = ExitDeadline::default();
-            let mut stops = |after| deadline.takes_write_timeout(signal + after, is_image);
+            let mut stops = |after| deadline.claim_write_timeout(signal + after, is_image);
             assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
             assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");
             assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));

@@ -17,7 +17,7 @@ pub struct ImagePosition {
 
 /// Rectangle in an image, as fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Section {
+pub struct NormalizedRect {
     /// Left edge.
     pub left: f64,
     /// Top edge.
@@ -28,7 +28,7 @@ pub struct Section {
     pub height: f64,
 }
 
-impl Section {
+impl NormalizedRect {
     /// Returns the smallest section containing both positions.
     pub fn between(a: ImagePosition, b: ImagePosition) -> Self {
         let (left, top) = (a.x.min(b.x), a.y.min(b.y));
@@ -66,7 +66,7 @@ impl Section {
 
 /// Object and color at an image position.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picked {
+pub struct PickResult {
     /// Column and row of the pixel.
     pub pixel: [u32; 2],
     /// The visible object. `None` if the ray hits nothing.
@@ -111,7 +111,7 @@ pub struct MovedCamera {
 
 /// Result of saving the camera to the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SavedCamera {
+pub struct CameraSaveResult {
     /// The scene file.
     pub path: PathBuf,
     /// Whether the file was written. `false` if it already contained this camera.
@@ -121,12 +121,12 @@ pub struct SavedCamera {
     /// Whether a new scene file was created next to the model, which remains open.
     pub of_model: bool,
     /// The edit that the `u` key undoes. `None` if nothing was written or the file is new.
-    pub edit: Option<CameraEdit>,
+    pub edit: Option<SceneFileEdit>,
 }
 
 /// An edit that saved a camera to a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CameraEdit {
+pub struct SceneFileEdit {
     /// The scene file.
     pub path: PathBuf,
     /// Text before the edit.
@@ -148,14 +148,20 @@ mod tests {
             Rect { x: 39, y: 29, width: 1, height: 1 },
         ] {
             // Rounding errors must not add pixels.
-            let Section { left, top, width, height } = Section::from_pixels(rect, size);
-            let inside =
-                Section { left: left + 1e-9, top: top + 1e-9, width: width - 2e-9, height: height - 2e-9 };
+            let NormalizedRect { left, top, width, height } = NormalizedRect::from_pixels(rect, size);
+            let inside = NormalizedRect {
+                left: left + 1e-9,
+                top: top + 1e-9,
+                width: width - 2e-9,
+                height: height - 2e-9,
+            };
             assert_eq!(inside.pixels(size), rect);
         }
-        let one = Section::between(ImagePosition { x: 0.99, y: 0.5 }, ImagePosition { x: 0.99, y: 0.5 });
+        let one =
+            NormalizedRect::between(ImagePosition { x: 0.99, y: 0.5 }, ImagePosition { x: 0.99, y: 0.5 });
         assert_eq!(one.pixels(size), Rect { x: 39, y: 15, width: 1, height: 1 });
-        let wide = Section::between(ImagePosition { x: 1.5, y: -0.2 }, ImagePosition { x: 0.5, y: 2.0 });
+        let wide =
+            NormalizedRect::between(ImagePosition { x: 1.5, y: -0.2 }, ImagePosition { x: 0.5, y: 2.0 });
         assert_eq!(wide.pixels(size), Rect { x: 20, y: 0, width: 20, height: 30 });
     }
 }

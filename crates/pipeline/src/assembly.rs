@@ -11,11 +11,11 @@ use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
-use crate::scene::fingerprint::{FingerprintContext, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
 /// A world and its key, which covers everything that affects the world's images.
-pub(super) type KeyedWorld = (Key, Arc<World>);
+pub(super) type KeyedWorld = (Fingerprint, Arc<World>);
 
 /// A request's camera: the scene's camera with the request's changes applied.
 #[derive(Clone, Debug)]
@@ -29,21 +29,21 @@ impl RequestCamera {
     pub(super) fn new(scene: &Scene, orbiter: Option<OrbiterCamera>, change: &CameraChange) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.has_changes() {
-            Self { camera: own.viewpoint().changed(change).into(), orbiter: None }
+            Self { camera: own.viewpoint().with_change(change).into(), orbiter: None }
         } else {
             own
         }
     }
 
     /// Rotates the camera for a turntable frame. Without a turntable, returns it unchanged.
-    pub(super) fn turned(self, turn: Option<TurntableFrame>) -> Self {
+    pub(super) fn rotated_for_turntable(self, turn: Option<TurntableFrame>) -> Self {
         match turn {
             // The first frame uses the scene's camera unchanged.
             None | Some(TurntableFrame { number: 0, .. }) => self,
             Some(turn) => {
                 let view = self.viewpoint();
                 let change = CameraChange { pose: Some(turn.pose(&view.pose)), ..CameraChange::default() };
-                Self { camera: view.changed(&change).into(), orbiter: None }
+                Self { camera: view.with_change(&change).into(), orbiter: None }
             }
         }
     }
@@ -53,21 +53,21 @@ impl RequestCamera {
     }
 
     /// Returns the coordinate origin that maximizes precision near the camera.
-    pub(super) fn origin(&self) -> DVec3 {
-        world::origin(&self.camera, self.orbiter.as_ref())
+    pub(super) fn coordinate_origin(&self) -> DVec3 {
+        world::choose_scene_origin(&self.camera, self.orbiter.as_ref())
     }
 }
 
 /// Assembles the world, or reuses the previous one if the key is unchanged.
-pub(super) fn world(
+pub(super) fn build_or_reuse_world(
     scene: &Scene,
-    (surfaces, of): (&Key, &FingerprintContext<'_>),
+    (surfaces, of): (&Fingerprint, &FingerprintContext<'_>),
     (built, lights, bodies): (AccelResult, Arc<Lights>, Arc<GlassSolids>),
     textures: &Textures,
     eye: &RequestCamera,
     memo: &mut Memo<Arc<World>>,
 ) -> KeyedWorld {
-    let key = keys::world(surfaces, &eye.camera, of);
+    let key = keys::world_key(surfaces, &eye.camera, of);
     let built_key = keys::with_tree_kind(&key, scene.render.accel);
     if let Some(world) = memo.get(built_key) {
         return (key, world.clone());

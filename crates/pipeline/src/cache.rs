@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
 use std::sync::Arc;
 
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 
 /// Cache for a single value.
 #[derive(Debug)]
 pub(super) struct Memo<T> {
-    last: Option<(Key, T)>,
+    last: Option<(Fingerprint, T)>,
 }
 
 impl<T> Default for Memo<T> {
@@ -20,7 +20,7 @@ impl<T> Default for Memo<T> {
 
 impl<T> Memo<T> {
     /// Returns the value if its key matches.
-    pub(super) fn get(&self, key: Key) -> Option<&T> {
+    pub(super) fn get(&self, key: Fingerprint) -> Option<&T> {
         self.last.as_ref().filter(|(of, _)| *of == key).map(|(_, value)| value)
     }
 
@@ -30,7 +30,7 @@ impl<T> Memo<T> {
     }
 
     /// Replaces the cached value.
-    pub(super) fn set(&mut self, key: Key, value: T) {
+    pub(super) fn set(&mut self, key: Fingerprint, value: T) {
         self.last = Some((key, value));
     }
 }
@@ -44,7 +44,7 @@ pub(super) struct NamedCache<N, T> {
 
 #[derive(Debug)]
 struct CacheEntry<T> {
-    key: Key,
+    key: Fingerprint,
     value: Arc<T>,
     bytes: usize,
     /// Whether the current request has used the value.
@@ -66,7 +66,7 @@ impl<N, T> Default for NamedCache<N, T> {
 
 impl<N: Hash + Eq, T> NamedCache<N, T> {
     /// Returns the value with this name if its key matches.
-    pub(super) fn get(&mut self, name: &N, key: Key) -> Option<Arc<T>> {
+    pub(super) fn get(&mut self, name: &N, key: Fingerprint) -> Option<Arc<T>> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
         entry.used = true;
         Some(entry.value.clone())
@@ -78,7 +78,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
     }
 
     /// Inserts or replaces the value with this name. `bytes` is its size.
-    pub(super) fn insert(&mut self, name: N, key: Key, (value, bytes): (Arc<T>, usize)) {
+    pub(super) fn insert(&mut self, name: N, key: Fingerprint, (value, bytes): (Arc<T>, usize)) {
         self.entries.insert(name, CacheEntry { key, value, bytes, used: true, proven: false, request: 0 });
     }
 
@@ -106,7 +106,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
 /// Returns the earliest request that can keep its unused values: they fit into `most_bytes` together with the
 /// unused values of all later requests. A request's values are all evicted together, because half a scene is
 /// of little use and trees keep their meshes alive.
-pub(super) fn first_request_that_fits(
+pub(super) fn oldest_request_to_keep(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
 ) -> u64 {
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::scene::fingerprint::FingerprintHasher;
 
-    fn key(name: &str) -> Key {
+    fn key(name: &str) -> Fingerprint {
         FingerprintHasher::new(name).finish()
     }
 
@@ -145,7 +145,7 @@ mod tests {
     /// Ends a request and evicts unused values until the remaining ones fit into `most_bytes`.
     fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.end_request(success, request);
-        pool.evict_unused_before(first_request_that_fits(pool.eviction_candidates(), most_bytes));
+        pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), most_bytes));
     }
 
     #[test]

@@ -6,12 +6,12 @@ use std::sync::mpsc;
 
 use super::engine::{Engine, EngineConfig};
 use super::memory::MemoryEstimate;
-use super::plan::plan;
+use super::plan::resolve_plan;
 use super::protocol::{Failure, PreviewSlot};
 use super::settings::Overrides;
-use super::sink::Sink;
+use super::sink::EventSink;
 use super::stages::meshes::Meshes;
-use super::stages::parse::Parsed;
+use super::stages::parse::ParsedScene;
 use super::stages::textures::Textures;
 use crate::assets::FileMaterial;
 use crate::control::CancelToken;
@@ -38,14 +38,14 @@ pub struct SceneSummary {
 ///
 /// # Errors
 /// Returns all errors and warnings for the scene and its files.
-pub fn check(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
-    IncrementalChecker::default().check(path, sets, &CancelToken::new())
+pub fn check_scene(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
+    IncrementalSceneChecker::default().check(path, sets, &CancelToken::new())
 }
 
 /// Checks scenes repeatedly, rereading only files that have changed.
-pub struct IncrementalChecker(Engine);
+pub struct IncrementalSceneChecker(Engine);
 
-impl Default for IncrementalChecker {
+impl Default for IncrementalSceneChecker {
     fn default() -> Self {
         Self(Engine::new(EngineConfig::default(), Arc::default()))
     }
@@ -56,19 +56,21 @@ impl Default for IncrementalChecker {
 /// # Errors
 /// Returns all errors in the scene and its files.
 pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
-    let IncrementalChecker(mut engine) = IncrementalChecker::default();
+    let IncrementalSceneChecker(mut engine) = IncrementalSceneChecker::default();
     let token = CancelToken::new();
-    let (parsed, meshes, textures, _) = engine.read_all(path, &overrides.sets, &silent_sink(), &token)?;
-    let plan = plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
-    Ok(MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
+    let (parsed, meshes, textures, _) =
+        engine.load_all_assets(path, &overrides.sets, &silent_sink(), &token)?;
+    let plan =
+        resolve_plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
+    Ok(MemoryEstimate::for_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
 }
 
-fn silent_sink() -> Sink {
+fn silent_sink() -> EventSink {
     let (events, _) = mpsc::channel();
-    Sink { generation: 0, events, previews: PreviewSlot::default(), within: None }
+    EventSink { generation: 0, events, previews: PreviewSlot::default(), within: None }
 }
 
-impl IncrementalChecker {
+impl IncrementalSceneChecker {
     /// Checks a scene and all files it references, used or not.
     ///
     /// # Errors
@@ -80,13 +82,14 @@ impl IncrementalChecker {
         sets: &[String],
         token: &CancelToken,
     ) -> Result<SceneSummary, Failure> {
-        let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &silent_sink(), token)?;
+        let (parsed, meshes, textures, warnings) =
+            self.0.load_all_assets(path, sets, &silent_sink(), token)?;
         Ok(summarize(&parsed, &meshes, &textures, warnings))
     }
 }
 
 fn summarize(
-    parsed: &Parsed,
+    parsed: &ParsedScene,
     meshes: &Meshes,
     textures: &Textures,
     mut warnings: Vec<Diagnostic>,

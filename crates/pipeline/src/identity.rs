@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 use super::assembly::RequestCamera;
 use super::build::BUILD;
 use super::keys;
-use super::plan::Plan;
-use super::stages::parse::Parsed;
-use super::watch::content::{Content, FileRead};
+use super::plan::RenderPlan;
+use super::stages::parse::ParsedScene;
+use super::watch::content::{FileContentId, FileRead};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::Dependency;
 use crate::scene::description::{CameraChange, Scene};
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Everything that affects an image.
 pub(super) struct ImageDependencies<'a> {
-    pub(super) parsed: &'a Parsed,
-    pub(super) plan: &'a Plan,
+    pub(super) parsed: &'a ParsedScene,
+    pub(super) plan: &'a RenderPlan,
     pub(super) camera: &'a CameraChange,
     /// Files that were read, including the scene file.
     pub(super) files: &'a [FileRead],
@@ -38,7 +38,7 @@ impl ImageDependencies<'_> {
         traits.extend(
             others.map(|file| Dependency::file(&relative_path(&file.path, scene_path), hash_or_reason(file))),
         );
-        traits.push(Dependency::everything(self.fingerprint().to_string()));
+        traits.push(Dependency::combined_hash(self.fingerprint().to_string()));
         traits
     }
 
@@ -59,7 +59,7 @@ impl ImageDependencies<'_> {
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
         // All parts must have the same view. Checkpoints only need the same samples.
-        let sampled = if self.divided.is_some() { view } else { view.sampled() };
+        let sampled = if self.divided.is_some() { view } else { view.sampled_view() };
         add("view", sampled.name().to_owned());
         add(
             "photons",
@@ -86,32 +86,35 @@ impl ImageDependencies<'_> {
     }
 
     /// Returns a fingerprint of shapes, materials, lights, camera and settings.
-    fn fingerprint(&self) -> Key {
+    fn fingerprint(&self) -> Fingerprint {
         let scene = self.scene_with_content_hashes();
         let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let meshes: Vec<Key> =
-            scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value), file.part)).collect();
-        let of = keys::referents(&scene, &meshes, orbiter.as_deref());
-        let world = keys::world(&keys::surfaces(&scene, &of, &[]), &eye.camera, &of);
-        keys::render(world, &self.plan.settings, self.plan.crop)
+        let meshes: Vec<Fingerprint> = scene
+            .mesh_files
+            .iter()
+            .map(|file| file_content_key(&self.describe_file_content(&file.value), file.part))
+            .collect();
+        let of = keys::fingerprint_context(&scene, &meshes, orbiter.as_deref());
+        let world = keys::world_key(&keys::surfaces_key(&scene, &of, &[]), &eye.camera, &of);
+        keys::film_key(world, &self.plan.settings, self.plan.crop)
     }
 
     /// Returns the scene with each path replaced by a description of the file's content.
     fn scene_with_content_hashes(&self) -> Scene {
         let mut scene = Scene::clone(&self.plan.scene);
         for texture in &mut scene.textures {
-            texture.file.value = self.content_of(&texture.file.value).into();
+            texture.file.value = self.describe_file_content(&texture.file.value).into();
         }
         if let Some(file) = scene.environment.as_mut().and_then(|environment| environment.file.as_mut()) {
-            file.value = self.content_of(&file.value).into();
+            file.value = self.describe_file_content(&file.value).into();
         }
         scene
     }
 
     /// Describes a file's content. Uses the file name if the file was not read, because unread files do not
     /// affect the image.
-    fn content_of(&self, path: &Path) -> String {
+    fn describe_file_content(&self, path: &Path) -> String {
         match self.files.iter().find(|file| file.path == path) {
             Some(file) => hash_or_reason(file),
             None => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -119,11 +122,11 @@ impl ImageDependencies<'_> {
     }
 }
 
-fn key(content: &str, part: Option<u32>) -> Key {
+fn file_content_key(content: &str, part: Option<u32>) -> Fingerprint {
     let mut key = FingerprintHasher::new("content");
-    key.text(content);
+    key.add_str(content);
     if let Some(part) = part {
-        key.index(part as usize);
+        key.add_index(part as usize);
     }
     key.finish()
 }
@@ -139,8 +142,8 @@ pub(super) fn relative_path(path: &Path, scene: &Path) -> String {
 /// Returns the file's hash in hexadecimal, or the reason why there is none.
 fn hash_or_reason(file: &FileRead) -> String {
     match file.content {
-        Content::Missing => "missing".to_owned(),
-        Content::Unusable(_) => "not readable".to_owned(),
-        Content::Hash(hash) => hash.iter().map(|byte| format!("{byte:02x}")).collect(),
+        FileContentId::Missing => "missing".to_owned(),
+        FileContentId::Unusable(_) => "not readable".to_owned(),
+        FileContentId::Hash(hash) => hash.iter().map(|byte| format!("{byte:02x}")).collect(),
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::identity::relative_path;
 use super::stages::meshes::Meshes;
-use super::stages::parse::Parsed;
+use super::stages::parse::ParsedScene;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
 use crate::output::{FileFingerprint, FileIdentity};
@@ -16,7 +16,7 @@ use crate::scene::{LoadedScene, is_model};
 
 /// A file that must not be written.
 #[derive(Clone, Debug)]
-pub(super) struct Input {
+pub(super) struct ProtectedInput {
     pub(super) path: PathBuf,
     /// Role of the file in the scene, for messages.
     pub(super) role: String,
@@ -26,19 +26,19 @@ pub(super) struct Input {
 
 /// All files that must not be written.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Inputs(Vec<Input>);
+pub(super) struct ProtectedInputs(Vec<ProtectedInput>);
 
-impl Inputs {
+impl ProtectedInputs {
     /// Collects the scene file and all files it references, used or not.
-    pub(super) fn of_scene(parsed: &Parsed) -> Self {
+    pub(super) fn from_scene(parsed: &ParsedScene) -> Self {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
         let role = if is_model(&path) { "the model" } else { "the scene file" };
-        let mut inputs = Self(vec![Input { path, role: role.to_owned(), place: None }]);
+        let mut inputs = Self(vec![ProtectedInput { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));
-            inputs.0.push(Input { path: path.to_owned(), role, place });
+            inputs.0.push(ProtectedInput { path: path.to_owned(), role, place });
         };
         match &scene.camera {
             Camera::Orbiter { file, .. } => {
@@ -57,7 +57,7 @@ impl Inputs {
         }
         for path in &parsed.named {
             let role = "a file that the scene references without the current overrides".to_owned();
-            inputs.0.push(Input { path: path.clone(), role, place: None });
+            inputs.0.push(ProtectedInput { path: path.clone(), role, place: None });
         }
         inputs
     }
@@ -68,7 +68,7 @@ impl Inputs {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
             let mut add = |path: &PathBuf, role: String| {
                 let place = Some((Arc::clone(loaded), file.span.clone()));
-                self.0.push(Input { path: path.clone(), role, place });
+                self.0.push(ProtectedInput { path: path.clone(), role, place });
             };
             let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
             for companion in &kept.mesh.companions {
@@ -85,7 +85,7 @@ impl Inputs {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         for file in files.iter().filter(|file| !known.contains(&file.path)) {
             let role = "a file read by the scene".to_owned();
-            self.0.push(Input { path: file.path.clone(), role, place: None });
+            self.0.push(ProtectedInput { path: file.path.clone(), role, place: None });
         }
     }
 
@@ -106,33 +106,33 @@ impl Inputs {
     pub(super) fn index_by_identity(&self) -> InputIndex<'_> {
         let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
-            if let Some(identity) = FileIdentity::of(&input.path) {
+            if let Some(identity) = FileIdentity::from_path(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
             }
-            on_disk.alike.extend(FileFingerprint::of(&input.path).map(|likeness| (likeness, input)));
+            on_disk.alike.extend(FileFingerprint::from_path(&input.path).map(|likeness| (likeness, input)));
         }
         on_disk
     }
 
     /// Whether a path currently refers to one of the files.
     pub(super) fn contain(&self, path: &Path) -> bool {
-        FileIdentity::of(path).is_some_and(|_| self.index_by_identity().find(path).is_some())
+        FileIdentity::from_path(path).is_some_and(|_| self.index_by_identity().find(path).is_some())
     }
 }
 
 /// Inputs indexed by file identity, with fingerprints for finding similar files.
 pub(super) struct InputIndex<'a> {
-    by_identity: HashMap<FileIdentity, &'a Input>,
-    alike: Vec<(FileFingerprint, &'a Input)>,
+    by_identity: HashMap<FileIdentity, &'a ProtectedInput>,
+    alike: Vec<(FileFingerprint, &'a ProtectedInput)>,
 }
 
 impl<'a> InputIndex<'a> {
     /// Returns the input that a path refers to, or probably refers to.
-    pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
-        if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
+    pub(super) fn find(&self, path: &Path) -> Option<&'a ProtectedInput> {
+        if let Some(input) = self.by_identity.get(&FileIdentity::from_path(path)?) {
             return Some(input);
         }
-        let own = FileFingerprint::of(path)?;
+        let own = FileFingerprint::from_path(path)?;
         self.alike.iter().find(|(likeness, _)| own.may_equal(likeness)).map(|(_, input)| *input)
     }
 }
@@ -150,7 +150,11 @@ mod tests {
         for (name, text) in [("t.png", "one"), ("T.PNG", "longer"), ("other.png", "two")] {
             fs::write(at(name), text).expect("written");
         }
-        let inputs = Inputs(vec![Input { path: at("t.png"), role: "a texture".to_owned(), place: None }]);
+        let inputs = ProtectedInputs(vec![ProtectedInput {
+            path: at("t.png"),
+            role: "a texture".to_owned(),
+            place: None,
+        }]);
         for (name, is_input) in [("t.png", true), ("T.PNG", true), ("other.png", false), ("none.png", false)]
         {
             assert_eq!(inputs.contain(&at(name)), is_input, "{name}");

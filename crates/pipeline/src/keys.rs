@@ -4,14 +4,14 @@
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
-use crate::plan::Plan;
-use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
-use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Key};
+use crate::plan::RenderPlan;
+use crate::scene::description::{Accel, Camera, Object, RenderOptions, Scene, Shape};
+use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
 
 /// Returns the textures, meshes and orbiter that scene descriptions refer to by index.
-pub(crate) fn referents<'a>(
+pub(crate) fn fingerprint_context<'a>(
     scene: &'a Scene,
-    meshes: &'a [Key],
+    meshes: &'a [Fingerprint],
     orbiter: Option<&'a str>,
 ) -> FingerprintContext<'a> {
     FingerprintContext { textures: &scene.textures, meshes, orbiter }
@@ -19,33 +19,33 @@ pub(crate) fn referents<'a>(
 
 /// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
 /// the entire mesh emissive.
-pub(crate) fn distinct_lights(mesh: &Key, is_emissive: bool) -> Key {
-    FingerprintHasher::new("distinct lights").key(mesh).flag(is_emissive).finish()
+pub(crate) fn distinct_lights_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
+    FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
 /// Returns the key for a mesh's tree. `distinct` is the key of the mesh with distinct lights if it differs from
 /// the mesh in the file.
-pub(crate) fn tree(mesh: &Key, accel: Accel, distinct: Option<Key>) -> Key {
-    FingerprintHasher::new("tree").key(&distinct.unwrap_or(*mesh)).choice(accel).finish()
+pub(crate) fn mesh_accel_key(mesh: &Fingerprint, accel: Accel, distinct: Option<Fingerprint>) -> Fingerprint {
+    FingerprintHasher::new("tree").add_fingerprint(&distinct.unwrap_or(*mesh)).add_choice(accel).finish()
 }
 
 /// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is
-/// offset. `distinct` contains the keys of the meshes with distinct lights, see [`tree`].
-pub(crate) fn geometry(
+/// offset. `distinct` contains the keys of the meshes with distinct lights, see [`mesh_accel_key`].
+pub(crate) fn geometry_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     (origin, lifts): (DVec3, &[DVec3]),
-    distinct: impl Iterator<Item = Option<Key>>,
-) -> Key {
+    distinct: impl Iterator<Item = Option<Fingerprint>>,
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("lifted");
-    key.key(&from(&shapes(scene, of), origin));
+    key.add_fingerprint(&with_origin(&shapes_key(scene, of), origin));
     for lift in lifts {
-        key.dvec3(*lift);
+        key.add_dvec3(*lift);
     }
     for distinct in distinct {
-        key.flag(distinct.is_some());
+        key.add_bool(distinct.is_some());
         if let Some(distinct) = distinct {
-            key.key(&distinct);
+            key.add_fingerprint(&distinct);
         }
     }
     with_tree_kind(&key.finish(), scene.render.accel)
@@ -53,33 +53,33 @@ pub(crate) fn geometry(
 
 /// Returns the key for the shapes and their emitting sides, which determine the lights to be moved off
 /// coplanar surfaces.
-pub(crate) fn coplanar(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+pub(crate) fn coplanar_lights_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("coplanar");
-    key.key(&shapes(scene, of));
+    key.add_fingerprint(&shapes_key(scene, of));
     let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
     for object in scene.objects.iter().filter(|object| !is_round(object)) {
         let material = object.material.map(|index| &scene.materials[index]);
         let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
         let is_glass = material.is_some_and(|material| material.kind.is_glass());
-        key.flag(object.material.is_some()).flag(is_glass).flag(emission.is_some());
+        key.add_bool(object.material.is_some()).add_bool(is_glass).add_bool(emission.is_some());
         if let Some(sides) = emission {
-            key.choice(sides);
+            key.add_choice(sides);
         }
     }
     key.finish()
 }
 
 /// Combines a key with a coordinate origin.
-pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
-    FingerprintHasher::new("from").key(of).dvec3(origin).finish()
+pub(crate) fn with_origin(of: &Fingerprint, origin: DVec3) -> Fingerprint {
+    FingerprintHasher::new("from").add_fingerprint(of).add_dvec3(origin).finish()
 }
 
 /// Combines a geometry key with the tree type.
-pub(crate) fn with_tree_kind(of: &Key, accel: Accel) -> Key {
-    FingerprintHasher::new("in trees").key(of).choice(accel).finish()
+pub(crate) fn with_tree_kind(of: &Fingerprint, accel: Accel) -> Fingerprint {
+    FingerprintHasher::new("in trees").add_fingerprint(of).add_choice(accel).finish()
 }
 
-fn shapes(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+fn shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("shapes");
     for object in &scene.objects {
         key.add(&object.shape, of);
@@ -88,14 +88,14 @@ fn shapes(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
 }
 
 /// Returns the key for the shapes and their glass materials.
-pub(crate) fn glass(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+pub(crate) fn glass_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("glass");
-    key.key(&shapes(scene, of));
+    key.add_fingerprint(&shapes_key(scene, of));
     for object in &scene.objects {
         let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_key());
-        key.flag(object.material.is_some()).flag(substance.is_some());
+        key.add_bool(object.material.is_some()).add_bool(substance.is_some());
         for part in substance.into_iter().flatten() {
-            key.u64(part);
+            key.add_u64(part);
         }
     }
     key.finish()
@@ -103,27 +103,27 @@ pub(crate) fn glass(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
 
 /// Returns the key for all lights: emission, position and object. `sky` is the environment map's key.
 /// `patterns` are the keys of emission textures.
-pub(crate) fn lights(
+pub(crate) fn lights_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     (origin, lifts): (DVec3, &[DVec3]),
-    (sky, patterns): (Option<&Key>, &[&Key]),
-) -> Key {
+    (sky, patterns): (Option<&Fingerprint>, &[&Fingerprint]),
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("lights");
-    key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
+    key.add_fingerprint(&with_origin(&light_descriptions_key(scene, of), origin)).add_bool(sky.is_some());
     for lift in lifts {
-        key.dvec3(*lift);
+        key.add_dvec3(*lift);
     }
     if let Some(sky) = sky {
-        key.key(sky);
+        key.add_fingerprint(sky);
     }
     for pattern in patterns {
-        key.key(pattern);
+        key.add_fingerprint(pattern);
     }
     key.finish()
 }
 
-fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("described lights");
     key.add(&scene.environment, of);
     for light in &scene.lights {
@@ -133,7 +133,7 @@ fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
         match object.material.map(|index| &scene.materials[index]) {
             Some(material) if !material.emits() => {}
             Some(material) => {
-                key.index(number)
+                key.add_index(number)
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
@@ -143,7 +143,7 @@ fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
             }
             // Materials from the mesh file may emit.
             None => {
-                key.index(number).add(&object.shape, of).text("own");
+                key.add_index(number).add(&object.shape, of).add_str("own");
             }
         }
     }
@@ -152,54 +152,69 @@ fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
 
 /// Returns the key for a world. It excludes the tree type, because all types produce the same hits. Views
 /// that visualize trees include the type in their own keys.
-pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &FingerprintContext<'_>) -> Key {
-    FingerprintHasher::new("world").key(surfaces).add(camera, of).finish()
+pub(crate) fn world_key(surfaces: &Fingerprint, camera: &Camera, of: &FingerprintContext<'_>) -> Fingerprint {
+    FingerprintHasher::new("world").add_fingerprint(surfaces).add(camera, of).finish()
 }
 
 /// Returns the key for photons: surfaces relative to `origin`, emission and maximum depth.
-pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
+pub(crate) fn photons_key(
+    surfaces: &Fingerprint,
+    origin: DVec3,
+    render: &RenderOptions,
+    photons: PhotonSettings,
+) -> Fingerprint {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = FingerprintHasher::new("photons");
-    key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
-    key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
+    key.add_fingerprint(&with_origin(surfaces, origin))
+        .add_u64(count.into())
+        .add_f32(radius)
+        .add_u64(bounces.into());
+    key.add_u64(render.max_depth.into()).add_u64(render.seed.into()).finish()
 }
 
 /// Returns the key for all surfaces, lights and textures.
-pub(crate) fn surfaces(scene: &Scene, of: &FingerprintContext<'_>, textures: &[Key]) -> Key {
+pub(crate) fn surfaces_key(
+    scene: &Scene,
+    of: &FingerprintContext<'_>,
+    textures: &[Fingerprint],
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("surfaces");
-    key.key(&shapes(scene, of)).key(&described_lights(scene, of));
+    key.add_fingerprint(&shapes_key(scene, of)).add_fingerprint(&light_descriptions_key(scene, of));
     for object in &scene.objects {
         match object.material {
-            Some(index) => key.index(1).add(&scene.materials[index], of),
-            None => key.index(0),
+            Some(index) => key.add_index(1).add(&scene.materials[index], of),
+            None => key.add_index(0),
         };
-        key.flag(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
+        key.add_bool(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
     }
     for texture in textures {
-        key.key(texture);
+        key.add_fingerprint(texture);
     }
     key.finish()
 }
 
 /// Returns the key for everything that affects a film's sums, except the sample count.
-pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+pub(crate) fn film_key(world: Fingerprint, settings: &RenderSettings, crop: Option<Rect>) -> Fingerprint {
     let mut key = FingerprintHasher::new("render");
-    key.key(&world).add(settings, &FingerprintContext::default());
+    key.add_fingerprint(&world).add(settings, &FingerprintContext::default());
     if let Some(rect) = crop {
-        key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
+        key.add_u64(rect.x.into())
+            .add_u64(rect.y.into())
+            .add_u64(rect.width.into())
+            .add_u64(rect.height.into());
     }
     key.finish()
 }
 
 /// Returns the key for the image developed from a film. With a time limit, noise varies between films, so the
 /// key includes `film_number`.
-pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
-    let Render { samples, error, .. } = plan.settings.render;
+pub(crate) fn image_key(film: Fingerprint, plan: &RenderPlan, film_number: u64) -> Fingerprint {
+    let RenderOptions { samples, error, .. } = plan.settings.render;
     let mut key = FingerprintHasher::new("image");
-    key.key(&film).u64(samples.into()).f32(error);
-    key.choice(plan.settings.view).f32(plan.tone.exposure_stops).choice(plan.tone.curve);
+    key.add_fingerprint(&film).add_u64(samples.into()).add_f32(error);
+    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_choice(plan.tone.curve);
     if let Some(seconds) = plan.time_seconds {
-        key.f64(seconds).u64(film_number);
+        key.add_f64(seconds).add_u64(film_number);
     }
     key.finish()
 }
@@ -207,20 +222,20 @@ pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrators::View;
+    use crate::integrators::ViewMode;
     use crate::math::Vec3;
-    use crate::scene::description::{Integrator, PixelFilter, Shadows, Tonemap};
+    use crate::scene::description::{Integrator, PixelFilter, ShadowMode, Tonemap};
     use crate::tests::loaded_of;
 
     const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
 
-    fn keys(text: &str) -> (Key, Key, Key) {
+    fn keys(text: &str) -> (Fingerprint, Fingerprint, Fingerprint) {
         let scene = loaded_of(text).scene;
-        let of = referents(&scene, &[], None);
+        let of = fingerprint_context(&scene, &[], None);
         (
-            geometry(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
-            lights(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
-            world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
+            geometry_key(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
+            lights_key(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
+            world_key(&surfaces_key(&scene, &of, &[]), &scene.camera, &of),
         )
     }
 
@@ -251,7 +266,12 @@ mod tests {
         assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
         let lifted = |lift: DVec3| {
             let scene = loaded_of(BALL).scene;
-            geometry(&scene, &referents(&scene, &[], None), (DVec3::ZERO, &[lift]), std::iter::empty())
+            geometry_key(
+                &scene,
+                &fingerprint_context(&scene, &[], None),
+                (DVec3::ZERO, &[lift]),
+                std::iter::empty(),
+            )
         };
         assert_ne!(lifted(DVec3::X), lifted(DVec3::Y));
     }
@@ -286,13 +306,13 @@ mod tests {
     #[test]
     fn render_key_covers_every_setting() {
         let scene = loaded_of(BALL).scene;
-        let plan = crate::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
+        let plan = crate::plan::resolve_plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
-        let of = |settings: &RenderSettings| render(FingerprintHasher::new("w").finish(), settings, None);
+        let of = |settings: &RenderSettings| film_key(FingerprintHasher::new("w").finish(), settings, None);
         let render_settings = settings.render;
         // No `..` here: adding a field must cause a compile error until it is tested below.
         let RenderSettings { render: _, dof, view, photons } = settings;
-        let Render {
+        let RenderOptions {
             width,
             height,
             samples,
@@ -310,65 +330,66 @@ mod tests {
             accel,
             seed,
         } = render_settings;
-        assert_eq!((integrator, shadows, clamp), (Integrator::Whitted, Shadows::Soft, 0.0));
-        let path = Render { integrator: Integrator::Path, ..render_settings };
+        assert_eq!((integrator, shadows, clamp), (Integrator::Whitted, ShadowMode::Soft, 0.0));
+        let path = RenderOptions { integrator: Integrator::Path, ..render_settings };
         assert_eq!(
             (filter, view, tonemap, accel),
-            (PixelFilter::Box, View::Beauty, Tonemap::None, Accel::Bvh)
+            (PixelFilter::Box, ViewMode::Beauty, Tonemap::None, Accel::Bvh)
         );
-        let with = |render: Render| RenderSettings { render, ..settings };
+        let with = |render: RenderOptions| RenderSettings { render, ..settings };
         assert_eq!(photons, None);
         let some = PhotonSettings { count: 7, radius: 0.0, bounces: 2 };
         let with_photons = |photons| RenderSettings { photons: Some(photons), ..settings };
         let gathering = with_photons(some);
         let others = [
-            with(Render { width: width + 1, ..render_settings }),
-            with(Render { height: height + 1, ..render_settings }),
-            with(Render { error: error + 0.5, ..render_settings }),
-            with(Render { shadow_samples: shadow_samples + 1, ..render_settings }),
-            with(Render { max_depth: max_depth + 1, ..render_settings }),
-            with(Render { shadows: Shadows::Hard, ..render_settings }),
-            with(Render { shadows: Shadows::Off, ..render_settings }),
+            with(RenderOptions { width: width + 1, ..render_settings }),
+            with(RenderOptions { height: height + 1, ..render_settings }),
+            with(RenderOptions { error: error + 0.5, ..render_settings }),
+            with(RenderOptions { shadow_samples: shadow_samples + 1, ..render_settings }),
+            with(RenderOptions { max_depth: max_depth + 1, ..render_settings }),
+            with(RenderOptions { shadows: ShadowMode::Hard, ..render_settings }),
+            with(RenderOptions { shadows: ShadowMode::Off, ..render_settings }),
             with(path),
-            with(Render { clamp: 1.0, ..path }),
-            with(Render { ambient: ambient + Vec3::ONE, ..render_settings }),
-            with(Render { background: background + Vec3::ONE, ..render_settings }),
-            with(Render { filter: PixelFilter::Tent, ..render_settings }),
-            with(Render { seed: seed + 1, ..render_settings }),
+            with(RenderOptions { clamp: 1.0, ..path }),
+            with(RenderOptions { ambient: ambient + Vec3::ONE, ..render_settings }),
+            with(RenderOptions { background: background + Vec3::ONE, ..render_settings }),
+            with(RenderOptions { filter: PixelFilter::Tent, ..render_settings }),
+            with(RenderOptions { seed: seed + 1, ..render_settings }),
             RenderSettings { dof: !dof, ..settings },
-            RenderSettings { view: View::Uv, ..settings },
+            RenderSettings { view: ViewMode::Uv, ..settings },
             gathering,
             with_photons(PhotonSettings { count: 8, ..some }),
             with_photons(PhotonSettings { radius: 0.5, ..some }),
             with_photons(PhotonSettings { bounces: 3, ..some }),
         ];
-        let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
+        let lit = RenderOptions { ambient: ambient + Vec3::ONE, ..render_settings };
         assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
         assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
         // Sample count, display settings and tree type do not change the samples taken.
         for same in [
-            Render { samples: samples + 1, ..render_settings },
-            Render { exposure: exposure + 1.0, ..render_settings },
-            Render { tonemap: Tonemap::Aces, ..render_settings },
-            Render { accel: Accel::KdTree, ..render_settings },
+            RenderOptions { samples: samples + 1, ..render_settings },
+            RenderOptions { exposure: exposure + 1.0, ..render_settings },
+            RenderOptions { tonemap: Tonemap::Aces, ..render_settings },
+            RenderOptions { accel: Accel::KdTree, ..render_settings },
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
         }
         // Views that visualize trees depend on the tree type.
-        for view in [View::Bounds, View::Cost] {
-            let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
+        for view in [ViewMode::Bounds, ViewMode::Cost] {
+            let by = |accel| RenderSettings { view, ..with(RenderOptions { accel, ..render_settings }) };
             assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");
         }
         // Settings ignored by the `path` or `whitted` integrator.
-        for same in
-            [Render { shadows: Shadows::Hard, ..path }, Render { ambient: ambient + Vec3::ONE, ..path }]
-        {
+        for same in [
+            RenderOptions { shadows: ShadowMode::Hard, ..path },
+            RenderOptions { ambient: ambient + Vec3::ONE, ..path },
+        ] {
             assert_eq!(of(&with(same)), of(&with(path)), "{same:?}");
         }
-        assert_eq!(of(&with(Render { clamp: 1.0, ..render_settings })), of(&settings));
-        let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
+        assert_eq!(of(&with(RenderOptions { clamp: 1.0, ..render_settings })), of(&settings));
+        let mut keys: Vec<Fingerprint> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
-        keys.push(render(FingerprintHasher::new("w").finish(), &settings, Some(crop)));
+        keys.push(film_key(FingerprintHasher::new("w").finish(), &settings, Some(crop)));
         for (i, key) in keys.iter().enumerate() {
             assert!(!keys[..i].contains(key), "key {i} is not unique");
         }
@@ -377,8 +398,9 @@ mod tests {
     #[test]
     fn trees_of_meshes_with_distinct_lights_differ() {
         let mesh = FingerprintHasher::new("mesh").finish();
-        let distinct = [false, true].map(|is_emissive| Some(distinct_lights(&mesh, is_emissive)));
-        let trees = [None, distinct[0], distinct[1]].map(|distinct| tree(&mesh, Accel::Bvh, distinct));
+        let distinct = [false, true].map(|is_emissive| Some(distinct_lights_mesh_key(&mesh, is_emissive)));
+        let trees =
+            [None, distinct[0], distinct[1]].map(|distinct| mesh_accel_key(&mesh, Accel::Bvh, distinct));
         assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);
     }
 
@@ -387,7 +409,7 @@ mod tests {
         let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
         let key = |kind: &str| {
             let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
-            coplanar(&scene, &referents(&scene, &[], None))
+            coplanar_lights_key(&scene, &fingerprint_context(&scene, &[], None))
         };
         assert_ne!(key("phong"), key("glass"));
     }

@@ -49,8 +49,8 @@ use glimt_scene as scene;
 use glimt_trace::{integrators, world};
 
 pub use build::BUILD;
-pub use check::{IncrementalChecker, SceneSummary, check, estimate_memory};
-pub use model::import::{ImportError, Imported, import};
+pub use check::{IncrementalSceneChecker, SceneSummary, check_scene, estimate_memory};
+pub use model::import::{ImportError, ImportedScene, import_gltf};
 pub use stages::parse::companion_files;
-pub use watch::content::{Content, FileRead};
+pub use watch::content::{FileContentId, FileRead};
 pub use worker::{CommandSender, Handle, start};

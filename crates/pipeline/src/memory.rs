@@ -4,14 +4,14 @@
 //! Film and image sizes are exact, and mesh and texture sizes are known once they are loaded. Tree and photon
 //! sizes are conservative estimates based on measured peak memory per triangle and per emitted photon.
 
-use super::plan::Plan;
+use super::plan::RenderPlan;
 use super::render::share::Shard;
-use super::stages::Stop;
+use super::stages::StopReason;
 use super::stages::meshes::Meshes;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
-use crate::system::memory::{MemoryLimit, limit};
+use crate::system::memory::{MemoryLimit, memory_limit};
 
 /// Bytes used by the program itself.
 const PROGRAM: u64 = 24 << 20;
@@ -47,7 +47,7 @@ pub(super) struct MemoryEstimate(Vec<MemoryItem>);
 
 impl MemoryEstimate {
     /// Estimates the memory for the image before any files are read.
-    pub(super) fn for_image(plan: &Plan) -> Self {
+    pub(super) fn for_image(plan: &RenderPlan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
         let (film, picture) =
@@ -71,7 +71,7 @@ impl MemoryEstimate {
     }
 
     /// Estimates the memory for the image and everything the scene references.
-    pub(super) fn of_scene(plan: &Plan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
+    pub(super) fn for_scene(plan: &RenderPlan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
         let Self(mut items) = Self::for_image(plan);
         let triangle = match scene.render.accel {
             Accel::Bvh => 110,
@@ -92,7 +92,7 @@ impl MemoryEstimate {
     }
 
     /// Adds the film for the scene's own image, which is kept while another image is shown.
-    pub(super) fn with_own_film(mut self, bytes: u64) -> Self {
+    pub(super) fn with_saved_scene_film(mut self, bytes: u64) -> Self {
         self.0.push((OWN_FILM, bytes));
         self
     }
@@ -102,7 +102,7 @@ impl MemoryEstimate {
         self.0.iter().fold(0, |sum: u64, (_, bytes)| sum.saturating_add(*bytes))
     }
 
-    fn own_film(&self) -> u64 {
+    fn saved_scene_film_bytes(&self) -> u64 {
         self.0.iter().filter(|(name, _)| *name == OWN_FILM).map(|(_, bytes)| bytes).sum()
     }
 
@@ -111,16 +111,20 @@ impl MemoryEstimate {
     ///
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
-    pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
-        self.check_against(plan, limit)
+    pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, StopReason> {
+        self.check_against(plan, memory_limit)
     }
 
     /// Like [`Self::check`], but takes the system's limit as a parameter.
-    fn check_against(&self, plan: &Plan, limit: impl FnOnce() -> Option<MemoryLimit>) -> Result<u64, Stop> {
+    fn check_against(
+        &self,
+        plan: &RenderPlan,
+        limit: impl FnOnce() -> Option<MemoryLimit>,
+    ) -> Result<u64, StopReason> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
-            return Err(Stop::work(format!(
+            return Err(StopReason::work_failure(format!(
                 "the frames need {} of memory until the animation is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
                 format_bytes(*bytes),
@@ -140,7 +144,7 @@ impl MemoryEstimate {
         let items: Vec<String> =
             items.map(|(name, bytes)| format!("{name} {}", format_bytes(*bytes))).collect();
         let remedy = match largest.first() {
-            _ if all - self.own_film() <= most => {
+            _ if all - self.saved_scene_film_bytes() <= most => {
                 "return to the scene's own settings, or let its image finish first"
             }
             Some(("the film" | "the image", _)) => SMALLER_IMAGE,
@@ -157,7 +161,7 @@ impl MemoryEstimate {
         };
         let try_anyway =
             format!(", raise the limit, or try anyway with --memory {}", format_memory_option(all));
-        Err(Stop::work(format!(
+        Err(StopReason::work_failure(format!(
             "the render needs about {} of memory ({}), more than the {} allowed by {setting}; {remedy}{}",
             format_bytes(all),
             items.join(", "),
@@ -169,10 +173,10 @@ impl MemoryEstimate {
 
 /// Returns the order in which samples are summed. If photons are enabled, assumes that some are emitted,
 /// because this is not known yet.
-fn sum_order(plan: &Plan) -> SumOrder {
+fn sum_order(plan: &RenderPlan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {
-        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).sums(),
+        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).sum_order(),
         None if gathers => SumOrder::Blocked,
         None => SumOrder::Sequential,
     }
@@ -200,14 +204,14 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::plan::plan;
+    use crate::plan::resolve_plan;
     use crate::protocol::Failure;
     use crate::settings::Overrides;
     use crate::tests::loaded_of;
 
-    fn planned(overrides: &Overrides) -> Plan {
+    fn planned(overrides: &Overrides) -> RenderPlan {
         let overrides = Overrides { threads: overrides.threads.or(Some(1)), ..overrides.clone() };
-        plan(&loaded_of("").scene, Path::new("a.toml"), &overrides).expect("a plan")
+        resolve_plan(&loaded_of("").scene, Path::new("a.toml"), &overrides).expect("a plan")
     }
 
     #[test]
@@ -228,7 +232,7 @@ mod tests {
             ..Overrides::default()
         };
         let said = match MemoryEstimate::for_image(&planned(&large)).check(&planned(&large)) {
-            Err(Stop::Failed(Failure::Work(said))) => said,
+            Err(StopReason::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
         // 64 million pixels at 40 bytes (film) and 15 bytes (image).
@@ -238,7 +242,7 @@ mod tests {
         let said = |memory: u64| {
             let small = Overrides { memory: Some(memory), ..Overrides::default() };
             match MemoryEstimate::for_image(&planned(&small)).check(&planned(&small)) {
-                Err(Stop::Failed(Failure::Work(said))) => said,
+                Err(StopReason::Failed(Failure::Work(said))) => said,
                 other => panic!("{other:?}"),
             }
         };
@@ -259,7 +263,7 @@ mod tests {
             MemoryEstimate::for_image(&plan).check_against(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
-            Err(Stop::Failed(Failure::Work(said))) => said,
+            Err(StopReason::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
         for fact in [" 41 MiB ", " 8 MiB allowed by the control group (x); ", "--memory 1GiB"] {

@@ -4,23 +4,25 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, EffectiveSettings, OutputLayer, Overrides, Side, UpAxis, View};
+use super::settings::{
+    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
+};
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
-use crate::integrators::{AovSource, FirstHit, LightAov, PhotonSettings, RenderSettings};
+use crate::integrators::{AovSource, FirstHitQuantity, LightAov, PhotonSettings, RenderSettings};
 use crate::math::Vec3;
 use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, Photons, Scene, Tonemap};
+use crate::scene::description::{Accel, PhotonOptions, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::threads::core_count;
 
 /// Resolved settings of a request, merged from the scene, the command line and the keyboard.
 #[derive(Clone, Debug)]
-pub(super) struct Plan {
+pub(super) struct RenderPlan {
     /// Path of the scene file or model.
     pub(super) path: PathBuf,
     /// File name of the scene, which is stored in part files.
@@ -43,7 +45,7 @@ pub(super) struct Plan {
     pub(super) layers: Vec<OutputLayer>,
     /// The side of a model that faces the camera, and the model's up axis. `None` if not set on the command
     /// line.
-    pub(super) from: Option<Side>,
+    pub(super) from: Option<ViewSide>,
     pub(super) up: Option<UpAxis>,
     /// Output files for later turntable frames.
     pub(super) later_outputs: Vec<PathBuf>,
@@ -55,7 +57,7 @@ pub(super) struct Plan {
     pub(super) replaces_foreign: bool,
     /// 1-based number of the part to render, and the number of parts.
     pub(super) shard: Option<(u32, u32)>,
-    pub(super) checkpoints: Checkpoints,
+    pub(super) checkpoints: CheckpointSettings,
     /// Maximum memory use of the render, in bytes.
     pub(super) memory: Option<u64>,
     pub(super) effective: EffectiveSettings,
@@ -76,7 +78,11 @@ pub(super) enum OutputNameSource {
 ///
 /// # Errors
 /// The crop is outside the image, or an output format cannot store the image.
-pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
+pub(super) fn resolve_plan(
+    scene: &Arc<Scene>,
+    path: &Path,
+    overrides: &Overrides,
+) -> Result<RenderPlan, Box<Diagnostic>> {
     let mut render = overrides.apply_to(&scene.render);
     if scene.environment.is_some() {
         render.background = Vec3::ZERO;
@@ -86,17 +92,17 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     let settings = RenderSettings {
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
-        view: overrides.view.unwrap_or(View::Beauty),
+        view: overrides.view.unwrap_or(ViewMode::Beauty),
         photons: overrides
             .photons
             .unwrap_or(scene.photons.enabled)
-            .then(|| photons(&scene.photons, (render.width, render.height))),
+            .then(|| photon_settings(&scene.photons, (render.width, render.height))),
     };
     let threads = thread_count(overrides);
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);
     let is_usual = named_by == OutputNameSource::Default && overrides.turn.is_some();
     let default_names = outputs.first().filter(|_| is_usual).cloned();
-    let OutputFiles { outputs, moving, later_outputs } = OutputFiles::of(outputs, overrides.turn);
+    let OutputFiles { outputs, moving, later_outputs } = OutputFiles::group_by_kind(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
         // Part files do not use an image format.
@@ -110,7 +116,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
                 .try_for_each(|path| check_animation(path, (render.width, render.height), bit_depth))?;
         }
     }
-    Ok(Plan {
+    Ok(RenderPlan {
         path: path.to_owned(),
         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
@@ -147,8 +153,8 @@ pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
 /// Returns the photon settings for this image size.
-fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
-    let Photons { enabled: _, count, radius, bounces } = *requested;
+fn photon_settings(requested: &PhotonOptions, (width, height): (u32, u32)) -> PhotonSettings {
+    let PhotonOptions { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {
         let pixels = u64::from(width) * u64::from(height);
         pixels.clamp(*PHOTONS_BY_PIXELS.start(), *PHOTONS_BY_PIXELS.end())
@@ -208,7 +214,7 @@ struct OutputFiles {
 }
 
 impl OutputFiles {
-    fn of(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
+    fn group_by_kind(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
         let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
         let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
@@ -232,7 +238,7 @@ impl OutputFiles {
 fn check_layers(
     outputs: &[PathBuf],
     moving: &[PathBuf],
-    view: View,
+    view: ViewMode,
     overrides: &Overrides,
 ) -> Result<(), Box<Diagnostic>> {
     if overrides.layers.is_empty() {
@@ -247,7 +253,7 @@ fn check_layers(
         let message = format!("`--layers` needs EXR output; {} is not an EXR file", other.display());
         return refused(message, "write an EXR file, for example -o layers.exr");
     }
-    if view != View::Beauty {
+    if view != ViewMode::Beauty {
         let message = format!("`--layers` needs the `beauty` view, not `{}`", view.name());
         return refused(message, "remove --view, or request it as a layer");
     }
@@ -314,7 +320,7 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
             "`--shard` does not work with photons and a noise target: each pass needs the whole image";
         return refused(message, "use --error 0 with --samples, or --photons off");
     }
-    if settings.gathers_photons() && settings.view.source() == AovSource::Film(Quantity::Error) {
+    if settings.gathers_photons() && settings.view.aov_source() == AovSource::Film(Quantity::Error) {
         return refused(
             "`--shard` does not work with photons and the `error` view",
             "render it without --shard, or use --photons off",
@@ -333,22 +339,25 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 }
 
 /// Returns the tone mapping for a view. Exposure and tone curve apply only to light, not to data.
-fn tone_mapping(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
-    match view.source() {
+fn tone_mapping(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
+    match view.aov_source() {
         AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
-        AovSource::FirstHit(FirstHit::Depth) => {
+        AovSource::FirstHit(FirstHitQuantity::Depth) => {
             ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
         }
         AovSource::Light(LightAov::TraversalCost)
-        | AovSource::FirstHit(FirstHit::Photons)
+        | AovSource::FirstHit(FirstHitQuantity::Photons)
         | AovSource::Film(Quantity::Samples | Quantity::Error) => {
             ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
         }
-        AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
-            ToneMapping::DATA
-        }
+        AovSource::FirstHit(
+            FirstHitQuantity::Normal
+            | FirstHitQuantity::Barycentric
+            | FirstHitQuantity::Uv
+            | FirstHitQuantity::Albedo,
+        ) => ToneMapping::DATA,
         // The values are linear, but exposure must not scale them.
         AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
     }
@@ -364,17 +373,17 @@ mod tests {
     use super::*;
     use crate::choice::Choice;
     use crate::output::Format;
-    use crate::scene::description::Shadows;
+    use crate::scene::description::ShadowMode;
     use crate::tests::loaded_of;
 
-    fn planned(text: &str, overrides: &Overrides) -> Plan {
-        plan(&loaded_of(text).scene, Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
+    fn planned(text: &str, overrides: &Overrides) -> RenderPlan {
+        resolve_plan(&loaded_of(text).scene, Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
     }
 
     #[test]
     fn command_line_takes_precedence_over_scene() {
         let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
-        let size = |plan: &Plan| {
+        let size = |plan: &RenderPlan| {
             let render = &plan.settings.render;
             (render.width, render.height, render.samples)
         };
@@ -421,8 +430,8 @@ mod tests {
     #[test]
     fn overrides_do_not_copy_the_scene() {
         let scene = loaded_of("").scene;
-        let overrides = Overrides { width: Some(8), shadows: Some(Shadows::Off), ..Default::default() };
-        let planned = plan(&scene, Path::new("a.toml"), &overrides).expect("a plan");
+        let overrides = Overrides { width: Some(8), shadows: Some(ShadowMode::Off), ..Default::default() };
+        let planned = resolve_plan(&scene, Path::new("a.toml"), &overrides).expect("a plan");
         assert!(Arc::ptr_eq(&planned.scene, &scene));
     }
 
@@ -479,9 +488,9 @@ mod tests {
         };
         let path = Path::new("a.toml");
         let scene = loaded_of(text).scene;
-        assert!(plan(&scene, path, &with(31, 23, 1, 1)).is_ok());
+        assert!(resolve_plan(&scene, path, &with(31, 23, 1, 1)).is_ok());
         for outside in [with(31, 23, 2, 1), with(0, 0, 0, 1), with(u32::MAX, 0, 2, 2)] {
-            let wrong = plan(&scene, path, &outside).expect_err("outside");
+            let wrong = resolve_plan(&scene, path, &outside).expect_err("outside");
             assert!(wrong.message.contains("32×24"), "{}", wrong.message);
         }
     }
@@ -490,17 +499,17 @@ mod tests {
     fn exposure_applies_only_to_light() {
         let text = "[render]\nexposure = 2.0\n";
         assert_eq!(planned(text, &Overrides::default()).tone.exposure_stops, 2.0);
-        let normals = Overrides { view: Some(View::Normal), ..Default::default() };
+        let normals = Overrides { view: Some(ViewMode::Normal), ..Default::default() };
         assert_eq!(planned(text, &normals).tone.exposure_stops, 0.0);
     }
 
     #[test]
     fn only_data_views_skip_the_srgb_curve() {
         use crate::film::tone::Transfer;
-        for &view in View::ALL {
+        for &view in ViewMode::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
             let transfer = planned("", &overrides).tone.transfer;
-            let is_display_value = match view.source() {
+            let is_display_value = match view.aov_source() {
                 AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
                 AovSource::Film(quantity) => quantity != Quantity::Radiance,
                 AovSource::Light(LightAov::Radiance(_) | LightAov::LitFraction) | AovSource::Bounds => false,

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::output::{may_replace_image, part, scene_of_image, scene_path};
+use crate::output::{may_replace_image, part, scene_name_in_png, scene_path};
 
 /// Which existing files an image must not replace.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Protection {
+pub(crate) enum OverwriteProtection {
     /// All except images of this scene, because the output has the default name.
     OtherImages(PathBuf),
     /// Parts and checkpoints, because the user chose the output's name.
@@ -24,14 +24,14 @@ pub(crate) enum ProtectedFile {
     Foreign,
 }
 
-impl Protection {
+impl OverwriteProtection {
     /// Returns why an image must not replace the file at a path, or `None` if it may.
-    pub(crate) fn applies_to(&self, at: &Path) -> Option<ProtectedFile> {
+    pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<ProtectedFile> {
         match self {
             Self::OtherImages(_) if may_replace_image(at).reason_to_keep().is_some() => {
                 Some(ProtectedFile::Foreign)
             }
-            Self::OtherImages(scene) => other_scene(scene, at).map(|_| ProtectedFile::OtherScene),
+            Self::OtherImages(scene) => mismatched_source_scene(scene, at).map(|_| ProtectedFile::OtherScene),
             Self::Parts => part::is_part(at).then_some(ProtectedFile::Foreign),
             Self::Nothing => None,
         }
@@ -39,6 +39,6 @@ impl Protection {
 }
 
 /// Returns the scene recorded in an image written by glimt, unless it is this scene.
-pub(crate) fn other_scene(scene: &Path, at: &Path) -> Option<String> {
-    scene_of_image(at).filter(|named| !scene_path::is_same(named, scene, at))
+pub(crate) fn mismatched_source_scene(scene: &Path, at: &Path) -> Option<String> {
+    scene_name_in_png(at).filter(|named| !scene_path::refers_to_scene(named, scene, at))
 }

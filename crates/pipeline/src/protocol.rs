@@ -14,17 +14,17 @@ use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{
-    CameraEdit, ImagePosition, MovedCamera, Picked, PickedObject, SavedCamera, Section,
+    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickResult, PickedObject, SceneFileEdit,
 };
 pub use super::report::{
-    Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
+    Counters, ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, SampleCounts,
 };
 use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
 use super::watch::content::FileRead;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 
 /// A command from a front end to the worker.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ pub enum Command {
     KeepCamera(MovedCamera),
     /// Undo this edit of the scene file unless the file has changed since. [`Event::CameraUndone`] reports the result.
     /// Rendering continues.
-    UndoCamera(CameraEdit),
+    UndoCamera(SceneFileEdit),
     /// Identify the object at an image position. [`Event::Picked`] reports the result. Rendering continues.
     Pick(ImagePosition),
     /// Stop the current render.
@@ -75,7 +75,7 @@ pub struct Request {
     /// Render again even if nothing has changed.
     pub force: bool,
     /// Region to render first. Does not affect the finished image.
-    pub first: Option<Section>,
+    pub first: Option<NormalizedRect>,
 }
 
 /// Whether to write the finished image.
@@ -195,7 +195,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// State of the scene's own image.
-        state: OwnImageState,
+        state: SavedSceneImageState,
     },
     /// An image or a report could not be written. Rendering continues.
     WriteFailed {
@@ -245,7 +245,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The file to which the camera was saved, or why it was not written.
-        outcome: Result<SavedCamera, String>,
+        outcome: Result<CameraSaveResult, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {
@@ -259,7 +259,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The object and the color.
-        picked: Box<Picked>,
+        picked: Box<PickResult>,
     },
     /// The request is finished.
     Done {
@@ -303,7 +303,7 @@ impl Event {
 
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OwnImageState {
+pub enum SavedSceneImageState {
     /// The image has been written to all of its output files.
     Written,
     /// Some of the image's samples have been rendered.
@@ -440,12 +440,12 @@ pub struct LatestPreview {
     /// Request number.
     pub generation: u64,
     /// The preview image, no larger than the requested size.
-    pub picture: Arc<Picture>,
+    pub picture: Arc<Srgb8Image>,
     /// Range of values displayed as black to white: from the smallest to the largest distance, or from 0 to
     /// the maximum.
     pub range: Option<[f32; 2]>,
     /// Section of the image shown at 1:1. `None` for the whole image.
-    pub section: Option<Section>,
+    pub section: Option<NormalizedRect>,
     /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview shows. `None` if the preview lacks light from photons.
@@ -456,7 +456,7 @@ pub struct LatestPreview {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PreviewSource {
     /// Previews with the same key show the same image, although their sizes and sample counts may differ.
-    pub image: Key,
+    pub image: Fingerprint,
     /// Whether the image has all of its samples.
     pub is_finished: bool,
 }

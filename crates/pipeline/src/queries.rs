@@ -4,13 +4,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::inputs::Inputs;
+use super::inputs::ProtectedInputs;
 use super::protocol::{
-    CameraEdit, Event, ImagePosition, MovedCamera, Picked, PickedObject, SavedCamera, Viewpoint,
+    CameraSaveResult, Event, ImagePosition, MovedCamera, PickResult, PickedObject, SceneFileEdit, Viewpoint,
 };
 use super::render::film_state::FilmState;
-use super::sink::Sink;
-use super::stages::parse::Parsed;
+use super::sink::EventSink;
+use super::stages::parse::ParsedScene;
 use crate::control::CancelToken;
 use crate::film::Quantity;
 use crate::integrators::RenderSettings;
@@ -19,7 +19,7 @@ use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
-use crate::scene::{LoadedScene, is_mesh, is_model, text_now};
+use crate::scene::{LoadedScene, is_mesh, is_model, read_current_text};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
@@ -27,13 +27,13 @@ use crate::world::World;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Query {
     KeepCamera(MovedCamera),
-    UndoCamera(CameraEdit),
+    UndoCamera(SceneFileEdit),
     Pick(ImagePosition),
 }
 
 impl Query {
     /// Reports why the query cannot be answered.
-    pub(super) fn report_failure(&self, why: &str, sink: &Sink) {
+    pub(super) fn report_failure(&self, why: &str, sink: &EventSink) {
         let generation = sink.generation;
         match self {
             Self::KeepCamera(_) => {
@@ -50,7 +50,7 @@ impl Query {
 /// Scene, world and settings of the current image, used to answer queries.
 #[derive(Clone)]
 pub(super) struct QueryContext {
-    pub(super) parsed: Arc<Parsed>,
+    pub(super) parsed: Arc<ParsedScene>,
     /// Scene key overrides from the command line.
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
@@ -60,7 +60,13 @@ pub(super) struct QueryContext {
 }
 
 impl QueryContext {
-    pub(super) fn run(&self, query: &Query, state: Option<&FilmState>, inputs: &Inputs, sink: &Sink) {
+    pub(super) fn run(
+        &self,
+        query: &Query,
+        state: Option<&FilmState>,
+        inputs: &ProtectedInputs,
+        sink: &EventSink,
+    ) {
         let generation = sink.generation;
         sink.send(match query {
             Query::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, state)) },
@@ -74,20 +80,20 @@ impl QueryContext {
     }
 
     /// Finds the first object hit by the ray through a pixel's center.
-    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> Picked {
+    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> PickResult {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = state.and_then(|state| state.film.pixel(Quantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let thing = self.object_at(self.settings.pixel_to_camera(middle));
-        Picked { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
+        PickResult { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
     }
 
     fn object_at(&self, place: DVec2) -> Option<PickedObject> {
         let (world, loaded) = (&self.world, &self.parsed.loaded);
         let ray = world.camera.pinhole_ray(place);
-        let hit = world.geometry.closest(&ray)?;
+        let hit = world.geometry.closest_hit(&ray)?;
         let surface = world.geometry.surface(&ray, &hit);
         let object = loaded.scene.objects.get(hit.object as usize)?;
         let material = match object.material.map(|index| &loaded.scene.materials[index]) {
@@ -102,7 +108,7 @@ impl QueryContext {
             shape: object.shape.kind(),
             name: object.name.as_deref().map(str::to_owned),
             path: loaded.path.clone(),
-            line: loaded.line(&object.span),
+            line: loaded.line_number(&object.span),
             material,
             position: (surface.point.as_dvec3() + world.geometry.origin()).to_array(),
             normal: surface.shading_normal.to_array(),
@@ -117,17 +123,17 @@ impl QueryContext {
     fn save_camera(
         &self,
         MovedCamera { camera, own }: &MovedCamera,
-        inputs: &Inputs,
-    ) -> Result<SavedCamera, String> {
+        inputs: &ProtectedInputs,
+    ) -> Result<CameraSaveResult, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
         if is_model(&path) {
-            return write_scene_of_model(loaded, camera);
+            return write_model_scene(loaded, camera);
         }
         if is_mesh(&path) && path.symlink_metadata().is_err() {
             return Err(format!("{} {MODEL_MISSING}", path.display()));
         }
-        let read = loaded.source.text();
+        let read = loaded.source.file_text();
         let changed = SCENE_FILE_CHANGED;
         if is_gone(&path) {
             return Err(SCENE_FILE_MISSING.to_owned());
@@ -145,16 +151,17 @@ impl QueryContext {
             None
         } else {
             replace_scene_text(&path, (read, &text), inputs, (changed, "camera not saved"))?;
-            Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
+            Some(SceneFileEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
-        let is_own = LoadedScene::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
-        Ok(SavedCamera { path, is_new: edit.is_some(), is_own, of_model: false, edit })
+        let is_own =
+            LoadedScene::parse_camera(&text, &self.sets).is_some_and(|own| own.matches_viewpoint(camera));
+        Ok(CameraSaveResult { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
 
 /// Undoes a camera edit by restoring the previous text. Fails if the file has changed since the edit.
-fn undo_camera_edit(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
-    let CameraEdit { path, before, after } = edit;
+fn undo_camera_edit(edit: &SceneFileEdit, inputs: &ProtectedInputs) -> Result<PathBuf, String> {
+    let SceneFileEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
     if is_gone(path) {
         return Err(format!("{} does not exist: nothing to undo", path.display()));
@@ -173,7 +180,7 @@ fn is_gone(path: &Path) -> bool {
 
 /// Whether a file's text is exactly `text`.
 fn has_text(path: &Path, text: &str) -> bool {
-    text_now(path).is_ok_and(|now| *now == *text)
+    read_current_text(path).is_ok_and(|now| *now == *text)
 }
 
 /// Replaces the text of a scene file. If the file's text is not `old`, fails with the message `changed`. If
@@ -181,10 +188,11 @@ fn has_text(path: &Path, text: &str) -> bool {
 fn replace_scene_text(
     path: &Path,
     (old, new): (&str, &str),
-    inputs: &Inputs,
+    inputs: &ProtectedInputs,
     (changed, outcome): (&str, &str),
 ) -> Result<(), String> {
-    let metadata = file::kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
+    let metadata =
+        file::file_kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
     if let Some(why) = file::reason_not_to_replace(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
@@ -202,16 +210,16 @@ fn replace_scene_text(
 
 /// Writes the scene generated for a model, but with this camera, to a file next to the model. Never replaces
 /// a file.
-fn write_scene_of_model(loaded: &LoadedScene, camera: &Viewpoint) -> Result<SavedCamera, String> {
+fn write_model_scene(loaded: &LoadedScene, camera: &Viewpoint) -> Result<CameraSaveResult, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
         return Err(format!("{shown} {ALREADY_EXISTS}: move it away and press c again"));
     }
     let text = loaded.text_with_camera(camera)?;
-    write::new_file(&path, text.as_bytes())
+    write::create_new(&path, text.as_bytes())
         .map_err(|error| format!("cannot write {shown}: {}", describe_error(&error)))?;
-    Ok(SavedCamera { path, is_new: true, is_own: false, of_model: true, edit: None })
+    Ok(CameraSaveResult { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 
 #[cfg(test)]
@@ -226,7 +234,7 @@ mod tests {
         let loaded = LoadedScene { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
         let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
         let camera = Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
-        let said = write_scene_of_model(&loaded, &camera).expect_err("no folder");
+        let said = write_model_scene(&loaded, &camera).expect_err("no folder");
         assert_eq!(said, "cannot write gone/a.toml: no such file or directory");
     }
 }

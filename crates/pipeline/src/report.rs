@@ -82,7 +82,7 @@ pub struct LightsReport {
     /// Number of lights. A mesh counts once per emissive material.
     pub count: u64,
     /// Which lights are sampled at each vertex.
-    pub sampled: LightsSampled,
+    pub sampled: LightSelectionMode,
     /// Number of lights sampled from the light tree at each vertex: 32 × `shadow_samples` for `whitted`, or 4
     /// × `shadow_samples` for `path`. 0 without a tree.
     pub picks: u64,
@@ -123,7 +123,7 @@ pub struct PhotonsReport {
 /// Which lights are sampled at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum LightsSampled {
+pub enum LightSelectionMode {
     /// All lights.
     All,
     /// A subset, sampled according to expected contribution.

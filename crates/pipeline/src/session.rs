@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::{Engine, EngineConfig, Interruption, PendingOrders, RequestContext};
-pub use super::engine::{Rendered, Unrendered};
+use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
+pub use super::engine::{RenderFailure, RenderedImage};
 use super::protocol::{PreviewSize, PreviewSlot, Request, WriteMode};
 use super::queries::Query;
 use super::settings::Overrides;
-use super::sink::Sink;
+use super::sink::EventSink;
 use crate::control::CancelToken;
 
 /// Renders images in memory and keeps caches between renders.
@@ -34,7 +34,7 @@ impl Session {
         scene: &Path,
         overrides: &Overrides,
         token: &CancelToken,
-    ) -> Result<Rendered, Unrendered> {
+    ) -> Result<RenderedImage, RenderFailure> {
         self.generation += 1;
         let request = Request {
             generation: self.generation,
@@ -50,21 +50,21 @@ impl Session {
         // Events are not needed, because the result is returned.
         let (events, _) = mpsc::channel();
         let sink =
-            Sink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
-        let context = RequestContext::new(token, token, &NoOrders);
+            EventSink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
+        let context = RequestContext::new(token, token, &NoPendingCommands);
         self.engine.render_image(&request, &sink, &context)
     }
 
     /// Whether the last image depends on the file at a path.
-    pub fn has_read(&self, path: &Path) -> bool {
-        self.engine.has_read(path)
+    pub fn depends_on_file(&self, path: &Path) -> bool {
+        self.engine.has_read_file(path)
     }
 }
 
 /// Orders for a request without a front end.
-pub(super) struct NoOrders;
+pub(super) struct NoPendingCommands;
 
-impl PendingOrders for NoOrders {
+impl PendingCommands for NoPendingCommands {
     fn wants_write(&self) -> bool {
         false
     }
@@ -73,7 +73,7 @@ impl PendingOrders for NoOrders {
         false
     }
 
-    fn take_preview(&self) -> Option<Option<PreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<PreviewSize>> {
         None
     }
 
@@ -110,7 +110,7 @@ mod tests {
         assert_ne!(one.image.pixels, other.image.pixels);
         assert!(one.key != other.key && one.key == more.key);
         assert_eq!(again.report.counters.camera_rays, 8 * 6 * 2, "rendered again");
-        assert!(session.has_read(&scene) && !session.has_read(&folder.path().join("b.toml")));
+        assert!(session.depends_on_file(&scene) && !session.depends_on_file(&folder.path().join("b.toml")));
         assert!(!folder.path().join("a.png").exists());
     }
 
@@ -118,12 +118,12 @@ mod tests {
     fn failed_or_cancelled_render_returns_no_image() {
         let token = CancelToken::new();
         let missing = Session::default().render(Path::new("none.toml"), &Overrides::default(), &token);
-        assert!(matches!(missing, Err(Unrendered::Failed(Failure::Scene(_)))));
+        assert!(matches!(missing, Err(RenderFailure::Failed(Failure::Scene(_)))));
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
         token.cancel();
         let cancelled = Session::default().render(&scene, &Overrides::default(), &token);
-        assert!(matches!(cancelled, Err(Unrendered::Cancelled)));
+        assert!(matches!(cancelled, Err(RenderFailure::Cancelled)));
     }
 }

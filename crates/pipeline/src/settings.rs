@@ -6,9 +6,9 @@ use super::turntable::TurntableFrame;
 use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
-pub use crate::integrators::View;
+pub use crate::integrators::ViewMode;
 pub use crate::scene::description::CameraChange;
-use crate::scene::description::{Accel, Integrator, Render, Shadows, render_keys};
+use crate::scene::description::{Accel, Integrator, RenderOptions, ShadowMode, render_keys};
 
 macro_rules! overrides {
     ($(
@@ -32,9 +32,9 @@ macro_rules! overrides {
             /// Whether to use depth of field.
             pub dof: Option<bool>,
             /// The view: beauty or an AOV.
-            pub view: Option<View>,
+            pub view: Option<ViewMode>,
             /// Side of a model that faces the camera. Replaces the model's own camera.
-            pub from: Option<Side>,
+            pub from: Option<ViewSide>,
             /// Up axis of a model. Replaces the format's default.
             pub up: Option<UpAxis>,
             /// Changes to the scene's camera.
@@ -52,7 +52,7 @@ macro_rules! overrides {
             /// 1-based number of the part that this process renders, and the number of parts.
             pub shard: Option<(u32, u32)>,
             /// Checkpoint settings.
-            pub checkpoints: Checkpoints,
+            pub checkpoints: CheckpointSettings,
             /// Maximum memory use of the render, in bytes.
             pub memory: Option<u64>,
             $($(#[doc = $doc])* pub $name: Option<$type>,)*
@@ -60,8 +60,8 @@ macro_rules! overrides {
 
         impl Overrides {
             /// Applies the overrides to a scene's settings.
-            pub(super) fn apply_to(&self, to: &Render) -> Render {
-                Render { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
+            pub(super) fn apply_to(&self, to: &RenderOptions) -> RenderOptions {
+                RenderOptions { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
             }
         }
     };
@@ -71,7 +71,7 @@ render_keys!(overrides, changed);
 
 choice! {
     /// Sides from which to view a model.
-    pub enum Side {
+    pub enum ViewSide {
         /// The front: +z, or −y in STL files.
         Front = "front",
         /// The back.
@@ -127,18 +127,18 @@ choice! {
 
 /// How often a render saves checkpoints next to its output file, and whether it resumes from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Checkpoints {
+pub struct CheckpointSettings {
     /// Seconds between checkpoints. 0 disables them.
     pub seconds: f64,
     /// Whether a render resumes from a checkpoint.
-    pub resume: Resume,
+    pub resume: ResumeMode,
     /// Whether the last checkpoint is kept when the image is written.
     pub are_kept: bool,
 }
 
 /// Whether a render resumes from a checkpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Resume {
+pub enum ResumeMode {
     /// Start from scratch.
     #[default]
     No,
@@ -154,7 +154,7 @@ pub struct AdjustableSettings {
     /// Integrator.
     pub integrator: Integrator,
     /// Shadow type.
-    pub shadows: Shadows,
+    pub shadows: ShadowMode,
     /// Whether photons are on.
     pub photons: bool,
 }
@@ -175,7 +175,7 @@ pub struct EffectiveSettings {
     pub integrator: Integrator,
     /// Shadow type.
     #[serde(serialize_with = "choice::serialize")]
-    pub shadows: Shadows,
+    pub shadows: ShadowMode,
     /// Limit on indirect radiance per bounce, which introduces bias. 0 means no limit.
     pub clamp: f32,
     /// Whether photons are on.
@@ -187,7 +187,7 @@ pub struct EffectiveSettings {
     pub accel: Accel,
     /// The view: beauty or an AOV.
     #[serde(serialize_with = "choice::serialize")]
-    pub view: View,
+    pub view: ViewMode,
     /// Exposure in stops.
     pub exposure: f32,
     /// Random seed.

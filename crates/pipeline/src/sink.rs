@@ -7,16 +7,16 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, LatestPreview, OwnImageState, PreviewSlot, PreviewSource,
-    RenderProgress, SampleCounts, Section, StageReport,
+    AssetProgress, CheckpointUpdate, Event, LatestPreview, NormalizedRect, PreviewSlot, PreviewSource,
+    RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
 };
 use super::watch::content::FileRead;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::scene::diagnostic::Diagnostic;
 
 /// Sends the events of one request. Ignores a disconnected front end.
 #[derive(Clone, Debug)]
-pub(super) struct Sink {
+pub(super) struct EventSink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
@@ -24,12 +24,12 @@ pub(super) struct Sink {
     pub(super) within: Option<[f64; 2]>,
 }
 
-impl Sink {
+impl EventSink {
     pub(super) fn send(&self, event: Event) {
         let _ = self.events.send(event);
     }
 
-    pub(super) fn stage(&self, stage: StageReport) {
+    pub(super) fn send_stage_report(&self, stage: StageReport) {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
@@ -48,7 +48,7 @@ impl Sink {
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
-    pub(super) fn files_read(&self, files: Vec<FileRead>, read: usize, since: Instant) {
+    pub(super) fn send_files_read(&self, files: Vec<FileRead>, read: usize, since: Instant) {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
@@ -63,7 +63,7 @@ impl Sink {
         self.send(Event::Written { generation, path, bytes, is_own, unfinished });
     }
 
-    pub(super) fn own_image(&self, state: OwnImageState) {
+    pub(super) fn send_saved_scene_image_state(&self, state: SavedSceneImageState) {
         self.send(Event::OwnImage { generation: self.generation, state });
     }
 
@@ -80,7 +80,7 @@ impl Sink {
         self.send(Event::NotKept { generation: self.generation, message });
     }
 
-    pub(super) fn checkpoint(&self, news: CheckpointUpdate) {
+    pub(super) fn send_checkpoint_update(&self, news: CheckpointUpdate) {
         self.send(Event::Checkpoint { generation: self.generation, news });
     }
 
@@ -90,9 +90,9 @@ impl Sink {
 
     pub(super) fn preview(
         &self,
-        picture: Picture,
+        picture: Srgb8Image,
         range: Option<[f32; 2]>,
-        section: Option<Section>,
+        section: Option<NormalizedRect>,
         source: PreviewSource,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
@@ -107,7 +107,7 @@ impl Sink {
     }
 
     /// Sends a preview without light from photons, before the photons are traced.
-    pub(super) fn preview_without_photons(&self, picture: Picture) {
+    pub(super) fn preview_without_photons(&self, picture: Srgb8Image) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
         self.replace_preview(LatestPreview {
@@ -127,7 +127,7 @@ impl Sink {
 
     /// Loads an asset and reports the progress that `load` passes to its callback. If loading succeeds,
     /// always reports completion.
-    pub(super) fn load_asset<T, E>(
+    pub(super) fn load_with_progress<T, E>(
         &self,
         name: &str,
         load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> Result<T, E>,
@@ -163,14 +163,14 @@ mod tests {
     #[test]
     fn asset_progress_is_throttled_and_completes() {
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
             }
             Ok(())
         };
-        sink.load_asset("bricks", load).expect("loaded");
+        sink.load_with_progress("bricks", load).expect("loaded");
         drop(sink);
         let seen: Vec<(u64, u64)> = received
             .into_iter()
@@ -189,8 +189,8 @@ mod tests {
     #[test]
     fn failed_asset_does_not_report_completion() {
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
-        sink.load_asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
+        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default(), within: None };
+        sink.load_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(
             |event| matches!(event, Event::Asset { progress, .. } if progress.done == progress.total),

@@ -1,15 +1,15 @@
 //! The stage table, which times each stage and reports its start and end.
 
 use super::protocol::{Stage, StageReport, Status};
-use super::sink::Sink;
-use super::stages::{StageResult, Stop};
+use super::sink::EventSink;
+use super::stages::{StageResult, StopReason};
 use super::stopwatch::Stopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
 /// Runs the stages of one request and records their reports.
-pub(super) struct StageTable<'a> {
-    pub(super) sink: &'a Sink,
+pub(super) struct StageRunner<'a> {
+    pub(super) sink: &'a EventSink,
     /// Token for pausing work. Pauses do not count toward stage times.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
@@ -17,7 +17,7 @@ pub(super) struct StageTable<'a> {
     pub(super) is_silent: bool,
 }
 
-impl StageTable<'_> {
+impl StageRunner<'_> {
     /// Runs a stage and reports its start and end.
     ///
     /// # Errors
@@ -25,8 +25,8 @@ impl StageTable<'_> {
     pub(super) fn run<T>(
         &mut self,
         name: Stage,
-        work: impl FnOnce() -> Result<StageResult<T>, Stop>,
-    ) -> Result<T, Stop> {
+        work: impl FnOnce() -> Result<StageResult<T>, StopReason>,
+    ) -> Result<T, StopReason> {
         let watch = Stopwatch::start(self.token);
         let before = process_cpu_seconds();
         let report = |status, why| {
@@ -43,7 +43,7 @@ impl StageTable<'_> {
 
     fn send_report(&self, report: StageReport) {
         if !self.is_silent {
-            self.sink.stage(report);
+            self.sink.send_stage_report(report);
         }
     }
 }

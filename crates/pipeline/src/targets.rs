@@ -4,16 +4,16 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
-use super::inputs::{Input, InputIndex, Inputs};
-use super::plan::{OutputNameSource, Plan};
-use super::protected::{Protection, other_scene};
+use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
+use super::plan::{OutputNameSource, RenderPlan};
+use super::protected::{OverwriteProtection, mismatched_source_scene};
 use super::render::checkpointer::checkpoint_path;
 use super::report::ReportSignature;
-use super::sink::Sink;
+use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{SweptFolders, WritePolicy};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, Replaced, may_replace_image, may_replace_json,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, may_replace_image, may_replace_json,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
@@ -27,7 +27,7 @@ pub(super) struct OutputTarget<'a> {
 
 impl<'a> OutputTarget<'a> {
     /// Creates the target for one of the plan's images.
-    pub(super) fn for_image(plan: &Plan, path: &'a Path) -> Self {
+    pub(super) fn for_image(plan: &RenderPlan, path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Picture(plan.named_by) }
     }
 
@@ -44,37 +44,37 @@ enum TargetKind {
 }
 
 /// Returns which existing files the plan's image must not replace.
-pub(super) fn protection(plan: &Plan) -> Protection {
+pub(super) fn overwrite_protection(plan: &RenderPlan) -> OverwriteProtection {
     match plan.named_by {
-        _ if plan.replaces_foreign => Protection::Nothing,
-        OutputNameSource::Default => Protection::OtherImages(plan.path.clone()),
-        OutputNameSource::CommandLine | OutputNameSource::Scene => Protection::Parts,
+        _ if plan.replaces_foreign => OverwriteProtection::Nothing,
+        OutputNameSource::Default => OverwriteProtection::OtherImages(plan.path.clone()),
+        OutputNameSource::CommandLine | OutputNameSource::Scene => OverwriteProtection::Parts,
     }
 }
 
 /// Returns one diagnostic for each of the plan's files that must not be written. Later calls may return other
 /// diagnostics, because symbolic links and files can change.
-pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
+pub(super) fn conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> Vec<Diagnostic> {
     let inputs = inputs.index_by_identity();
     // Later frames have distinct files, because each name contains the frame number.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
-        if let Some(identity) = FileIdentity::of(target.path) {
+        if let Some(identity) = FileIdentity::from_path(target.path) {
             first.entry(identity).or_insert(target);
         }
     }
     let twin =
         |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
     let each = targets(plan).filter_map(|target| find_conflict(plan, target, target.path, &inputs, twin));
-    each.chain(linked_frames(plan)).collect()
+    each.chain(linked_frame_conflicts(plan)).collect()
 }
 
 /// Returns diagnostics for turntable frames that symbolic links direct to the same file, where a later frame
 /// would replace an earlier one.
-fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
+fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
     for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
-        let Some(identity) = FileIdentity::of(path) else { continue };
+        let Some(identity) = FileIdentity::from_path(path) else { continue };
         match seen.entry(identity) {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
@@ -93,10 +93,10 @@ fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
 /// # Errors
 /// The file cannot be written, or must not be overwritten ([`OutputError::Refused`]).
 pub(super) fn write_guarded<'a, T>(
-    plan: &'a Plan,
-    inputs: &Inputs,
+    plan: &'a RenderPlan,
+    inputs: &ProtectedInputs,
     (target, sweep): (OutputTarget<'a>, Option<&SweptFolders>),
-    sink: &Sink,
+    sink: &EventSink,
     write: impl FnOnce(&WritePolicy<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
@@ -108,7 +108,7 @@ pub(super) fn write_guarded<'a, T>(
                 return None;
             }
             let mut others = current_targets(plan).filter(|other| *other != target);
-            others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
+            others.find(|other| FileIdentity::from_path(other.path).as_ref() == Some(at))
         };
         match find_conflict(plan, target, real, &inputs, twin) {
             Some(conflict) => Err(OutputError::Refused { reason: format_one_line(&conflict) }),
@@ -130,13 +130,13 @@ fn format_one_line(conflict: &Diagnostic) -> String {
 }
 
 /// Returns the files of this request, then the files of later turntable frames.
-fn targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
+fn targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
     current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the files of this request: the images, then the report.
-fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
+fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
     let report = plan.report.iter().map(|path| OutputTarget::for_report(path));
     let pictures = plan.outputs.iter().chain(&plan.moving);
@@ -146,13 +146,13 @@ fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
 /// Returns the reason for not writing a target that resolves to `at`. `twin` finds another target that is the
 /// same file.
 fn find_conflict<'a>(
-    plan: &'a Plan,
+    plan: &'a RenderPlan,
     target: OutputTarget<'a>,
     at: &Path,
     inputs: &InputIndex<'_>,
     twin: impl Fn(OutputTarget<'a>, &FileIdentity) -> Option<OutputTarget<'a>>,
 ) -> Option<Diagnostic> {
-    if let Some(identity) = FileIdentity::of(at) {
+    if let Some(identity) = FileIdentity::from_path(at) {
         if let Some(input) = inputs.find(at) {
             return Some(input_error(plan, target, input));
         }
@@ -162,7 +162,7 @@ fn find_conflict<'a>(
         if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint for {output}");
-            return Some(call_error(message, Some(conflict_help(plan, target.kind).to_owned())));
+            return Some(command_line_error(message, Some(conflict_help(plan, target.kind).to_owned())));
         }
     }
     if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
@@ -170,31 +170,31 @@ fn find_conflict<'a>(
 
 /// Whether a file is the checkpoint for an output.
 fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
-    FileIdentity::of(&checkpoint_path(output)).as_ref() == Some(identity)
+    FileIdentity::from_path(&checkpoint_path(output)).as_ref() == Some(identity)
 }
 
-fn input_error(plan: &Plan, target: OutputTarget<'_>, input: &Input) -> Diagnostic {
+fn input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &ProtectedInput) -> Diagnostic {
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
     let help = Some(conflict_help(plan, target.kind).to_owned());
     match &input.place {
         Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
-        None => call_error(message, help),
+        None => command_line_error(message, help),
     }
 }
 
-fn same_file_error(plan: &Plan, target: OutputTarget<'_>, twin: &Path) -> Diagnostic {
+fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> Diagnostic {
     let (name, twin) = (target.path.display(), twin.display());
     let message = match target.kind {
         TargetKind::Picture(_) => format!("the outputs {twin} and {name} are the same file"),
         TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
-    call_error(message, Some(format!("use separate files: {}", conflict_help(plan, target.kind))))
+    command_line_error(message, Some(format!("use separate files: {}", conflict_help(plan, target.kind))))
 }
 
 /// Returns an error if the target is an existing file not written by glimt.
-fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
+fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
     let (replaced, help) = match target.kind {
         TargetKind::Picture(OutputNameSource::Default) => {
@@ -204,9 +204,9 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
             let replaced = may_replace_image(at);
-            if let (Replaced::Own, Some(other)) = (&replaced, other_scene(&plan.path, at)) {
+            if let (ReplaceCheck::Own, Some(other)) = (&replaced, mismatched_source_scene(&plan.path, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
-                return Some(call_error(message, Some(help)));
+                return Some(command_line_error(message, Some(help)));
             }
             (replaced, help)
         }
@@ -218,16 +218,16 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             return other_part_error(plan, target, at);
         }
     };
-    Some(call_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
+    Some(command_line_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
 }
 
 /// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours
 /// of work. Parts with a different total belong to an earlier render and may be replaced.
-fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
+fn other_part_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     if !part::is_part(at) {
         return None;
     }
-    let head = PartFile::head(at).ok();
+    let head = PartFile::read_header(at).ok();
     let what = match head.as_ref().map(|head| (head.kind, head.share.index, head.share.count)) {
         Some((part::PartKind::Part, index, count)) => match plan.shard {
             Some((own, of)) if of != count || own == index => return None,
@@ -237,10 +237,13 @@ fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<
         None => "a part or checkpoint from another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());
-    Some(call_error(message, Some(format!("{}; --force replaces it", conflict_help(plan, target.kind)))))
+    Some(command_line_error(
+        message,
+        Some(format!("{}; --force replaces it", conflict_help(plan, target.kind))),
+    ))
 }
 
-fn conflict_help(plan: &Plan, kind: TargetKind) -> &'static str {
+fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
     match kind {
         TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"
@@ -260,6 +263,6 @@ fn conflict_help(plan: &Plan, kind: TargetKind) -> &'static str {
 }
 
 /// Creates a diagnostic about the command line, which has no location in the scene.
-fn call_error(message: String, help: Option<String>) -> Diagnostic {
+fn command_line_error(message: String, help: Option<String>) -> Diagnostic {
     Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
 }

@@ -15,7 +15,7 @@ use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
 /// Renders a tile, with or without photon maps. See [`crate::integrators::render_tile_with_photons`].
-pub(super) type Kernel = fn(
+pub(super) type TileKernel = fn(
     Option<&PhotonMaps>,
     &World,
     &RenderSettings,
@@ -34,7 +34,7 @@ const AT_ONCE: Duration = Duration::from_micros(300);
 /// State shared by all jobs.
 #[derive(Clone, Copy)]
 pub(super) struct Tracer<'a> {
-    pub(super) kernel: Kernel,
+    pub(super) kernel: TileKernel,
     pub(super) pool: &'a ThreadPool,
     pub(super) world: &'a World,
     pub(super) settings: &'a RenderSettings,
@@ -151,26 +151,26 @@ impl Drop for StopOnPanic<'_> {
 /// Returns the number of samples per pixel after the next pass. It is 1, 2, 4, … at first, so that an image
 /// appears early, and then increases in steps that keep the time per tile short. `pixels` is the image size.
 /// A pass ends at every power of two, because noise is evaluated there.
-pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
-    let longest = longest_pass(pixels);
+pub(super) fn next_pass_samples(done: u32, total: u32, pixels: usize) -> u32 {
+    let longest = max_pass_samples(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
     done.saturating_add(done.clamp(1, longest)).min(power).min(total)
 }
 
 /// Returns the number of samples per pixel in the longest pass.
-fn longest_pass(pixels: usize) -> u32 {
+fn max_pass_samples(pixels: usize) -> u32 {
     const LONGEST: usize = 32;
     const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`next_pass`].
+/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`next_pass_samples`].
 /// Each job has at most `at_once` samples.
 pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
-    let longest = longest_pass(pixels);
+    let longest = max_pass_samples(pixels);
     let (mut reached, mut jobs) = (done, 0);
     while reached < longest.min(total) {
-        let end = next_pass(reached, total, pixels);
+        let end = next_pass_samples(reached, total, pixels);
         jobs += (end - reached).div_ceil(at_once);
         reached = end;
     }
@@ -193,7 +193,7 @@ mod tests {
         ] {
             let (mut reached, mut jobs) = (done, 0);
             while reached < total {
-                let end = next_pass(reached, total, pixels);
+                let end = next_pass_samples(reached, total, pixels);
                 jobs += (end - reached).div_ceil(at_once);
                 reached = end;
             }
@@ -213,7 +213,7 @@ mod tests {
             while let Some(&last) = ends.last()
                 && last < total
             {
-                ends.push(next_pass(last, total, pixels));
+                ends.push(next_pass_samples(last, total, pixels));
             }
             ends
         };
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(passes(100, 5000), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
         // An image half the size of a tile has twice as many samples per pass.
         assert_eq!(passes(200, 512), [0, 1, 2, 4, 8, 16, 32, 64, 128, 192, 200]);
-        assert_eq!(next_pass(100, 1000, 5000), 128);
-        assert_eq!(next_pass(u32::MAX - 1, u32::MAX, 0), u32::MAX);
+        assert_eq!(next_pass_samples(100, 1000, 5000), 128);
+        assert_eq!(next_pass_samples(u32::MAX - 1, u32::MAX, 0), u32::MAX);
     }
 }

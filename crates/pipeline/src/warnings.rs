@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::plan::MAX_PHOTONS;
-use super::settings::{Overrides, View};
+use super::settings::{Overrides, ViewMode};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
 use crate::messages::{CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS};
@@ -13,7 +13,7 @@ use crate::scene::{LoadedScene, is_model};
 
 /// The setting that caused a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cause {
+enum WarningCause {
     Integrator,
     Photons,
     PhotonCount,
@@ -33,26 +33,31 @@ pub(super) fn settings_warnings(
 }
 
 /// Adds the location of the setting that caused a warning.
-fn locate_setting(cause: Cause, message: String, loaded: &LoadedScene, overrides: &Overrides) -> Diagnostic {
+fn locate_setting(
+    cause: WarningCause,
+    message: String,
+    loaded: &LoadedScene,
+    overrides: &Overrides,
+) -> Diagnostic {
     let severity = Severity::Warning;
-    if let Some(option) = cause.option(overrides) {
+    if let Some(option) = cause.command_line_option(overrides) {
         let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
-    if cause == Cause::Clamp && is_model(&loaded.path) {
+    if cause == WarningCause::Clamp && is_model(&loaded.path) {
         let message = message.replace(CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS);
         let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
     }
-    match cause.key().and_then(|(table, key)| loaded.setting(table, key)) {
+    match cause.scene_table_and_key().and_then(|(table, key)| loaded.setting_span(table, key)) {
         Some(span) => loaded.diagnostic_at(span, severity, message, None),
         None => Diagnostic { severity, message, path: loaded.path.clone(), place: None, help: None },
     }
 }
 
-impl Cause {
+impl WarningCause {
     /// Returns the command-line option if it overrides the scene.
-    fn option(self, overrides: &Overrides) -> Option<String> {
+    fn command_line_option(self, overrides: &Overrides) -> Option<String> {
         match self {
             Self::Integrator => overrides.integrator.map(|one| format!("--integrator {}", one.name())),
             Self::Photons => {
@@ -65,7 +70,7 @@ impl Cause {
     }
 
     /// Returns the setting's table and key in the scene file.
-    fn key(self) -> Option<(&'static str, &'static str)> {
+    fn scene_table_and_key(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Integrator => Some(("render", "integrator")),
             Self::Photons => Some(("photons", "enabled")),
@@ -76,13 +81,13 @@ impl Cause {
     }
 }
 
-fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
+fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarningCause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
-    let finds_all_light = render.integrator.method().scatters;
-    let is_specular = |kind: &MaterialKind| kind.has_delta();
+    let finds_all_light = render.integrator.properties().scatters;
+    let is_specular = |kind: &MaterialKind| kind.has_delta_lobe();
     // These surfaces block shadow rays, and path tracing has no other way to sample light that passes
     // straight through them.
-    let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_index_matched_glass();
+    let keeps_direction = |kind: &MaterialKind| kind.has_delta_lobe() || kind.is_index_matched_glass();
     let has = |is_one: &dyn Fn(&MaterialKind) -> bool| {
         let used = scene.objects.iter().filter_map(|object| object.material);
         used.map(|index| &scene.materials[index].kind).any(is_one)
@@ -92,27 +97,27 @@ fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
         let message = "path does not find light from a [[light]] of zero size through mirrors or glass: the caustics \
                        are missing";
-        warnings.push((Cause::Integrator, message.to_owned()));
+        warnings.push((WarningCause::Integrator, message.to_owned()));
     }
     if photons.is_some()
         && has(&is_specular)
         && scene.lights.iter().any(|light| light.has_emission() && light.has_constant_falloff())
     {
         let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
-        warnings.push((Cause::Photons, message.to_owned()));
+        warnings.push((WarningCause::Photons, message.to_owned()));
     }
-    if photons.is_none() && settings.view == View::Photons {
+    if photons.is_none() && settings.view == ViewMode::Photons {
         let message = "the `photons` view is empty: photons are off or the integrator is `path`";
-        warnings.push((Cause::View, message.to_owned()));
+        warnings.push((WarningCause::View, message.to_owned()));
     }
     if photons.is_some() && scene.photons.count > MAX_PHOTONS {
         let message =
             format!("`count` exceeds the maximum of {MAX_PHOTONS} photons per pass, which limits memory use");
-        warnings.push((Cause::PhotonCount, message));
+        warnings.push((WarningCause::PhotonCount, message));
     }
     if render.clamp > 0.0 {
         let message = format!("`clamp = {}` {CLAMP_EFFECT}", render.clamp);
-        warnings.push((Cause::Clamp, message));
+        warnings.push((WarningCause::Clamp, message));
     }
     warnings
 }

@@ -14,7 +14,7 @@ pub enum Eta {
 impl Eta {
     /// Returns the remaining time. Returns `None` during the first 1 % or the first half second of the
     /// render, while the estimate is unreliable.
-    pub fn of(progress: &RenderProgress) -> Option<Self> {
+    pub fn from_progress(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
         let seconds = progress.eta_seconds.filter(|seconds| !is_early && *seconds >= 0.0)?;
@@ -22,9 +22,9 @@ impl Eta {
     }
 
     /// Formats the time for a line that is seldom redrawn.
-    pub fn words(self) -> String {
+    pub fn format(self) -> String {
         match self {
-            Self::Seconds(time) => seconds(time),
+            Self::Seconds(time) => format_seconds(time),
             Self::OverADay => "over a day".to_owned(),
         }
     }
@@ -41,7 +41,7 @@ pub fn format_mean_samples(progress: &RenderProgress) -> String {
 }
 
 /// Formats a duration in a few characters.
-pub fn seconds(seconds: f64) -> String {
+pub fn format_seconds(seconds: f64) -> String {
     match seconds {
         s if !s.is_finite() || s < 0.0 => "?".to_owned(),
         s if s > 0.0 && s < 0.000_005 => "<0.01 ms".to_owned(),
@@ -81,7 +81,9 @@ mod tests {
 
     #[test]
     fn unreliable_or_huge_eta_is_not_shown() {
-        let eta = |fraction, elapsed, eta| Eta::of(&progress(fraction, elapsed, Some(eta))).map(Eta::words);
+        let eta = |fraction, elapsed, eta| {
+            Eta::from_progress(&progress(fraction, elapsed, Some(eta))).map(Eta::format)
+        };
         assert_eq!(eta(0.009, 60.0, 6e3), None);
         assert_eq!(eta(0.4, 0.49, 0.7), None);
         assert_eq!(eta(0.01, 0.5, 49.5).as_deref(), Some("49.5 s"));
@@ -89,7 +91,7 @@ mod tests {
         assert_eq!(eta(0.01, 1e3, 86_401.0).as_deref(), Some("over a day"));
         assert_eq!(eta(0.5, 1e3, f64::INFINITY).as_deref(), Some("over a day"));
         assert_eq!(eta(0.5, 1e3, f64::NAN), None);
-        assert_eq!(Eta::of(&progress(0.5, 1e3, None)), None);
+        assert_eq!(Eta::from_progress(&progress(0.5, 1e3, None)), None);
     }
 
     #[test]
@@ -125,7 +127,7 @@ mod tests {
             (3720.0, "1 h 02 min"),
             (f64::NAN, "?"),
         ] {
-            assert_eq!(seconds(time), words);
+            assert_eq!(format_seconds(time), words);
         }
     }
 }

@@ -11,12 +11,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, EngineConfig, Interruption, PendingOrders, RequestContext};
+use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, WriteMode};
 use super::queries::Query;
 use super::settings::Overrides;
-use super::sink::Sink;
-use super::watch::content::Contents;
+use super::sink::EventSink;
+use super::watch::content::FileHashCache;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 
@@ -34,7 +34,7 @@ pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = CommandSender { mailbox: Arc::default(), events: sender };
     let previews = PreviewSlot::default();
-    let contents = Arc::<Contents>::default();
+    let contents = Arc::<FileHashCache>::default();
     let worker =
         Worker { remote: remote.clone(), previews: previews.clone(), config, contents: contents.clone() };
     let thread = spawn("glimt-worker", move || worker.run_loop())?;
@@ -49,7 +49,7 @@ pub struct Handle {
     /// Slot for the latest preview.
     pub previews: PreviewSlot,
     remote: CommandSender,
-    contents: Arc<Contents>,
+    contents: Arc<FileHashCache>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -60,12 +60,12 @@ impl Handle {
     }
 
     /// Returns a handle for sending commands from other threads.
-    pub fn remote(&self) -> CommandSender {
+    pub fn command_sender(&self) -> CommandSender {
         self.remote.clone()
     }
 
     /// Returns the worker's file contents, which can be shared with a watcher of the same files.
-    pub fn contents(&self) -> Arc<Contents> {
+    pub fn file_hashes(&self) -> Arc<FileHashCache> {
         Arc::clone(&self.contents)
     }
 
@@ -81,7 +81,7 @@ impl Handle {
     }
 
     /// Like [`Self::stop_within`], but abandons a worker that does not stop.
-    pub fn finish(mut self, patience: Duration) -> bool {
+    pub fn stop_or_abandon(mut self, patience: Duration) -> bool {
         let has_ended = self.stop_within(patience);
         if !has_ended {
             self.thread = None;
@@ -237,7 +237,7 @@ impl CommandSender {
         postponed
     }
 
-    fn next(&self) -> Task {
+    fn wait_for_task(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
             // Carry out a write order that came before quitting.
@@ -268,7 +268,7 @@ impl CommandSender {
     }
 }
 
-impl PendingOrders for CommandSender {
+impl PendingCommands for CommandSender {
     fn wants_write(&self) -> bool {
         let mailbox = self.lock();
         mailbox.write && !mailbox.is_write_of_waiting
@@ -281,7 +281,7 @@ impl PendingOrders for CommandSender {
         is_taken
     }
 
-    fn take_preview(&self) -> Option<Option<PreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<PreviewSize>> {
         self.lock().preview.take()
     }
 
@@ -301,7 +301,7 @@ impl PendingOrders for CommandSender {
 
 struct Worker {
     remote: CommandSender,
-    contents: Arc<Contents>,
+    contents: Arc<FileHashCache>,
     previews: PreviewSlot,
     config: EngineConfig,
 }
@@ -310,16 +310,16 @@ impl Worker {
     fn run_loop(self) {
         let _last_words = PanicReporter(&self.remote);
         let mut engine = Engine::new(self.config, self.contents.clone());
-        let mut sink = Sink {
+        let mut sink = EventSink {
             generation: 0,
             events: self.remote.events.clone(),
             previews: self.previews.clone(),
             within: None,
         };
         loop {
-            let outcome = match self.remote.next() {
+            let outcome = match self.remote.wait_for_task() {
                 Task::Quit => {
-                    engine.save_own_checkpoint(&sink, self.remote.interruption());
+                    engine.checkpoint_saved_scene_image(&sink, self.remote.interruption());
                     break;
                 }
                 Task::Write if self.remote.postpone_write(engine.can_write()) => continue,
@@ -331,7 +331,7 @@ impl Worker {
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
                     let context = RequestContext::new(&token, &writing, &self.remote);
-                    catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &context)))
+                    catch_unwind(AssertUnwindSafe(|| engine.handle_request(&request, &sink, &context)))
                 }
             };
             if let Err(payload) = outcome {
@@ -367,7 +367,7 @@ fn panic_reason(payload: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::View;
+    use crate::settings::ViewMode;
 
     fn render(generation: u64) -> Command {
         Command::Render(Box::new(Request {
@@ -384,7 +384,7 @@ mod tests {
     }
 
     fn token(remote: &CommandSender) -> CancelToken {
-        let Task::Render(_, token, _) = remote.next() else { panic!("expected a pending request") };
+        let Task::Render(_, token, _) = remote.wait_for_task() else { panic!("expected a pending request") };
         token
     }
 
@@ -429,9 +429,9 @@ mod tests {
         remote.send(Command::Write);
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
-        assert!(matches!(remote.next(), Task::Write));
+        assert!(matches!(remote.wait_for_task(), Task::Write));
         assert!(!remote.postpone_write(false), "no request should be pending");
-        assert!(matches!(remote.next(), Task::Quit));
+        assert!(matches!(remote.wait_for_task(), Task::Quit));
     }
 
     #[test]
@@ -439,7 +439,9 @@ mod tests {
         let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
-            let Task::Render(_, token, writing) = remote.next() else { panic!("expected a pending request") };
+            let Task::Render(_, token, writing) = remote.wait_for_task() else {
+                panic!("expected a pending request")
+            };
             (token, writing)
         };
         let (token, writing) = begin(1);
@@ -465,9 +467,9 @@ mod tests {
         let _ = token(&remote);
         remote.send(Command::Write);
         let Command::Render(view) = render(2) else { panic!("a request") };
-        let overrides = Overrides { view: Some(View::Normal), ..view.overrides.clone() };
+        let overrides = Overrides { view: Some(ViewMode::Normal), ..view.overrides.clone() };
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
-        assert!(matches!(remote.next(), Task::Write));
+        assert!(matches!(remote.wait_for_task(), Task::Write));
         assert!(
             !remote.postpone_write(false),
             "the order should not be postponed, so that an error is reported"
@@ -476,7 +478,7 @@ mod tests {
         // complete.
         remote.send(Command::Write);
         assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
-        assert!(matches!(remote.next(), Task::Write));
+        assert!(matches!(remote.wait_for_task(), Task::Write));
         assert!(remote.postpone_write(true));
     }
 
@@ -486,12 +488,15 @@ mod tests {
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
-        assert!(matches!(remote.next(), Task::Write), "the order should apply to the shown image first");
+        assert!(
+            matches!(remote.wait_for_task(), Task::Write),
+            "the order should apply to the shown image first"
+        );
         assert!(remote.postpone_write(false), "the order should be postponed for an incomplete image");
-        assert!(matches!(remote.next(), Task::Render(..)));
+        assert!(matches!(remote.wait_for_task(), Task::Render(..)));
         assert!(remote.take_write(), "the request should take the order");
         assert!(!remote.take_write());
-        assert!(matches!(remote.next(), Task::Preview(None, _)));
+        assert!(matches!(remote.wait_for_task(), Task::Preview(None, _)));
         assert!(!remote.postpone_write(false), "no request should be pending");
     }
 }

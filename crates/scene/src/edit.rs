@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::description::{Pose, Viewpoint, is_same_distance};
-use super::document::{FOV_DEGREES, camera_of};
+use super::document::{FOV_DEGREES, parse_camera};
 use super::source::SceneText;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 use crate::math::DVec3;
@@ -12,16 +12,17 @@ use crate::math::DVec3;
 ///
 /// # Errors
 /// Returns the reason why the `[camera]` table cannot be edited.
-pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
+pub(super) fn replace_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
-    let Some(TomlValue::Table(table)) = found.map(|found| found.value.item()) else {
+    let Some(TomlValue::Table(table)) = found.map(|found| found.value.decode()) else {
         return Err("the scene file has no readable [camera] table".to_owned());
     };
     let mut edits = CameraEdits { text, table, replaced: Vec::new(), added: Vec::new() };
     edits.set_camera(wanted);
     let new = edits.apply();
-    let is_right = camera_of(&SceneText::file(new.as_str().into())).is_some_and(|new| new.is_nearly(wanted));
+    let is_right = parse_camera(&SceneText::from_file_text(new.as_str().into()))
+        .is_some_and(|new| new.matches_viewpoint(wanted));
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
@@ -84,7 +85,7 @@ impl CameraEdits<'_> {
 
     /// Replaces a number unless it already equals `wanted`.
     fn replace_number(&mut self, found: &Value<'_>, wanted: f64) {
-        let is_same = match found.item() {
+        let is_same = match found.decode() {
             TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => {
                 digits.parse() == Ok(wanted)
             }
@@ -155,7 +156,7 @@ impl CameraEdits<'_> {
 
 /// Whether a value equals `distance` up to rounding.
 fn is_nearly_equal(value: &Value<'_>, distance: f64) -> bool {
-    let given: Option<f64> = match value.item() {
+    let given: Option<f64> = match value.decode() {
         TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => digits.parse().ok(),
         TomlValue::Integer { .. }
         | TomlValue::String(_)
@@ -186,7 +187,7 @@ mod tests {
     }
 
     fn written(text: &str, wanted: &Viewpoint) -> String {
-        with_camera(text, wanted).unwrap_or_else(|why| panic!("{why}\n{text}"))
+        replace_camera(text, wanted).unwrap_or_else(|why| panic!("{why}\n{text}"))
     }
 
     #[test]
@@ -265,7 +266,7 @@ mod tests {
     #[test]
     fn uneditable_cameras_are_rejected() {
         for text in ["", "[render]\nwidth = 4\n", "[camera]\nposition = [0, 1, 4\n", "camera = 3\n"] {
-            assert!(with_camera(text, &view([0.0, 1.0, 4.0])).is_err(), "{text}");
+            assert!(replace_camera(text, &view([0.0, 1.0, 4.0])).is_err(), "{text}");
         }
     }
 

@@ -2,13 +2,13 @@
 
 use unicode_width::UnicodeWidthStr;
 
-use super::sanitize::{shortened, visible};
-use super::source::toml_string;
+use super::sanitize::{escape_invisible_chars, shortened};
+use super::source::quote_toml_string;
 
 /// Formats one part of a dotted key. Quotes the part if it is not a bare key.
 pub(super) fn quote_key_part(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { toml_string(name) }
+    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quote_toml_string(name) }
 }
 
 /// Splits a dotted key into its parts, which keep their quotes. Ignores dots inside quotes.
@@ -24,14 +24,14 @@ pub fn key_parts(key: &str) -> Vec<&str> {
 }
 
 /// Splits a text at the first space outside quotes, into a dotted key and the text after it.
-pub fn split_key(text: &str) -> Option<(&str, &str)> {
+pub fn split_leading_key(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
 /// Shortens a dotted key to `columns`. Drops leading tables first. Cuts the last part only if it does not
 /// fit.
 pub fn shortened_key(key: &str, columns: usize) -> String {
-    let key = visible(key);
+    let key = escape_invisible_chars(key);
     if key.width() <= columns {
         return key.into_owned();
     }
@@ -70,8 +70,8 @@ mod tests {
         assert_eq!(key_parts(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
         assert_eq!(key_parts("light.1.direction"), ["light", "1", "direction"]);
         assert_eq!(key_parts("camera"), ["camera"]);
-        assert_eq!(split_key(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
-        assert_eq!(split_key("camera"), None);
+        assert_eq!(split_leading_key(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
+        assert_eq!(split_leading_key("camera"), None);
     }
 
     #[test]

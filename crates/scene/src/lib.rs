@@ -34,10 +34,10 @@ pub use changes::{MOST_COMPARED_BYTES, list_changes};
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
-pub use key_path::{key_parts, shortened_key, split_key};
-pub use other_content::other_content;
+pub use key_path::{key_parts, shortened_key, split_leading_key};
+pub use other_content::detect_non_scene;
 pub use read::find_renamed_scene;
-pub use source::{SceneText, toml_string};
+pub use source::{SceneText, quote_toml_string};
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -51,7 +51,7 @@ pub const MODEL_NOT_FOUND: &str = "file not found";
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
-pub fn is_absence(diagnostic: &Diagnostic) -> bool {
+pub fn is_file_not_found(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
@@ -92,7 +92,7 @@ pub struct SettingSpan {
 ///
 /// # Errors
 /// Returns the reason why the file cannot be read.
-pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
+pub fn read_current_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::read_scene_text(path)
 }
 
@@ -103,13 +103,13 @@ impl LoadedScene {
     /// # Errors
     /// Returns the reason why the `[camera]` table cannot be edited.
     pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
-        edit::with_camera(self.source.text(), camera)
+        edit::replace_camera(self.source.file_text(), camera)
     }
 
     /// Reads the camera from a scene's text, with `--set` values applied. `None` if the text or a value has
     /// errors.
-    pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
-        document::camera_of(&SceneText::with_sets(text.into(), sets).ok()?)
+    pub fn parse_camera(text: &str, sets: &[String]) -> Option<Camera> {
+        document::parse_camera(&SceneText::with_set_args(text.into(), sets).ok()?)
     }
 
     /// In scenes with mesh files, returns warnings about lights that shine away from everything. Only calls
@@ -130,13 +130,13 @@ impl LoadedScene {
     }
 
     /// Returns the 1-based line number in the file where `span` starts.
-    pub fn line(&self, span: &Range<usize>) -> usize {
-        let before = self.source.text().get(..span.start).unwrap_or_default();
+    pub fn line_number(&self, span: &Range<usize>) -> usize {
+        let before = self.source.file_text().get(..span.start).unwrap_or_default();
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument. `None` if neither sets it.
-    pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
+    pub fn setting_span(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_it = |setting: &&SettingSpan| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
     }
@@ -157,7 +157,7 @@ impl LoadedScene {
 
 /// Result of parsing a scene's text.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct ParseOutcome {
     /// The scene. `None` if there is an error.
     pub scene: Option<Scene>,
     /// Errors and warnings, in text order.
@@ -173,7 +173,7 @@ pub struct Outcome {
 /// [`MAX_FILE_BYTES`] bytes, without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
-    load_source(SceneText::with_sets(text, sets)?, path, sets)
+    load_source(SceneText::with_set_args(text, sets)?, path, sets)
 }
 
 /// Like [`load`], for a scene generated for the model at `path`. Diagnostics have no line numbers because the
@@ -182,14 +182,18 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
 /// # Errors
 /// Returns the same errors as [`load`].
 pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
-    load_source(SceneText::with_sets(text, sets)?.mark_generated(), path, sets)
+    load_source(SceneText::with_set_args(text, sets)?.mark_generated(), path, sets)
 }
 
 fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
-    let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
+    let ParseOutcome { scene, diagnostics, settings } = document::parse_and_lower(&source, path);
     match scene {
         Some(scene) => {
-            let named = if sets.is_empty() { Vec::new() } else { document::named_files(source.text(), path) };
+            let named = if sets.is_empty() {
+                Vec::new()
+            } else {
+                document::referenced_files(source.file_text(), path)
+            };
             let (scene, path) = (Arc::new(scene), path.to_owned());
             Ok(LoadedScene { scene, source, path, warnings: diagnostics, named, settings })
         }
@@ -199,24 +203,24 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
 
 /// Returns the files that a scene file references, even if the scene has errors. Empty for models and
 /// unreadable files.
-pub fn named_files(path: &Path) -> Vec<PathBuf> {
+pub fn referenced_files(path: &Path) -> Vec<PathBuf> {
     if is_model(path) {
         return Vec::new();
     }
-    read::read_scene_text(path).map_or(Vec::new(), |text| document::named_files(&text, path))
+    read::read_scene_text(path).map_or(Vec::new(), |text| document::referenced_files(&text, path))
 }
 
 /// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
 /// file is not read. Of referenced files, only the metadata is read.
-pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
+pub fn parse(text: Arc<str>, path: &Path) -> ParseOutcome {
     if text.contains('\0') {
-        return Outcome {
+        return ParseOutcome {
             scene: None,
             diagnostics: vec![*read::binary_file_error(path)],
             settings: Vec::new(),
         };
     }
-    document::lower(&SceneText::file(text), path)
+    document::parse_and_lower(&SceneText::from_file_text(text), path)
 }
 
 /// Whether a file is a model, that is, has a mesh extension and does not contain a scene.
@@ -230,7 +234,7 @@ pub fn is_mesh(path: &Path) -> bool {
 }
 
 /// Returns the commented scene written by `glimt new`.
-pub fn starter() -> &'static str {
+pub fn starter_scene() -> &'static str {
     include_str!("starter.toml")
 }
 

@@ -4,7 +4,7 @@ use strsim::osa_distance;
 
 /// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`. `None` if
 /// more than one third of the characters differ. Ignores case and treats `-` as `_`.
-pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest_name<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {
         return None;
@@ -54,7 +54,7 @@ pub fn translate_foreign_name<'a>(written: &str, candidates: &[&'a str]) -> Opti
     let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));
     let known = |name: &&str| candidates.iter().find(|candidate| *candidate == name).copied();
     let meant = named.and_then(|(_, meant)| meant.iter().find_map(known));
-    meant.or_else(|| nearest(written, candidates.iter().copied()))
+    meant.or_else(|| nearest_name(written, candidates.iter().copied()))
 }
 
 #[cfg(test)]
@@ -78,11 +78,11 @@ mod tests {
     #[test]
     fn only_typos_match() {
         let keys = ["center", "radius", "material", "u", "v"];
-        assert_eq!(nearest("raduis", keys), Some("radius"));
-        assert_eq!(nearest("centre", keys), Some("center"));
-        assert_eq!(nearest("Material", keys), Some("material"));
-        assert_eq!(nearest("w", keys), None);
-        assert_eq!(nearest("colour", keys), None);
-        assert_eq!(nearest("max-depth", ["max_depth"]), Some("max_depth"));
+        assert_eq!(nearest_name("raduis", keys), Some("radius"));
+        assert_eq!(nearest_name("centre", keys), Some("center"));
+        assert_eq!(nearest_name("Material", keys), Some("material"));
+        assert_eq!(nearest_name("w", keys), None);
+        assert_eq!(nearest_name("colour", keys), None);
+        assert_eq!(nearest_name("max-depth", ["max_depth"]), Some("max_depth"));
     }
 }

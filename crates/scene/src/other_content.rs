@@ -5,20 +5,20 @@ use std::io::Read;
 use std::path::Path;
 
 use super::diagnostic::Diagnostic;
-use super::sanitize::visible;
+use super::sanitize::escape_invisible_chars;
 use crate::system::file::{self, PART_MAGIC};
 
 /// Hint for errors about files that are not scenes.
 pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
 /// Whether a file has a scene's extension.
-pub(super) fn may_be_scene(found: &Path) -> bool {
+pub(super) fn has_scene_extension(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
 /// Contents of a file that is not a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum OtherContent {
+pub(super) enum NonSceneContent {
     /// A model, with its format and its usual extension.
     Model { format: &'static str, ending: &'static str },
     /// An image in this format.
@@ -29,19 +29,19 @@ pub(super) enum OtherContent {
 
 /// Checks whether a file is an image, an image part or a checkpoint, regardless of its name. Returns its
 /// format and an error, or `None` for other or unreadable files.
-pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
+pub fn detect_non_scene(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
-    let (opened, _) = file::open(path).ok()?.ok()?;
+    let (opened, _) = file::open_regular_file(path).ok()?.ok()?;
     let mut bytes = Vec::new();
     opened.take(START).read_to_end(&mut bytes).ok()?;
-    match OtherContent::detect(&bytes)? {
-        OtherContent::Model { .. } => None,
-        content @ OtherContent::Image(format) => Some((format, content.to_diagnostic(path))),
-        content @ OtherContent::Part => Some(("part", content.to_diagnostic(path))),
+    match NonSceneContent::detect(&bytes)? {
+        NonSceneContent::Model { .. } => None,
+        content @ NonSceneContent::Image(format) => Some((format, content.to_diagnostic(path))),
+        content @ NonSceneContent::Part => Some(("part", content.to_diagnostic(path))),
     }
 }
 
-impl OtherContent {
+impl NonSceneContent {
     /// Detects the content type from the first bytes. `None` if the file may be a scene.
     pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MAGIC) {
@@ -53,12 +53,15 @@ impl OtherContent {
     /// Returns the error for a file that has these contents and is therefore not a scene.
     pub(super) fn to_diagnostic(self, path: &Path) -> Box<Diagnostic> {
         // Remove the extension `.toml`.
-        let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
+        let name = if has_scene_extension(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
         let (message, help) = match self {
             Self::Model { format, ending } => (
                 format!("this is a model ({format}), but its extension is not .{ending}"),
-                format!("glimt detects models by their extension: rename it to {}.{ending}", visible(&name)),
+                format!(
+                    "glimt detects models by their extension: rename it to {}.{ending}",
+                    escape_invisible_chars(&name)
+                ),
             ),
             Self::Image(format) => {
                 let help = format!("`glimt info` shows how an image was rendered; {NEW_SCENE_HELP}");
@@ -120,9 +123,9 @@ fn is_tga(bytes: &[u8]) -> bool {
 }
 
 /// Detects a model from the first line that is not a comment.
-fn detect_model(bytes: &[u8]) -> Option<OtherContent> {
+fn detect_model(bytes: &[u8]) -> Option<NonSceneContent> {
     if bytes.starts_with(b"glTF") {
-        return Some(OtherContent::Model { format: "glTF", ending: "glb" });
+        return Some(NonSceneContent::Model { format: "glTF", ending: "glb" });
     }
     let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
     let line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
@@ -139,7 +142,7 @@ fn detect_model(bytes: &[u8]) -> Option<OtherContent> {
         (b"v" | b"vn" | b"vt" | b"mtllib" | b"usemtl" | b"o" | b"g", Some(_)) => ("OBJ", "obj"),
         _ => return None,
     };
-    Some(OtherContent::Model { format, ending })
+    Some(NonSceneContent::Model { format, ending })
 }
 
 #[cfg(test)]
@@ -166,12 +169,12 @@ mod tests {
             (&tga, "TGA"),
         ];
         for (bytes, format) in images {
-            assert_eq!(OtherContent::detect(bytes), Some(OtherContent::Image(format)), "{format}");
+            assert_eq!(NonSceneContent::detect(bytes), Some(NonSceneContent::Image(format)), "{format}");
         }
         for scene in
             ["P6 = 3", "P6\n= 3", "BM = 1", "GIF8 = 1", "RIFF = 1", "# P6\n[camera]", "#? what\n", "", "P6"]
         {
-            assert_eq!(OtherContent::detect(scene.as_bytes()), None, "{scene:?}");
+            assert_eq!(NonSceneContent::detect(scene.as_bytes()), None, "{scene:?}");
         }
     }
 
@@ -180,24 +183,24 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, PART_MAGIC).expect("written");
-        let part = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(part, OtherContent::Part.to_diagnostic(&path));
-        assert_eq!(other_content(&path), Some(("part", part)));
+        let part = super::super::read_current_text(&path).expect_err("an error");
+        assert_eq!(part, NonSceneContent::Part.to_diagnostic(&path));
+        assert_eq!(detect_non_scene(&path), Some(("part", part)));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
-        let large = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(large, OtherContent::Image("EXR").to_diagnostic(&path));
+        let large = super::super::read_current_text(&path).expect_err("an error");
+        assert_eq!(large, NonSceneContent::Image("EXR").to_diagnostic(&path));
         std::fs::write(&path, b"v 0 0 0\n").expect("written");
-        assert_eq!(other_content(&path), None, "models are rendered");
+        assert_eq!(detect_non_scene(&path), None, "models are rendered");
     }
 
     #[test]
     fn models_are_recognized_by_content() {
-        let of = |text: &str| OtherContent::detect(text.as_bytes());
+        let of = |text: &str| NonSceneContent::detect(text.as_bytes());
         let ending = |text: &str| match of(text) {
-            Some(OtherContent::Model { ending, .. }) => ending,
-            Some(OtherContent::Image(_) | OtherContent::Part) => "image",
+            Some(NonSceneContent::Model { ending, .. }) => ending,
+            Some(NonSceneContent::Image(_) | NonSceneContent::Part) => "image",
             None => "",
         };
         for (text, expected) in [
@@ -223,8 +226,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("model");
         std::fs::write(&path, "v 0 0 0\n").expect("written");
-        let error = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(error, OtherContent::Model { format: "OBJ", ending: "obj" }.to_diagnostic(&path));
+        let error = super::super::read_current_text(&path).expect_err("an error");
+        assert_eq!(error, NonSceneContent::Model { format: "OBJ", ending: "obj" }.to_diagnostic(&path));
         assert!(error.help.expect("a help text").contains("model.obj"));
     }
 }

@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use super::key_path;
+use super::keys::all_tables;
 use super::keys::key::{KeyInfo, TableInfo, TableSyntax, TypeInfo};
-use super::keys::tables;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 
 /// A table with a known definition.
@@ -55,7 +55,7 @@ pub fn outline(text: &str) -> Vec<OutlineTable> {
         let found = document.root().get(info.name);
         found.map_or_else(Vec::new, |found| outline_tables(info, &found))
     };
-    tables().iter().flat_map(of).collect()
+    all_tables().iter().flat_map(of).collect()
 }
 
 /// Returns the tables that `info` defines.
@@ -97,9 +97,9 @@ fn outline_table(
 ) -> OutlineTable {
     let kind = all.get("type").map(|kind| string_value(kind.value));
     let kind = match &kind {
-        Some(Some(kind)) => info.type_of(Some(&kind.text)),
+        Some(Some(kind)) => info.find_type(Some(&kind.text)),
         Some(None) => None,
-        None => info.type_of(None),
+        None => info.find_type(None),
     };
     OutlineTable { info, kind, name, number, span: value.span(), keys: outline_keys(all) }
 }
@@ -116,7 +116,7 @@ fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
 
 /// The value, if it is a string.
 fn string_value(value: Value<'_>) -> Option<SpannedName> {
-    match value.item() {
+    match value.decode() {
         TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
         TomlValue::Integer { .. }
         | TomlValue::Float(_)
@@ -128,7 +128,7 @@ fn string_value(value: Value<'_>) -> Option<SpannedName> {
 }
 
 fn table_entries(value: Value<'_>) -> Option<Entries<'_>> {
-    match value.item() {
+    match value.decode() {
         TomlValue::Table(entries) => Some(entries),
         TomlValue::String(_)
         | TomlValue::Integer { .. }
@@ -153,12 +153,12 @@ impl OutlineTable {
                 }
                 known
             }
-            kind => self.info.keys_of(kind).collect(),
+            kind => self.info.keys_for_type(kind).collect(),
         }
     }
 
     /// Returns the key prefixes by which `--set` refers to this table.
-    pub fn set_prefixes(&self) -> Vec<String> {
+    pub fn set_arg_prefixes(&self) -> Vec<String> {
         let table = self.info.name;
         let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::quote_key_part(&name.text)));
         match self.info.form {
@@ -180,7 +180,7 @@ mod tests {
     fn tables_have_names_types_and_paths() {
         let found: Vec<(Vec<String>, &str)> = outline(TEXT)
             .iter()
-            .map(|table| (table.set_prefixes(), table.kind.map_or("", |kind| kind.name)))
+            .map(|table| (table.set_arg_prefixes(), table.kind.map_or("", |kind| kind.name)))
             .collect();
         let expected: [(&[&str], &str); 6] = [
             (&["render"], ""),
@@ -202,8 +202,10 @@ mod tests {
     #[test]
     fn inline_table_keys_have_spans() {
         let tables = outline(TEXT);
-        let wall =
-            tables.iter().find(|table| table.set_prefixes() == ["materials.\"back wall\""]).expect("a table");
+        let wall = tables
+            .iter()
+            .find(|table| table.set_arg_prefixes() == ["materials.\"back wall\""])
+            .expect("a table");
         let [diffuse] = wall.keys.as_slice() else { panic!("{wall:?}") };
         assert_eq!(&TEXT[diffuse.name.span.clone()], "diffuse");
         assert_eq!(&TEXT[diffuse.value.clone()], "{ texture = \"a\" }");
@@ -214,8 +216,10 @@ mod tests {
     fn unknown_types_allow_all_keys() {
         let tables = outline(TEXT);
         let known = |path: &str| {
-            let table =
-                tables.iter().find(|table| table.set_prefixes().contains(&path.to_owned())).expect("a table");
+            let table = tables
+                .iter()
+                .find(|table| table.set_arg_prefixes().contains(&path.to_owned()))
+                .expect("a table");
             table.known_keys().iter().map(|key| key.name).collect::<Vec<_>>()
         };
         assert_eq!(

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use super::diagnostic::{Diagnostic, SourceSpan};
 use super::document::has_mesh_extension;
 use super::keys::endings::MESHES;
-use super::nearest::nearest;
-use super::other_content::{NEW_SCENE_HELP, OtherContent, may_be_scene, other_content};
-use super::sanitize::visible;
+use super::nearest::nearest_name;
+use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_non_scene, has_scene_extension};
+use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
@@ -38,13 +38,13 @@ pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> 
     }
     let bytes = read_bytes(path).map_err(|(message, help)| {
         // Report a large image as an image rather than as a large scene.
-        other_content(path)
+        detect_non_scene(path)
             .map_or_else(|| Diagnostic::error(path, message, help, None), |(_, problem)| problem)
     })?;
     if file::is_lfs_pointer(&bytes) {
         return Err(Diagnostic::error(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));
     }
-    if let Some(content) = OtherContent::detect(&bytes) {
+    if let Some(content) = NonSceneContent::detect(&bytes) {
         return Err(content.to_diagnostic(path));
     }
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
@@ -71,7 +71,7 @@ fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
-        mesh_file_key(&visible(&name))
+        mesh_file_key(&escape_invisible_chars(&name))
     );
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
@@ -102,7 +102,7 @@ fn is_unsupported_model(path: &Path) -> bool {
 fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
-        let (file, _) = file::open(path).ok()?.ok()?;
+        let (file, _) = file::open_regular_file(path).ok()?.ok()?;
         let mut bytes = Vec::new();
         file.take(START).read_to_end(&mut bytes).ok()?;
         Some(bytes)
@@ -125,7 +125,7 @@ type Refusal = (String, Option<String>);
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     let unreadable = |error: io::Error| unreadable_refusal(path, &error);
     let (file, metadata) =
-        file::open(path).map_err(unreadable)?.map_err(|kind| not_regular_refusal(path, kind))?;
+        file::open_regular_file(path).map_err(unreadable)?.map_err(|kind| not_regular_refusal(path, kind))?;
     if metadata.len() > MAX_FILE_BYTES {
         return Err(too_large_refusal());
     }
@@ -150,7 +150,7 @@ fn count_syntax_elements(text: &[u8]) -> usize {
 
 fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
     if has_mesh_extension(path) {
-        return (format!("this is {}, not a model", kind.words()), None);
+        return (format!("this is {}, not a model", kind.description()), None);
     }
     let help = match kind {
         FileKind::Folder => "pass a scene file, such as scene.toml",
@@ -158,7 +158,7 @@ fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
             "glimt reads scenes only from regular files, so that it can watch them"
         }
     };
-    (format!("this is {}, not a scene file", kind.words()), Some(help.to_owned()))
+    (format!("this is {}, not a scene file", kind.description()), Some(help.to_owned()))
 }
 
 fn too_large_refusal() -> Refusal {
@@ -174,10 +174,10 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
         return (DANGLING_LINK.to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
-        let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
+        let shown = |path: &Path| escape_invisible_chars(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let is_model = has_mesh_extension(path);
-        let near = similar_file(path, if is_model { has_mesh_extension } else { may_be_scene });
+        let near = similar_file(path, if is_model { has_mesh_extension } else { has_scene_extension });
         let help = match (missing, near) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
@@ -199,14 +199,14 @@ pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
-    let names: Vec<String> = folder::names(listed)
+    let names: Vec<String> = folder::entry_names(listed)
         .ok()?
         .take(MAX_FOLDER_FILES)
         .filter_map(|name| name.into_string().ok())
-        .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
-        .filter(|name| matches!(file::kind(&parent.join(name)), Ok((FileKind::Regular, _))))
+        .filter(|name| shares_stem_or_extension(Path::new(name), path) && may_be_meant(Path::new(name)))
+        .filter(|name| matches!(file::file_kind(&parent.join(name)), Ok((FileKind::Regular, _))))
         .collect();
-    let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    let near = nearest_name(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(parent.join(near))
 }
 
@@ -217,17 +217,17 @@ pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let length = u64::try_from(text.len()).ok()?;
     let has_text = |file: &PathBuf| {
-        matches!(file::kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
+        matches!(file::file_kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
             && read_bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
-    let names = folder::names(listed).ok()?.take(MAX_FOLDER_FILES);
+    let names = folder::entry_names(listed).ok()?.take(MAX_FOLDER_FILES);
     let named = |name| parent.join::<std::ffi::OsString>(name);
     // The order of files in a folder depends on the file system. Use the first by name.
     names.map(named).filter(|file| file != path && has_text(file)).min()
 }
 
 /// Whether two file names differ, but have the same extension or the same stem.
-fn is_alike(found: &Path, meant: &Path) -> bool {
+fn shares_stem_or_extension(found: &Path, meant: &Path) -> bool {
     found.file_name() != meant.file_name()
         && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())
 }

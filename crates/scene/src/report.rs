@@ -1,8 +1,8 @@
 //! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help
 //! text.
 //!
-//! Text from files is sanitized with [`visible`]. The only control characters in the output are line breaks
-//! and, with [`Style::Ansi`], color escape sequences.
+//! Text from files is sanitized with [`escape_invisible_chars`]. The only control characters in the output are line breaks
+//! and, with [`ReportStyle::Ansi`], color escape sequences.
 
 mod lines;
 
@@ -14,13 +14,13 @@ use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
 use super::diagnostic::{Diagnostic, Severity};
-use super::sanitize::visible;
+use super::sanitize::escape_invisible_chars;
 
-pub use lines::{ReportLine, SpanRole, StyledSpan, lines};
+pub use lines::{ReportLine, SpanRole, StyledSpan, report_lines};
 
 /// Report style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Style {
+pub enum ReportStyle {
     /// Plain text.
     Plain,
     /// Text with ANSI color escape sequences.
@@ -29,16 +29,16 @@ pub enum Style {
 
 /// Formats diagnostics sorted by file and position, followed by a summary line. Wraps messages at `width`
 /// columns and cuts source lines. Returns an empty string if there are no diagnostics.
-pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
+pub fn render_report(diagnostics: &[Diagnostic], width: usize, style: ReportStyle) -> String {
     let renderer = match style {
-        Style::Plain => Renderer::plain(),
-        Style::Ansi => Renderer::styled(),
+        ReportStyle::Plain => Renderer::plain(),
+        ReportStyle::Ansi => Renderer::styled(),
     };
-    render_with(diagnostics, width, &renderer)
+    render_report_with(diagnostics, width, &renderer)
 }
 
 /// Counts the diagnostics, as in `2 errors, 1 warning`.
-pub fn summary(diagnostics: &[Diagnostic]) -> String {
+pub fn summarize_counts(diagnostics: &[Diagnostic]) -> String {
     let count = |severity| diagnostics.iter().filter(|one| one.severity == severity).count();
     let words = |count: usize, name: &str| match count {
         0 => None,
@@ -51,16 +51,16 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
 
 /// Converts offsets to lines and columns. Caches the line index for the last text.
 #[derive(Default)]
-pub struct Locator(Option<(Arc<str>, LineIndex)>);
+pub struct LineColumnLocator(Option<(Arc<str>, LineIndex)>);
 
-impl Locator {
+impl LineColumnLocator {
     /// Like [`line_and_column`], but fast for repeated calls with the same text.
     pub fn locate(&mut self, source: &Arc<str>, offset: usize) -> (usize, usize) {
-        let (source, lines) = self.lines(source);
+        let (source, lines) = self.line_index(source);
         lines.locate(source, offset)
     }
 
-    fn lines(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
+    fn line_index(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
         self.0 = self.0.take().filter(|(known, _)| Arc::ptr_eq(known, source));
         self.0.get_or_insert_with(|| (Arc::clone(source), LineIndex::new(source)))
     }
@@ -71,20 +71,20 @@ pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
 }
 
-fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
+fn render_report_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
     if diagnostics.is_empty() {
         return String::new();
     }
     let renderer = renderer.clone().term_width(width.max(MIN_WIDTH)).decor_style(DecorStyle::Ascii);
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|one| (&one.path, one.place.as_ref().map(|place| place.span.start)));
-    let mut index = Locator::default();
+    let mut index = LineColumnLocator::default();
     let mut text = String::new();
     for diagnostic in sorted {
-        text.push_str(&render_one(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
+        text.push_str(&render_diagnostic(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
         text.push_str("\n\n");
     }
-    text.push_str(&summary(diagnostics));
+    text.push_str(&summarize_counts(diagnostics));
     text.push('\n');
     text
 }
@@ -92,22 +92,27 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
 /// Minimum report width, even if the terminal is narrower.
 const MIN_WIDTH: usize = 30;
 
-fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {
+fn render_diagnostic(
+    diagnostic: &Diagnostic,
+    width: usize,
+    renderer: &Renderer,
+    index: &mut LineColumnLocator,
+) -> String {
     let level = match diagnostic.severity {
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
     };
     let path = diagnostic.path.to_string_lossy();
-    let mut origin = Origin::path(visible(&path));
+    let mut origin = Origin::path(escape_invisible_chars(&path));
     let mut snippet = None;
     let mut note = None;
     if let Some(place) = &diagnostic.place {
-        let (source, lines) = index.lines(&place.source);
+        let (source, lines) = index.line_index(&place.source);
         let (line, column) = lines.locate(source, place.span.start);
         origin = origin.line(line).char_column(column);
-        let whole = lines.span(line - 1, source).unwrap_or_default();
+        let whole = lines.line_span(line - 1, source).unwrap_or_default();
         let excerpt = Excerpt::new(source, whole, &place.span);
-        let label = visible(&place.label);
+        let label = escape_invisible_chars(&place.label);
         let fits = excerpt.label_column(line) + display_width(&label) <= width;
         // The renderer does not wrap labels, so show a long label as a note.
         note = (!fits && !label.is_empty()).then_some(place.label.as_str());
@@ -116,7 +121,7 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
     let title =
-        level.primary_title(wrap_visible(&diagnostic.message, width.saturating_sub("warning: ".len())));
+        level.primary_title(sanitize_and_wrap(&diagnostic.message, width.saturating_sub("warning: ".len())));
     // Errors in command-line arguments have no file.
     let has_origin = !path.is_empty();
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
@@ -124,17 +129,17 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
         group = group.element(snippet);
     }
     if let Some(note) = note {
-        group = group.element(Level::NOTE.message(wrap_visible(note, width.saturating_sub(14))));
+        group = group.element(Level::NOTE.message(sanitize_and_wrap(note, width.saturating_sub(14))));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(wrap_visible(help, width.saturating_sub(14))));
+        group = group.element(Level::HELP.message(sanitize_and_wrap(help, width.saturating_sub(14))));
     }
-    let rendered = without_second_origin(&renderer.render(&[group]));
-    if has_origin { rendered } else { without_lines(&rendered, "|") }
+    let rendered = remove_repeated_origin(&renderer.render(&[group]));
+    if has_origin { rendered } else { remove_matching_lines(&rendered, "|") }
 }
 
 /// Removes color escape sequences and surrounding whitespace from a rendered line.
-fn without_colors(line: &str) -> String {
+fn strip_color_codes(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
         _ => part,
@@ -143,13 +148,13 @@ fn without_colors(line: &str) -> String {
 }
 
 /// Removes the rendered lines that contain nothing but `text`.
-fn without_lines(rendered: &str, text: &str) -> String {
-    rendered.split_inclusive('\n').filter(|line| without_colors(line) != text).collect()
+fn remove_matching_lines(rendered: &str, text: &str) -> String {
+    rendered.split_inclusive('\n').filter(|line| strip_color_codes(line) != text).collect()
 }
 
 /// Removes the line `:::`, which the renderer inserts before a snippet whose origin it has already shown.
-fn without_second_origin(rendered: &str) -> String {
-    let Some(second) = rendered.lines().find(|line| without_colors(line) == ":::") else {
+fn remove_repeated_origin(rendered: &str) -> String {
+    let Some(second) = rendered.lines().find(|line| strip_color_codes(line) == ":::") else {
         return rendered.to_owned();
     };
     rendered.replacen(&format!("{second}\n"), "", 1)
@@ -166,13 +171,16 @@ impl Excerpt {
     const NEAR_BYTES: usize = 1_000;
 
     fn new(source: &str, line: Range<usize>, place: &Range<usize>) -> Self {
-        let start = floor_char(source, place.start.clamp(line.start, line.end));
-        let end = floor_char(source, place.end.clamp(start, line.end));
-        let end = end.min(floor_char(source, start + Self::NEAR_BYTES)).max(start);
-        let left = floor_char(source, line.start.max(start.saturating_sub(Self::NEAR_BYTES)));
-        let right = floor_char(source, line.end.min(end + Self::NEAR_BYTES));
-        let (before, inside, after) =
-            (visible(&source[left..start]), visible(&source[start..end]), visible(&source[end..right]));
+        let start = floor_char_boundary(source, place.start.clamp(line.start, line.end));
+        let end = floor_char_boundary(source, place.end.clamp(start, line.end));
+        let end = end.min(floor_char_boundary(source, start + Self::NEAR_BYTES)).max(start);
+        let left = floor_char_boundary(source, line.start.max(start.saturating_sub(Self::NEAR_BYTES)));
+        let right = floor_char_boundary(source, line.end.min(end + Self::NEAR_BYTES));
+        let (before, inside, after) = (
+            escape_invisible_chars(&source[left..start]),
+            escape_invisible_chars(&source[start..end]),
+            escape_invisible_chars(&source[end..right]),
+        );
         let from = before.len();
         Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
     }
@@ -193,7 +201,7 @@ fn display_width(text: &str) -> usize {
     unicode_width::UnicodeWidthStr::width(text)
 }
 
-fn floor_char(source: &str, offset: usize) -> usize {
+fn floor_char_boundary(source: &str, offset: usize) -> usize {
     let mut offset = offset.min(source.len());
     while !source.is_char_boundary(offset) {
         offset -= 1;
@@ -213,21 +221,21 @@ impl LineIndex {
     }
 
     /// The 1-based line number of a byte offset.
-    pub(super) fn line(&self, offset: usize) -> usize {
+    pub(super) fn line_number(&self, offset: usize) -> usize {
         self.starts.partition_point(|start| *start <= offset)
     }
 
     /// Returns the 1-based line and column of a byte offset. A byte order mark is not counted.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
-        let offset = floor_char(source, offset);
-        let line = self.line(offset);
+        let offset = floor_char_boundary(source, offset);
+        let line = self.line_number(offset);
         let before = &source[self.starts[line - 1]..offset];
         let before = before.strip_prefix('\u{feff}').unwrap_or(before);
         (line, before.chars().count() + 1)
     }
 
     /// Returns the byte range of the 0-based line `line`, without its line ending or a byte order mark.
-    pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
+    pub(super) fn line_span(&self, line: usize, source: &str) -> Option<Range<usize>> {
         let start = *self.starts.get(line)?;
         let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
         let text = &source[start..end];
@@ -237,8 +245,8 @@ impl LineIndex {
 }
 
 /// Makes text safe to display and wraps it at word boundaries after at most `width` characters.
-fn wrap_visible(text: &str, width: usize) -> Cow<'static, str> {
-    let text = visible(text);
+fn sanitize_and_wrap(text: &str, width: usize) -> Cow<'static, str> {
+    let text = escape_invisible_chars(text);
     let mut lines = String::with_capacity(text.len());
     let mut column = 0;
     for word in text.split(' ') {

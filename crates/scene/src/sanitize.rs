@@ -3,13 +3,13 @@
 
 use std::borrow::Cow;
 
-use crate::system::text::is_plain;
+use crate::system::text::is_terminal_safe;
 
 /// Replaces control and invisible characters with visible characters: control pictures such as `␛` for ESC
 /// and `␊` for a line feed, four spaces for a tab, and escapes such as `\u{202e}` for C1 controls,
 /// directional marks and zero-width characters. The result is a single line.
-pub fn visible(text: &str) -> Cow<'_, str> {
-    if text.chars().all(is_plain) {
+pub fn escape_invisible_chars(text: &str) -> Cow<'_, str> {
+    if text.chars().all(is_terminal_safe) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
@@ -18,17 +18,17 @@ pub fn visible(text: &str) -> Cow<'_, str> {
             '\t' => shown.push_str("    "),
             '\u{7f}' => shown.push('␡'),
             '\0'..='\u{1f}' => shown.extend(char::from_u32(0x2400 + u32::from(c))),
-            c if is_plain(c) => shown.push(c),
+            c if is_terminal_safe(c) => shown.push(c),
             c => shown.extend(c.escape_unicode()),
         }
     }
     Cow::Owned(shown)
 }
 
-/// Makes text safe to display with [`visible`] and truncates it to `limit` characters. Truncated text ends
+/// Makes text safe to display with [`escape_invisible_chars`] and truncates it to `limit` characters. Truncated text ends
 /// with `…`.
 pub fn shortened(text: &str, limit: usize) -> String {
-    let shown = visible(text);
+    let shown = escape_invisible_chars(text);
     if shown.chars().count() <= limit {
         return shown.into_owned();
     }
@@ -41,15 +41,18 @@ mod tests {
 
     #[test]
     fn plain_text_is_not_copied() {
-        assert!(matches!(visible("Bäume, 木, 🌳"), Cow::Borrowed(_)));
+        assert!(matches!(escape_invisible_chars("Bäume, 木, 🌳"), Cow::Borrowed(_)));
     }
 
     #[test]
     fn control_characters_become_visible() {
-        assert_eq!(visible("\u{1b}]52;c;x\u{7}"), "␛]52;c;x␇");
-        assert_eq!(visible("a\r\nb\tc\u{7f}\0"), "a␍␊b    c␡␀");
-        assert_eq!(visible("\u{9b}31m\u{202e}gpj.exe\u{2066}"), "\\u{9b}31m\\u{202e}gpj.exe\\u{2066}");
-        assert_eq!(visible("\u{feff}a\u{200b}"), "\\u{feff}a\\u{200b}");
+        assert_eq!(escape_invisible_chars("\u{1b}]52;c;x\u{7}"), "␛]52;c;x␇");
+        assert_eq!(escape_invisible_chars("a\r\nb\tc\u{7f}\0"), "a␍␊b    c␡␀");
+        assert_eq!(
+            escape_invisible_chars("\u{9b}31m\u{202e}gpj.exe\u{2066}"),
+            "\\u{9b}31m\\u{202e}gpj.exe\\u{2066}"
+        );
+        assert_eq!(escape_invisible_chars("\u{feff}a\u{200b}"), "\\u{feff}a\\u{200b}");
     }
 
     #[test]

@@ -6,13 +6,13 @@ use super::description::*;
 use super::diagnostic::Diagnostic;
 use super::source::{MALFORMED_SET, MISSING_EQUALS_HELP};
 use super::tests::CAMERA;
-use super::{Outcome, SceneText, document, parse};
+use super::{ParseOutcome, SceneText, document, parse};
 
 /// Adds a camera to `text` and parses it with `--set` values.
-fn with_sets(text: &str, sets: &[&str]) -> Result<Scene, Vec<Diagnostic>> {
+fn parse_with_set_args(text: &str, sets: &[&str]) -> Result<Scene, Vec<Diagnostic>> {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    let source = SceneText::with_sets(format!("{text}\n{CAMERA}").into(), &sets)?;
-    let Outcome { scene, diagnostics, .. } = document::lower(&source, Path::new("scene.toml"));
+    let source = SceneText::with_set_args(format!("{text}\n{CAMERA}").into(), &sets)?;
+    let ParseOutcome { scene, diagnostics, .. } = document::parse_and_lower(&source, Path::new("scene.toml"));
     scene.ok_or(diagnostics)
 }
 
@@ -40,7 +40,7 @@ fn set_is_equivalent_to_editing_the_file() {
     for (sets, old, new) in cases {
         let text = format!("{BALLS}\n{CAMERA}").replace(old, new);
         let from_file = parse(text.into(), Path::new("scene.toml")).scene.expect("a scene");
-        let from_set = with_sets(BALLS, sets).expect("a scene");
+        let from_set = parse_with_set_args(BALLS, sets).expect("a scene");
         assert_eq!((&from_set.render, &from_set.camera), (&from_file.render, &from_file.camera), "{sets:?}");
         assert_eq!(from_set.photons, from_file.photons, "{sets:?}");
         let shapes = |scene: &Scene| scene.objects.iter().map(|one| one.shape.clone()).collect::<Vec<_>>();
@@ -77,7 +77,7 @@ fn mistakes_in_set_are_reported() {
         ("samples=3", MALFORMED_SET, "samples=3"),
         ("render.samples 3", MALFORMED_SET, "render.samples 3"),
     ] {
-        let errors = with_sets(&format!("{BALLS}\n{two}"), &[set]).expect_err("an error");
+        let errors = parse_with_set_args(&format!("{BALLS}\n{two}"), &[set]).expect_err("an error");
         let [error] = errors.as_slice() else { panic!("{set}: {errors:?}") };
         let place = error.place.as_ref().expect("a place");
         assert_eq!((&*error.message, &place.source[place.span.clone()]), (message, written), "{set}");
@@ -89,9 +89,9 @@ fn mistakes_in_set_are_reported() {
 
 #[test]
 fn unclosed_brackets_do_not_affect_set() {
-    let source = SceneText::with_sets("[render]\nsamples = [1,".into(), &["render.width=3".to_owned()])
+    let source = SceneText::with_set_args("[render]\nsamples = [1,".into(), &["render.width=3".to_owned()])
         .expect("a text");
-    let outcome = document::lower(&source, Path::new("scene.toml"));
+    let outcome = document::parse_and_lower(&source, Path::new("scene.toml"));
     assert!(
         outcome.diagnostics.iter().all(|one| one.path == Path::new("scene.toml")),
         "{:?}",
@@ -103,9 +103,9 @@ fn unclosed_brackets_do_not_affect_set() {
 fn position_and_look_at_override_the_orbiter() {
     let camera = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        let source =
-            SceneText::with_sets("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets).expect("sets");
-        document::camera_of(&source)
+        let source = SceneText::with_set_args("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets)
+            .expect("sets");
+        document::parse_camera(&source)
     };
     let place = ["camera.position=[1,2,3]", "camera.look_at=[0,0,0]"];
     let Some(Camera::LookAt { position, fov, focus, .. }) = camera(&[place[0], place[1], "camera.fov=30"])

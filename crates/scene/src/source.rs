@@ -16,21 +16,21 @@ pub struct SceneText {
     all: Arc<str>,
     /// Length of the file's text, the first part of `all`.
     file: usize,
-    sets: Vec<SetValue>,
+    sets: Vec<SetArg>,
     /// Whether the text was generated for a model and therefore is not in a file.
     is_generated: bool,
 }
 
 /// A `--set` value: its span in the whole text, and a copy of its text for diagnostics.
 #[derive(Clone, Debug)]
-struct SetValue {
+struct SetArg {
     span: Range<usize>,
     text: Arc<str>,
 }
 
 impl SceneText {
     /// Wraps the text of a file, without `--set` values.
-    pub fn file(text: Arc<str>) -> Self {
+    pub fn from_file_text(text: Arc<str>) -> Self {
         Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
     }
 
@@ -39,22 +39,20 @@ impl SceneText {
     ///
     /// # Errors
     /// Returns one error per malformed value.
-    pub fn with_sets(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
+    pub fn with_set_args(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
         if sets.is_empty() {
-            return Ok(Self::file(file));
+            return Ok(Self::from_file_text(file));
         }
         let (mut all, mut known, mut wrong) = (file.to_string(), Vec::new(), Vec::new());
         for set in sets {
-            match set_to_toml(set) {
+            match set_arg_to_toml(set) {
                 Some(text) => {
                     all.push('\n');
-                    known.push(SetValue {
-                        span: all.len()..all.len() + text.len(),
-                        text: text.as_str().into(),
-                    });
+                    known
+                        .push(SetArg { span: all.len()..all.len() + text.len(), text: text.as_str().into() });
                     all.push_str(&text);
                 }
-                None => wrong.push(malformed_set_error(set)),
+                None => wrong.push(malformed_set_arg_error(set)),
             }
         }
         if wrong.is_empty() {
@@ -70,22 +68,22 @@ impl SceneText {
     }
 
     /// The file's text.
-    pub fn text(&self) -> &str {
+    pub fn file_text(&self) -> &str {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// Returns [`Self::text`] as an `Arc`. Only copies the text if there are `--set` values.
-    pub fn shared_text(&self) -> Arc<str> {
-        if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text().into() }
+    /// Returns [`Self::file_text`] as an `Arc`. Only copies the text if there are `--set` values.
+    pub fn shared_file_text(&self) -> Arc<str> {
+        if self.sets.is_empty() { Arc::clone(&self.all) } else { self.file_text().into() }
     }
 
     /// Returns the byte offsets of the `--set` values.
-    pub(super) fn set_offsets(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn set_arg_offsets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_in_set_value(&self, span: &Range<usize>) -> bool {
+    pub(super) fn is_in_set_arg(&self, span: &Range<usize>) -> bool {
         span.start >= self.file
     }
 
@@ -103,7 +101,7 @@ impl SceneText {
     ) -> (PathBuf, Option<SourceSpan>) {
         let set = self.sets.iter().find(|set| set.span.start <= span.start && span.end <= set.span.end);
         let (path, source, span) = match set {
-            Some(SetValue { span: own, text }) => {
+            Some(SetArg { span: own, text }) => {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
             None if self.is_generated => return (path.to_owned(), None),
@@ -117,25 +115,25 @@ impl SceneText {
 
 /// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. `None` if the `=`, the table or the
 /// key is missing.
-fn set_to_toml(set: &str) -> Option<String> {
+fn set_arg_to_toml(set: &str) -> Option<String> {
     // Quoted keys may contain `=`, so try each `=`.
     const MAX_EQUALS_SIGNS: usize = 8;
     set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
         let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_key_value(text));
         with("0")?;
-        with(value).or_else(|| with(&complete_number(value)?)).or_else(|| with(&toml_string(value)))
+        with(value).or_else(|| with(&normalize_decimal(value)?)).or_else(|| with(&quote_toml_string(value)))
     })
 }
 
 /// Completes numbers such as `.5` and `5.`, which are invalid in TOML.
-fn complete_number(text: &str) -> Option<String> {
+fn normalize_decimal(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
 }
 
 /// Formats a TOML basic string.
-pub fn toml_string(text: &str) -> String {
+pub fn quote_toml_string(text: &str) -> String {
     let mut quoted = String::from('"');
     for character in text.chars() {
         match character {
@@ -153,7 +151,7 @@ pub(super) const MALFORMED_SET: &str = "malformed value";
 /// Hint for a `--set` value without `=`.
 pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";
 
-fn malformed_set_error(set: &str) -> Diagnostic {
+fn malformed_set_arg_error(set: &str) -> Diagnostic {
     let place =
         SourceSpan { source: set.into(), span: 0..set.len(), label: "expected TABLE.KEY=VALUE".to_owned() };
     let key = set.split('=').next().unwrap_or_default();
@@ -192,12 +190,12 @@ mod tests {
             ("render.samples=3 # few", "render.samples = 3 # few"),
             ("render.a=1\nrender.b=2", "render.a = \"1\\U0000000arender.b=2\""),
         ] {
-            assert_eq!(set_to_toml(set).as_deref(), Some(text), "{set}");
+            assert_eq!(set_arg_to_toml(set).as_deref(), Some(text), "{set}");
         }
         for wrong in
             ["", "=", "render", "render=3", "=3", "render.=3", ".samples=3", "[render]\nsamples=3", "a b.c=1"]
         {
-            assert_eq!(set_to_toml(wrong), None, "{wrong}");
+            assert_eq!(set_arg_to_toml(wrong), None, "{wrong}");
         }
     }
 }

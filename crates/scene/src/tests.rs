@@ -6,7 +6,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 
 pub const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
-fn outcome(text: &str) -> Outcome {
+fn outcome(text: &str) -> ParseOutcome {
     parse(text.into(), Path::new("scene.toml"))
 }
 
@@ -24,7 +24,7 @@ fn messages(text: &str) -> Vec<String> {
 
 #[test]
 fn starter_has_no_diagnostics() {
-    let outcome = outcome(starter());
+    let outcome = outcome(starter_scene());
     assert_eq!(outcome.diagnostics, []);
     let scene = outcome.scene.expect("a scene");
     assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (5, 1, 5));
@@ -33,12 +33,12 @@ fn starter_has_no_diagnostics() {
 #[test]
 fn empty_scene_has_the_documented_defaults() {
     let scene = scene("");
-    let Render { width, height, samples, shadow_samples, max_depth, seed, .. } = scene.render;
+    let RenderOptions { width, height, samples, shadow_samples, max_depth, seed, .. } = scene.render;
     assert_eq!((width, height, samples, shadow_samples, max_depth, seed), (640, 480, 64, 1, 8, 0));
-    assert_eq!(scene.render.shadows, Shadows::Soft);
+    assert_eq!(scene.render.shadows, ShadowMode::Soft);
     assert_eq!((scene.render.filter, scene.render.tonemap), (PixelFilter::Box, Tonemap::None));
     assert_eq!((scene.render.exposure, &scene.output), (0.0, &None));
-    assert_eq!(scene.photons, Photons { enabled: false, count: 0, radius: 0.0, bounces: 16 });
+    assert_eq!(scene.photons, PhotonOptions { enabled: false, count: 0, radius: 0.0, bounces: 16 });
     let camera = Camera::LookAt {
         position: DVec3::new(0.0, 1.0, 4.0),
         look_at: DVec3::Y,
@@ -142,14 +142,14 @@ fn mesh_files_are_listed_once() {
     let scene = &loaded.scene;
     let files: Vec<_> = scene.mesh_files.iter().map(|file| file.value.clone()).collect();
     assert_eq!(files, [folder.path().join("a.obj"), folder.path().join("b.OFF")]);
-    assert_eq!(&loaded.source.text()[scene.mesh_files[0].span.clone()], "'a.obj'");
+    assert_eq!(&loaded.source.file_text()[scene.mesh_files[0].span.clone()], "'a.obj'");
     let meshes: Vec<_> = scene
         .objects
         .iter()
         .map(|object| match object.shape {
-            Shape::Mesh(Mesh { file, placed: MeshTransform::Steps { scale, .. }, smooth, .. }) => {
-                (file, scale, smooth, object.material)
-            }
+            Shape::Mesh(MeshReference {
+                file, placed: MeshTransform::Steps { scale, .. }, smooth, ..
+            }) => (file, scale, smooth, object.material),
             _ => panic!("not a mesh"),
         })
         .collect();
@@ -168,7 +168,7 @@ fn mesh_files_are_listed_once() {
 
     let late =
         loaded.diagnostic_at(scene.mesh_files[1].span.clone(), Severity::Error, "no usable face", None);
-    let shown = report::render(&[late], 300, report::Style::Plain);
+    let shown = report::render_report(&[late], 300, report::ReportStyle::Plain);
     assert!(shown.contains("scene.toml:16:6\n") && shown.contains("^^^^^^^"), "{shown}");
 }
 
@@ -249,7 +249,7 @@ fn warnings_never_hide_errors() {
     let table =
         |number: usize| format!("[materials.m{number}]\ndiffuse = 0.9\nspecular = 0.9\nshininess = 5\n");
     let flood = |count: usize| (0..count).map(table).collect::<String>();
-    let errors = |outcome: &Outcome| -> Vec<String> {
+    let errors = |outcome: &ParseOutcome| -> Vec<String> {
         let errors = outcome.diagnostics.iter().filter(|one| one.severity == diagnostic::Severity::Error);
         errors.map(|one| one.message.clone()).collect()
     };
@@ -269,7 +269,7 @@ fn warnings_never_hide_errors() {
 
 mod properties {
     use super::super::diagnostic::Diagnostic;
-    use super::super::report::{Style, lines, render};
+    use super::super::report::{ReportStyle, render_report, report_lines};
     use super::*;
     use proptest::prelude::*;
 
@@ -278,9 +278,9 @@ mod properties {
         for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
             assert!(place.source.get(place.span.clone()).is_some(), "{:?}", place.span);
         }
-        let text = render(diagnostics, 60, Style::Plain);
+        let text = render_report(diagnostics, 60, ReportStyle::Plain);
         assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
-        let pieces = lines(diagnostics, 60);
+        let pieces = report_lines(diagnostics, 60);
         assert_eq!(pieces.len(), text.lines().count());
         assert!(pieces.iter().flatten().all(|piece| !piece.text.contains(char::is_control)));
     }
@@ -325,7 +325,7 @@ mod properties {
         fn mutations_of_a_scene_never_panic(
             changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, fragment()), 1..8),
         ) {
-            let mut text: Vec<char> = starter().chars().collect();
+            let mut text: Vec<char> = starter_scene().chars().collect();
             for (at, removed, inserted) in changes {
                 let at = at.index(text.len() + 1);
                 let end = (at + removed).min(text.len());

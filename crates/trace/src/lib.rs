@@ -3,7 +3,7 @@
 //! | module | contents |
 //! | --- | --- |
 //! | [`world`] | objects and their acceleration structures, materials, lights, the camera, glass solids |
-//! | [`integrators`] | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::View), and [`render_tile_with_photons`](integrators::render_tile_with_photons), which renders a tile |
+//! | [`integrators`] | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::ViewMode), and [`render_tile_with_photons`](integrators::render_tile_with_photons), which renders a tile |
 //! | `integrators/transport/` | rays of a tile, packets of their hits, packets of sixteen vertices, paths through glass, scattering |
 //! | `integrators/direct/` | light samples, shadow rays, lobe rays, MIS weights |
 //! | `integrators/photons/` | photon emission, maps, gathering |

@@ -2,7 +2,7 @@
 //! camera can be written to a scene file exactly.
 
 use crate::math::DVec3;
-use crate::math::decimal::{decimal_step, rounded};
+use crate::math::decimal::{decimal_step, round_to_step};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
@@ -41,13 +41,13 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
 /// Multiplies the field of view by `factor`, within limits.
 pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
     let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
-    rounded((view.fov * factor).clamp(least, most), 0.01)
+    round_to_step((view.fov * factor).clamp(least, most), 0.01)
 }
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
 fn with_eye_at(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
-    let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
+    let position = (pose.look_at + arm).to_array().map(|number| round_to_step(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
 }
 

@@ -6,10 +6,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
-use super::connection::{Connection, QueryKind};
-use super::event::FrameReport;
-use super::graphics::{Images, PixelPlacement};
-use super::paint::{Fidelity, FrameExtras, Painter};
+use super::connection::{QueryKind, TerminalConnection};
+use super::event::PreviewSendReport;
+use super::graphics::{ImagePlacement, TerminalImages};
+use super::paint::{Fidelity, LinksAndDelayedText, Painter};
 use super::preview_kind::PreviewKind;
 use super::terminal;
 use super::terminal_replies::TerminalQueries;
@@ -45,8 +45,8 @@ pub(super) struct TerminalEnvironment {
 impl TerminalEnvironment {
     /// Creates a connection whose speed is unknown. A local multiplexer's replies do not reflect the network
     /// behind it.
-    fn connection(self, now: Instant) -> Connection {
-        Connection::new(self.is_multiplexed && self.is_remote, now)
+    fn new_connection(self, now: Instant) -> TerminalConnection {
+        TerminalConnection::new(self.is_multiplexed && self.is_remote, now)
     }
 }
 
@@ -57,8 +57,8 @@ pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 pub(super) struct Display {
     painter: Painter,
     /// The preview, if it is drawn as pixels.
-    images: Option<Images>,
-    connection: Connection,
+    images: Option<TerminalImages>,
+    connection: TerminalConnection,
     link: TerminalEnvironment,
     /// Writer that sends bytes to the terminal.
     out: TerminalWriter,
@@ -75,7 +75,7 @@ pub(super) struct Display {
     /// Whether a preview is being sent.
     is_picture_due: bool,
     /// Bytes and round-trip time for sending the last preview.
-    report: Option<FrameReport>,
+    report: Option<PreviewSendReport>,
     /// Whether the last preview's report has been returned.
     is_reported: bool,
 }
@@ -85,14 +85,14 @@ impl Display {
     pub(super) fn new(
         depth: ColorDepth,
         link: TerminalEnvironment,
-        images: Option<Images>,
+        images: Option<TerminalImages>,
         out: TerminalWriter,
         now: Instant,
     ) -> Self {
         let mut display = Self {
-            painter: Painter::new(depth).repeating(link.can_repeat),
+            painter: Painter::new(depth).with_repeat_support(link.can_repeat),
             images,
-            connection: link.connection(now),
+            connection: link.new_connection(now),
             link,
             out,
             is_synchronized: false,
@@ -112,7 +112,7 @@ impl Display {
     pub(super) fn restart(&mut self, now: Instant) {
         self.invalidate();
         self.window_titles[1] = WindowTitle::default();
-        self.connection = self.link.connection(now);
+        self.connection = self.link.new_connection(now);
         let questions = [SYNCHRONIZED, &self.link.ask.query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
@@ -129,8 +129,8 @@ impl Display {
     /// Switches to drawing the preview as pixels if `kind` requires it.
     pub(super) fn set_preview_kind(&mut self, kind: PreviewKind) {
         if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
-            terminal::record_images();
-            self.images = Some(Images::new(protocol, self.link.is_in_tmux));
+            terminal::mark_images_used();
+            self.images = Some(TerminalImages::new(protocol, self.link.is_in_tmux));
         }
     }
 
@@ -140,7 +140,7 @@ impl Display {
     }
 
     /// Places a preview drawn as pixels. `None` if the preview is drawn as cells.
-    pub(super) fn place_pixels(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
+    pub(super) fn place_pixels(&mut self, wanted: Option<ImagePlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -152,10 +152,10 @@ impl Display {
         wanted: &Buffer,
         picture: Rect,
         fidelity: Fidelity,
-        (is_new, extras): (bool, &FrameExtras),
+        (is_new, extras): (bool, &LinksAndDelayedText),
     ) {
         if !extras.links.is_empty() {
-            terminal::record_links();
+            terminal::mark_links_used();
         }
         self.painter.set_target_with(wanted, picture, fidelity, extras);
         self.is_complete = false;
@@ -173,7 +173,7 @@ impl Display {
     }
 
     /// Queues bytes to send after the preview.
-    pub(super) fn send_after_preview(&mut self, bytes: Vec<u8>) {
+    pub(super) fn queue_after_preview(&mut self, bytes: Vec<u8>) {
         self.asides.extend(bytes);
     }
 
@@ -190,9 +190,9 @@ impl Display {
             bytes.extend_from_slice(terminal::title_saving_bytes());
         }
         if wanted.bar.is_some() {
-            terminal::record_progress_bar();
+            terminal::mark_progress_bar_used();
         }
-        bytes.extend(sent.changes(wanted));
+        bytes.extend(sent.update_sequence(wanted));
         bytes.append(&mut self.asides);
         self.window_titles[1] = self.window_titles[0].clone();
         if !bytes.is_empty() {
@@ -203,7 +203,7 @@ impl Display {
     /// Sends one slice, ending it early if `is_late` returns true. Returns true if anything was sent.
     pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_queued_bytes();
-        let room = if is_idle { 0 } else { self.connection.max_slice(now) };
+        let room = if is_idle { 0 } else { self.connection.max_sendable_bytes(now) };
         if room == 0 {
             return false;
         }
@@ -212,7 +212,7 @@ impl Display {
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
-        let cells = self.painter.slice_until(room, is_late);
+        let cells = self.painter.next_slice_until(room, is_late);
         if !cells.is_empty() {
             self.send_slice(self.wrap_synchronized(cells), now);
             return true;
@@ -240,7 +240,8 @@ impl Display {
     fn finish_target(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
-            self.report = Some(FrameReport { bytes: self.sent, round_trip: self.connection.round_trip() });
+            self.report =
+                Some(PreviewSendReport { bytes: self.sent, round_trip: self.connection.round_trip() });
             self.is_reported = false;
         }
     }
@@ -255,7 +256,7 @@ impl Display {
     }
 
     fn send(&mut self, bytes: Vec<u8>, question: Option<QueryKind>, now: Instant) {
-        self.connection.send(bytes.len(), question, now);
+        self.connection.record_sent(bytes.len(), question, now);
         (self.out)(bytes);
     }
 
@@ -277,7 +278,7 @@ impl Display {
 
     /// Records that the operating system has accepted bytes.
     pub(super) fn record_written(&mut self, bytes: usize) {
-        self.connection.written(bytes);
+        self.connection.record_written(bytes);
     }
 
     /// Whether the target has been sent completely.
@@ -304,13 +305,13 @@ impl Display {
     pub(super) fn next_send_time(&mut self, now: Instant) -> Option<Instant> {
         match () {
             () if self.is_complete && !self.has_queued_bytes() => None,
-            () if self.connection.max_slice(now) > 0 => Some(now),
-            () => self.connection.wake(now),
+            () if self.connection.max_sendable_bytes(now) > 0 => Some(now),
+            () => self.connection.next_send_time(now),
         }
     }
 
     /// Returns the report on the last preview once, and again when the first round-trip time is known.
-    pub(super) fn take_report(&mut self) -> Option<FrameReport> {
+    pub(super) fn take_send_report(&mut self) -> Option<PreviewSendReport> {
         let report = self.report.as_mut()?;
         if report.round_trip.is_none() && self.connection.round_trip().is_some() {
             report.round_trip = self.connection.round_trip();
@@ -354,7 +355,7 @@ mod tests {
         }
         let show = |display: &mut Display, buffer: &Buffer| {
             let before = all.get();
-            display.set_target(buffer, area, Fidelity::Still, (true, &FrameExtras::default()));
+            display.set_target(buffer, area, Fidelity::Still, (true, &LinksAndDelayedText::default()));
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.send_next_slice(now, || false);
@@ -363,7 +364,7 @@ mod tests {
                 display.handle_reply(TerminalReply::Ready, now);
             }
             assert!(display.is_complete());
-            (display.take_report().expect("a report").bytes, all.get() - before)
+            (display.take_send_report().expect("a report").bytes, all.get() - before)
         };
         display.reset_byte_count();
         let (told, whole) = show(&mut display, &buffer);

@@ -18,12 +18,12 @@ const DEFAULT: &str = "vi";
 
 /// The editor from the environment, as a shell command.
 pub(super) fn editor_command(variable: impl Fn(&str) -> Option<String>) -> String {
-    editor(variable).0
+    editor_and_variable(variable).0
 }
 
 /// The editor from the environment as a shell command, with the variable that specifies it. `None` for the
 /// default editor.
-pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
+pub fn editor_and_variable(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
     let set = |name: &'static str| {
         let editor = variable(name).filter(|value| !value.trim().is_empty())?;
         Some((editor, Some(name)))
@@ -43,9 +43,9 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let child = shell.spawn().map_err(failed)?;
     let id = i32::try_from(child.id()).map_err(|_| format!("lost track of the editor `{editor}`"))?;
     let id = Pid::from_raw(id);
-    signals::set_child(Some(id));
+    signals::set_foreground_child(Some(id));
     let end = wait_for_child(id);
-    signals::set_child(None);
+    signals::set_foreground_child(None);
     match end {
         // Signals from the keyboard are a normal way to quit an editor.
         Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(_, Signal::SIGINT | Signal::SIGQUIT, _)) => Ok(()),
@@ -130,10 +130,10 @@ mod tests {
         assert_eq!(of(&[("VISUAL", " "), ("EDITOR", "ed")]), "ed");
         assert_eq!(of(&[]), "vi");
         assert_eq!(
-            editor(|name| (name == "EDITOR").then(|| "ed".to_owned())),
+            editor_and_variable(|name| (name == "EDITOR").then(|| "ed".to_owned())),
             ("ed".to_owned(), Some("EDITOR"))
         );
-        assert_eq!(editor(|_| None), ("vi".to_owned(), None));
+        assert_eq!(editor_and_variable(|_| None), ("vi".to_owned(), None));
     }
 
     #[test]

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::options::{Changed, OutputChange, WatchUpdate};
+use super::options::{ContentChange, OutputChange, WatchUpdate};
 use super::terminal_replies::TerminalReply;
-use crate::film::Picture;
-use crate::pipeline::protocol::{self, PreviewSource, Section};
+use crate::film::Srgb8Image;
+use crate::pipeline::protocol::{self, NormalizedRect, PreviewSource};
 
 /// An input to the front end.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(super) enum Event {
     /// A key press.
     Key(KeyPress),
     /// A mouse action.
-    Mouse(Mouse),
+    Mouse(MouseEvent),
     /// Pasted text. Its content is ignored.
     Paste,
     /// A reply or report from the terminal.
@@ -28,23 +28,23 @@ pub(super) enum Event {
     /// Writing to the terminal failed.
     Unwritable(ErrorKind),
     /// A preview has been sent.
-    Frame(FrameReport),
+    Frame(PreviewSendReport),
     /// The window size may have changed.
-    Resize(Window),
+    Resize(WindowSize),
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
     /// A new preview. `range` is the range of displayed values, for views that map values to colors.
     /// `section` is set if only part of the image is shown, at 1:1 scale.
     Picture {
         generation: u64,
-        picture: Arc<Picture>,
+        picture: Arc<Srgb8Image>,
         range: Option<[f32; 2]>,
-        section: Option<Section>,
+        section: Option<NormalizedRect>,
         lacks_photons: bool,
         source: Option<PreviewSource>,
     },
     /// A file that the scene depends on was written.
-    Changed(Changed),
+    Changed(ContentChange),
     /// The changed files have been fully written.
     Settled,
     /// An output file was modified or restored by another program.
@@ -102,7 +102,7 @@ impl KeyPress {
 
 /// A mouse event over a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Mouse {
+pub(super) struct MouseEvent {
     pub kind: MouseEventKind,
     /// Column of the cell, counted from 0.
     pub column: u16,
@@ -123,7 +123,7 @@ pub(super) enum MouseEventKind {
 
 /// Terminal window size.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Window {
+pub(super) struct WindowSize {
     pub columns: u16,
     pub rows: u16,
     /// Height of a cell divided by its width.
@@ -198,7 +198,7 @@ pub(super) struct FilePosition {
 
 /// Bytes and round-trip time for sending the last preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct FrameReport {
+pub(super) struct PreviewSendReport {
     /// Bytes sent since the render began.
     pub bytes: usize,
     /// Round-trip time of the terminal. `None` if it does not reply.

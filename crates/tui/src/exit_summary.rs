@@ -2,12 +2,12 @@
 
 use super::event::WriteFailure;
 use super::messages;
-use super::state::{KeyOverrides, OwnImage, State, WorkerActivity, WrittenFile};
+use super::state::{KeyOverrides, SceneImageProgress, State, WorkerActivity, WrittenFile};
 use crate::choice::Choice;
-use crate::pipeline::protocol::{OwnImageState, Report, SampleCounts};
-use crate::pipeline::settings::{CameraChange, View};
-use crate::pipeline::words::seconds;
-use crate::scene::sanitize::visible;
+use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
+use crate::pipeline::settings::{CameraChange, ViewMode};
+use crate::pipeline::words::format_seconds;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Lists the written files with their sample counts and render times, followed by later events.
 pub(super) fn summary_text(state: &State) -> String {
@@ -20,27 +20,29 @@ pub(super) fn summary_text(state: &State) -> String {
 
 /// Whether the summary claims that the scene's own image is up to date.
 pub(super) fn is_image_current(state: &State) -> bool {
-    let is_written = state.saving.own.state == OwnImageState::Written;
+    let is_written = state.saving.own.state == SavedSceneImageState::Written;
     is_written && state.saving.write_failed.is_none() && !is_scene_broken(state)
 }
 
 /// Changes that were made with keys and saved neither to the scene nor in an image, formatted as command-line
 /// options.
-pub(super) fn unsaved_as_options(state: &State) -> Option<String> {
+pub(super) fn unsaved_changes_as_options(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
     let is_in_scene =
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
     let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
-    let options = KeyOverrides { camera, ..shown }.options(state.request.viewpoint().filter(|_| has_orbiter));
+    let options = KeyOverrides { camera, ..shown }
+        .as_command_line_options(state.request.viewpoint().filter(|_| has_orbiter));
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
 /// Names of the image's output files. `None` until the scene has been read.
-pub(super) fn image_name(state: &State) -> Option<String> {
+pub(super) fn output_file_names(state: &State) -> Option<String> {
     let outputs = &state.request.effective.as_ref()?.outputs;
-    let names: Vec<_> = outputs.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
+    let names: Vec<_> =
+        outputs.iter().map(|path| escape_invisible_chars(&path.to_string_lossy()).into_owned()).collect();
     (!names.is_empty()).then(|| names.join(", "))
 }
 
@@ -49,13 +51,13 @@ fn reason_for_no_image(state: &State) -> String {
     if is_scene_broken(state) {
         return format!("no image written; {} has errors", scene_name(state));
     }
-    let Some(name) = image_name(state) else { return "no image written".to_owned() };
+    let Some(name) = output_file_names(state) else { return "no image written".to_owned() };
     match state.saving.own {
-        OwnImage { state: OwnImageState::Written, .. } => format!("{name} is up to date"),
-        OwnImage { fraction, .. } if fraction > 0.0 => {
+        SceneImageProgress { state: SavedSceneImageState::Written, .. } => format!("{name} is up to date"),
+        SceneImageProgress { fraction, .. } if fraction > 0.0 => {
             format!("{name} not finished ({} %)", (fraction * 100.0).floor())
         }
-        OwnImage { .. } => format!("{name} not finished"),
+        SceneImageProgress { .. } => format!("{name} not finished"),
     }
 }
 
@@ -68,15 +70,17 @@ fn events_since_writing(state: &State) -> String {
         return format!("; {} has errors since", scene_name(state));
     }
     let written = &state.saving.written;
-    if state.saving.own.state == OwnImageState::Written {
+    if state.saving.own.state == SavedSceneImageState::Written {
         return String::new();
     }
-    if !state.request.is_own_image() {
+    if !state.request.has_no_key_overrides() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            OwnImage { .. } if state.saving.is_older_than_edit() => messages::OLDER_THAN_EDIT.to_owned(),
-            OwnImage { .. } if is_by_hand => String::new(),
-            OwnImage { fraction, .. } => {
+            SceneImageProgress { .. } if state.saving.is_older_than_edit() => {
+                messages::OLDER_THAN_EDIT.to_owned()
+            }
+            SceneImageProgress { .. } if is_by_hand => String::new(),
+            SceneImageProgress { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
             }
         };
@@ -98,7 +102,7 @@ fn is_scene_broken(state: &State) -> bool {
 
 fn scene_name(state: &State) -> String {
     let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
-    visible(&name).into_owned()
+    escape_invisible_chars(&name).into_owned()
 }
 
 /// Lists the written files and their descriptions, grouped by image.
@@ -110,8 +114,9 @@ fn describe_files(written: &[WrittenFile]) -> String {
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
-            let changes =
-                KeyOverrides { view: None, ..shows }.differences(&KeyOverrides::default(), false).join(", ");
+            let changes = KeyOverrides { view: None, ..shows }
+                .describe_differences(&KeyOverrides::default(), false)
+                .join(", ");
             let with = if changes.is_empty() { String::new() } else { format!(", with {changes}") };
             format!("wrote {}{colon}{made}{with}", names.join(", "))
         })
@@ -121,7 +126,7 @@ fn describe_files(written: &[WrittenFile]) -> String {
 
 /// Explains why an image could not be written, and lists other files written for this and earlier images.
 fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
-    let mut words = format!("not written: {}", visible(&failed.why));
+    let mut words = format!("not written: {}", escape_invisible_chars(&failed.why));
     for written in &state.saving.written {
         let is_new = written.generation >= failed.generation;
         words += match (is_new, written.is_stale) {
@@ -135,37 +140,37 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
 }
 
 /// Describes an image and its render time. If the samples were reused, the time is the original render's.
-pub(super) fn describe_image(report: &Report, shown: View) -> String {
+pub(super) fn describe_image(report: &Report, shown: ViewMode) -> String {
     let image = &report.image;
-    let time = seconds(report.seconds.max(image.render_seconds));
-    let samples = sample_words(image.samples);
+    let time = format_seconds(report.seconds.max(image.render_seconds));
+    let samples = format_sample_count(image.samples);
     format!("{}{}×{}, {samples}, {time}", view_prefix(shown), image.width, image.height)
 }
 
 /// Describes an image that was written before its render finished.
-pub(super) fn describe_unfinished(samples: SampleCounts, shown: View) -> String {
-    format!("{}unfinished ({})", view_prefix(shown), sample_words(samples))
+pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) -> String {
+    format!("{}unfinished ({})", view_prefix(shown), format_sample_count(samples))
 }
 
 /// `64 samples`, or `16 to 32 samples`.
-fn sample_words(SampleCounts { min, max, .. }: SampleCounts) -> String {
+fn format_sample_count(SampleCounts { min, max, .. }: SampleCounts) -> String {
     if min == max { format!("{max} samples") } else { format!("{min} to {max} samples") }
 }
 
-fn view_prefix(view: View) -> String {
+fn view_prefix(view: ViewMode) -> String {
     let view = view_label(view);
     if view.is_empty() { view } else { format!("{view}, ") }
 }
 
 /// The view's name. Empty for the beauty view.
-pub(super) fn view_label(view: View) -> String {
-    if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
+pub(super) fn view_label(view: ViewMode) -> String {
+    if view == ViewMode::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Changed;
+    use crate::ContentChange;
     use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::description::Camera;
@@ -185,11 +190,11 @@ mod tests {
     fn file_written_during_newer_request_is_listed() {
         let mut ui = TestUi::new();
         ui.finish_render([200, 30, 30]);
-        ui.press('r');
+        ui.press_character('r');
         let begun = ui.state.request.generation;
         ui.worker_event(Event::Started { generation: begun });
         ui.worker_event(Event::Progress { generation: begun, progress: render_progress(0.5, None) });
-        ui.press('l');
+        ui.press_character('l');
         ui.worker_event(written_event(begun, "big.png", true));
         assert!(
             summary_text(&ui.state).starts_with(&format!("wrote big.png; {NEXT_RENDER}")),
@@ -200,7 +205,11 @@ mod tests {
         ui.finish_render([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
-        assert!(ui.text().contains(messages::NOT_SAVED), "expected an unsaved image: {}", ui.text());
+        assert!(
+            ui.screen_text().contains(messages::NOT_SAVED),
+            "expected an unsaved image: {}",
+            ui.screen_text()
+        );
     }
 
     #[test]
@@ -215,9 +224,9 @@ mod tests {
             }));
         };
         write(&mut ui, 2.02, 2.0);
-        ui.press('r');
+        ui.press_character('r');
         write(&mut ui, 1.02, 1.0);
-        ui.press('r');
+        ui.press_character('r');
         write(&mut ui, 0.05, 2.0);
         assert_eq!(summary_text(&ui.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
     }
@@ -228,16 +237,17 @@ mod tests {
         ui.worker_event(written_event(1, "a.png", true));
         ui.finish_render([200, 30, 30]);
         let own = summary_text(&ui.state);
-        ui.press('v');
+        ui.press_character('v');
         let generation = ui.state.request.generation;
         ui.worker_event(Event::Started { generation });
         ui.worker_event(done_with(generation, |report| {
-            (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
+            (report.settings.view, report.seconds, report.image.render_seconds) =
+                (ViewMode::Normal, 0.5, 0.4);
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
         assert_eq!(summary_text(&ui.state), own, "the file should not be written again");
-        ui.press('w');
+        ui.press_character('w');
         ui.worker_event(written_event(generation, "a.png", false));
         assert_eq!(summary_text(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
@@ -249,20 +259,20 @@ mod tests {
             let mut ui = TestUi::new();
             ui.worker_event(written_event(1, "a.png", true));
             ui.finish_render([200, 30, 30]);
-            ui.press(key);
+            ui.press_character(key);
             ui.finish_render([200, 30, 30]);
             let before = summary_text(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
             ui.finish_render([30, 30, 200]);
             let after = summary_text(&ui.state);
             assert_eq!(after, format!("{made}{}", messages::OLDER_THAN_EDIT), "{key}");
             assert_eq!(
-                unsaved_as_options(&ui.state).is_some_and(|it| it.contains("camera.position")),
+                unsaved_changes_as_options(&ui.state).is_some_and(|it| it.contains("camera.position")),
                 key == 'l'
             );
             // Saving the file without changing the image does not make the image newer.
-            ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             ui.worker_event(done_event(generation, Vec::new(), true));
@@ -286,7 +296,7 @@ mod tests {
         fail(&mut ui);
         let failed = "not written: cannot write a.png: no space";
         for key in ['l', 'v', '?'] {
-            ui.press(key);
+            ui.press_character(key);
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             assert!(summary_text(&ui.state).starts_with(failed), "{key}");
@@ -294,11 +304,11 @@ mod tests {
             assert!(summary_text(&ui.state).starts_with(failed), "{key}");
         }
         // Return to the scene's own image after freeing disk space or writing the image.
-        ui.press('0');
+        ui.press_character('0');
         for status in [Status::Done, Status::Reused] {
             fail(&mut ui);
             assert_eq!(summary_text(&ui.state), failed);
-            ui.press('r');
+            ui.press_character('r');
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             ui.worker_event(finished(generation, status));
@@ -319,7 +329,7 @@ mod tests {
     fn summary_lists_written_and_missing_images() {
         let mut ui = TestUi::new();
         assert_eq!(summary_text(&ui.state), "no image written");
-        ui.read_scene();
+        ui.report_scene_read();
         assert_eq!(summary_text(&ui.state), "cornell.png not finished");
         ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.388, None) });
         assert_eq!(summary_text(&ui.state), "cornell.png not finished (38 %)");
@@ -327,11 +337,11 @@ mod tests {
         ui.worker_event(done_event(1, Vec::new(), false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), made);
-        ui.press('r');
+        ui.press_character('r');
         ui.worker_event(Event::Started { generation: 2 });
         ui.worker_event(done_event(2, Vec::new(), true));
         assert_eq!(summary_text(&ui.state), made, "no new render was started");
-        ui.press('r');
+        ui.press_character('r');
         ui.worker_event(Event::Started { generation: 3 });
         ui.worker_event(Event::Progress { generation: 3, progress: render_progress(0.5, None) });
         assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 50 %"));
@@ -345,7 +355,7 @@ mod tests {
         let failed =
             "not written: cannot write b.exr: no space; wrote an earlier image to cornell.png; wrote a.png";
         assert_eq!(summary_text(&ui.state), failed);
-        ui.press('r');
+        ui.press_character('r');
         ui.worker_event(Event::Started { generation: 4 });
         ui.worker_event(written_event(4, "a.png", true));
         ui.worker_event(done_event(4, Vec::new(), false));
@@ -359,25 +369,25 @@ mod tests {
     fn unsaved_changes_are_listed_as_options() {
         let mut ui = TestUi::new();
         ui.finish_render([200, 30, 30]);
-        assert_eq!(unsaved_as_options(&ui.state), None);
+        assert_eq!(unsaved_changes_as_options(&ui.state), None);
         for key in ['s', 'i', 'd', ']', '<', 'v'] {
-            ui.press(key);
+            ui.press_character(key);
             ui.finish_render([200, 30, 30]);
         }
         let options = "not kept: --integrator path --shadows hard --dof off --view normal \
                        --set render.exposure=0.25 --set camera.fov=38.1";
-        assert_eq!(unsaved_as_options(&ui.state).as_deref(), Some(options));
-        ui.press('w');
+        assert_eq!(unsaved_changes_as_options(&ui.state).as_deref(), Some(options));
+        ui.press_character('w');
         let generation = ui.state.request.generation;
         ui.worker_event(written_event(generation, "a.png", false));
-        assert_eq!(unsaved_as_options(&ui.state), None, "the written image includes the changes");
-        ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
-        ui.press('l');
+        assert_eq!(unsaved_changes_as_options(&ui.state), None, "the written image includes the changes");
+        ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
+        ui.press_character('l');
         ui.finish_render([200, 30, 30]);
-        let words = unsaved_as_options(&ui.state).expect("the camera moved");
+        let words = unsaved_changes_as_options(&ui.state).expect("the camera moved");
         assert!(words.contains("--set 'camera.position=["), "{words}");
-        ui.press('0');
-        assert_eq!(unsaved_as_options(&ui.state), None);
+        ui.press_character('0');
+        assert_eq!(unsaved_changes_as_options(&ui.state), None);
     }
 
     #[test]
@@ -387,12 +397,12 @@ mod tests {
         ui.finish_render([200, 30, 30]);
         ui.state.request.text = Some(text.into());
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.1;
-        ui.press('l');
+        ui.press_character('l');
         let moved = ui.state.request.viewpoint().expect("a camera");
-        let words = unsaved_as_options(&ui.state).expect("moved");
+        let words = unsaved_changes_as_options(&ui.state).expect("moved");
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();
-        let camera = crate::scene::LoadedScene::camera_of(text, &sets);
+        let camera = crate::scene::LoadedScene::parse_camera(text, &sets);
         let Some(Camera::LookAt { position, look_at, fov, focus, .. }) = camera else { panic!("{words}") };
         assert_eq!((position, look_at), (moved.pose.position, moved.pose.look_at));
         assert_eq!((fov, focus), (moved.fov, moved.focus));
@@ -405,21 +415,21 @@ mod tests {
         ui.worker_event(Event::Started { generation: 1 });
         ui.worker_event(written_event(1, "cornell.png", true));
         ui.finish_render([200, 30, 30]);
-        ui.press('s');
+        ui.press_character('s');
         ui.finish_render([30, 200, 30]);
         // The next key is pressed before the request is done.
-        ui.press('0');
+        ui.press_character('0');
         ui.worker_event(Event::Started { generation: ui.state.request.generation });
         assert_eq!(summary_text(&ui.state), made);
-        ui.press(']');
+        ui.press_character(']');
         assert_eq!(summary_text(&ui.state), made);
         // A new version of the image is being rendered.
-        ui.press('0');
+        ui.press_character('0');
         let generation = ui.state.request.generation;
         ui.worker_event(Event::Started { generation });
         ui.worker_event(Event::Progress { generation, progress: render_progress(0.2, None) });
         assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 20 %"));
-        ui.press(']');
+        ui.press_character(']');
         assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (20 %)"));
     }
 
@@ -430,34 +440,37 @@ mod tests {
             let generation = ui.state.request.generation;
             ui.worker_event(Event::OwnImage { generation, state });
         };
-        ui.read_scene();
+        ui.report_scene_read();
         ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.108, None) });
-        ui.press('s');
-        own(&mut ui, OwnImageState::Begun { is_rendering: false });
+        ui.press_character('s');
+        own(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
         ui.finish_render([200, 30, 30]);
         assert_eq!(summary_text(&ui.state), "cornell.png not finished (10 %)");
         let said = crate::view::status_line::unsaved_messages(&ui.state);
-        assert_eq!(said, [messages::NOT_SAVED.to_owned(), messages::own_image_unfinished("cornell.png", 10)]);
-        assert!(ui.text().contains(messages::NOT_SAVED), "{}", ui.text());
+        assert_eq!(
+            said,
+            [messages::NOT_SAVED.to_owned(), messages::scene_image_unfinished("cornell.png", 10)]
+        );
+        assert!(ui.screen_text().contains(messages::NOT_SAVED), "{}", ui.screen_text());
         // `w` writes the displayed image.
-        ui.press('w');
+        ui.press_character('w');
         let generation = ui.state.request.generation;
         ui.worker_event(written_event(generation, "cornell.png", false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
         assert_eq!(summary_text(&ui.state), made);
-        assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
+        assert!(ui.screen_text().contains("→ cornell.png"), "{}", ui.screen_text());
         // Return to the scene's own image, which has not been written yet.
-        ui.press('0');
+        ui.press_character('0');
         ui.worker_event(Event::Started { generation: ui.state.request.generation });
         assert!(summary_text(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));
         let generation = ui.state.request.generation;
         ui.worker_event(written_event(generation, "cornell.png", true));
         ui.finish_render([30, 200, 30]);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.press('s');
-        own(&mut ui, OwnImageState::Written);
+        ui.press_character('s');
+        own(&mut ui, SavedSceneImageState::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+        ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
         assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 /// The base directory for relative paths, and the host name, which is needed because the terminal may run on
 /// another machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct FileUrls {
+pub(super) struct FileUrlBuilder {
     folder: PathBuf,
     host: String,
 }
 
-impl FileUrls {
+impl FileUrlBuilder {
     /// URLs of files on this machine.
     pub(super) fn local() -> Self {
         // This file exists only on Linux. On other systems, the host name is omitted.
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn paths_become_file_urls() {
-        let files = FileUrls { folder: "/home/ä".into(), host: "box".to_owned() };
+        let files = FileUrlBuilder { folder: "/home/ä".into(), host: "box".to_owned() };
         assert_eq!(files.url(Path::new("a b;%.png")), "file://box/home/%C3%A4/a%20b%3B%25.png");
         assert_eq!(files.url(Path::new("/tmp/x.png")), "file://box/tmp/x.png");
         assert_eq!(files.url(Path::new("\u{1b}\u{7}")), "file://box/home/%C3%A4/%1B%07");

@@ -8,26 +8,26 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::{ColorDepth, XTERM};
-use super::event::{Effect, Event, KeyPress, Window};
-use super::options::Changed;
+use super::event::{Effect, Event, KeyPress, WindowSize};
+use super::options::ContentChange;
 use super::preview_kind::PreviewKind;
 use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
 use super::terminals::Capabilities;
-use super::update::{start, update};
+use super::update::{request_first_render, update};
 use super::view;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{
     self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
     SampleCounts, Stage, StageReport, Status, Viewpoint,
 };
-use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, View};
-use crate::scene::description::{Accel, Integrator, Pose, Shadows};
+use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, ViewMode};
+use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
-pub(super) fn window(columns: u16, rows: u16) -> Window {
-    Window { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
+pub(super) fn window(columns: u16, rows: u16) -> WindowSize {
+    WindowSize { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
 }
 
 /// Creates a state from which no request has been sent yet.
@@ -67,12 +67,12 @@ pub(super) struct TestUi {
 impl TestUi {
     /// An 80×24 UI that has sent its first request.
     pub(super) fn new() -> Self {
-        Self::with(state(80, 24))
+        Self::from_state(state(80, 24))
     }
 
-    pub(super) fn with(mut state: State) -> Self {
+    pub(super) fn from_state(mut state: State) -> Self {
         let now = state.now;
-        start(&mut state);
+        request_first_render(&mut state);
         Self { state, now }
     }
 
@@ -85,12 +85,12 @@ impl TestUi {
         self.handle_event(Event::Worker(event))
     }
 
-    pub(super) fn key(&mut self, key: KeyPress) -> Vec<Effect> {
+    pub(super) fn press_key(&mut self, key: KeyPress) -> Vec<Effect> {
         self.handle_event(Event::Key(key))
     }
 
-    pub(super) fn press(&mut self, character: char) -> Vec<Effect> {
-        self.key(KeyPress::plain(character))
+    pub(super) fn press_character(&mut self, character: char) -> Vec<Effect> {
+        self.press_key(KeyPress::plain(character))
     }
 
     pub(super) fn advance_clock(&mut self, milliseconds: u64) -> Vec<Effect> {
@@ -100,13 +100,13 @@ impl TestUi {
 
     /// Saves a scene with this text and lets the worker load it.
     pub(super) fn save_scene(&mut self, text: &str) {
-        self.handle_event(Event::Changed(Changed { noticed: self.now }));
+        self.handle_event(Event::Changed(ContentChange { noticed: self.now }));
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Text { generation, text: text.into() });
     }
 
     /// Starts the current request and reports that its scene is valid.
-    pub(super) fn read_scene(&mut self) {
+    pub(super) fn report_scene_read(&mut self) {
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Started { generation });
         self.worker_event(protocol::Event::Settings {
@@ -114,7 +114,7 @@ impl TestUi {
             settings: Box::new(effective_settings()),
             camera: camera(),
             exposure: 0.0,
-            own: own_settings(),
+            own: scene_settings(),
         });
     }
 
@@ -132,7 +132,7 @@ impl TestUi {
 
     /// Simulates a complete render of a uniform image.
     pub(super) fn finish_render(&mut self, color: [u8; 3]) {
-        self.read_scene();
+        self.report_scene_read();
         self.show_preview(color);
         self.worker_event(done_event(self.state.request.generation, Vec::new(), false));
     }
@@ -154,31 +154,31 @@ impl TestUi {
 
     /// The text on the screen. Half blocks are removed and runs of spaces are collapsed.
     pub(super) fn screen_words(&mut self) -> String {
-        self.text().replace('▀', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+        self.screen_text().replace('▀', " ").split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    pub(super) fn text(&mut self) -> String {
-        text(&self.draw_screen())
+    pub(super) fn screen_text(&mut self) -> String {
+        buffer_text(&self.draw_screen())
     }
 }
 
 /// A buffer's rows as text.
-pub(super) fn text(buffer: &Buffer) -> String {
+pub(super) fn buffer_text(buffer: &Buffer) -> String {
     let width = usize::from(buffer.area.width).max(1);
     let rows = buffer.content.chunks(width);
     rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
 }
 
 /// The render request in a list of effects.
-pub(super) fn request(effects: &[Effect]) -> Option<&Request> {
+pub(super) fn find_render_request(effects: &[Effect]) -> Option<&Request> {
     effects.iter().find_map(|effect| match effect {
         Effect::Send(Command::Render(request)) => Some(&**request),
         _ => None,
     })
 }
 
-pub(super) fn uniform_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Picture> {
-    Arc::new(Picture { width, height, pixels: vec![color; width as usize * height as usize] })
+pub(super) fn uniform_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Srgb8Image> {
+    Arc::new(Srgb8Image { width, height, pixels: vec![color; width as usize * height as usize] })
 }
 
 pub(super) fn effective_settings() -> EffectiveSettings {
@@ -188,12 +188,12 @@ pub(super) fn effective_settings() -> EffectiveSettings {
         error: 0.0,
         samples: 64,
         integrator: Integrator::Whitted,
-        shadows: Shadows::Soft,
+        shadows: ShadowMode::Soft,
         clamp: 0.0,
         photons: false,
         dof: true,
         accel: Accel::Bvh,
-        view: View::Beauty,
+        view: ViewMode::Beauty,
         exposure: 0.0,
         seed: 0,
         threads: 2,
@@ -202,8 +202,8 @@ pub(super) fn effective_settings() -> EffectiveSettings {
 }
 
 /// Settings from the scene file, before any overrides.
-pub(super) fn own_settings() -> AdjustableSettings {
-    AdjustableSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
+pub(super) fn scene_settings() -> AdjustableSettings {
+    AdjustableSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
@@ -255,7 +255,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
         settings: effective_settings(),
         lights: protocol::LightsReport {
             count: 1,
-            sampled: protocol::LightsSampled::All,
+            sampled: protocol::LightSelectionMode::All,
             picks: 0,
             tree_nodes: 0,
             memory_bytes: 0,

@@ -5,11 +5,11 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::messages;
-use crate::pipeline::protocol::{PreviewSource, Section};
+use crate::pipeline::protocol::{NormalizedRect, PreviewSource};
 use crate::rescale::resized;
-use crate::state::ImageOrigin;
+use crate::state::ImageProvenance;
 
 /// Memory limit for all images and scene texts, in bytes.
 const MAX_BYTES: usize = 16 << 20;
@@ -20,11 +20,11 @@ const SMALL: f32 = 32.0;
 #[derive(Clone, Debug)]
 pub(crate) struct ShownImage {
     pub generation: u64,
-    pub picture: Arc<Picture>,
+    pub picture: Arc<Srgb8Image>,
     /// Range of displayed values, for views that map values to colors.
     pub range: Option<[f32; 2]>,
     /// The section of the image shown at 1:1 scale. `None` if the whole image is shown.
-    pub section: Option<Section>,
+    pub section: Option<NormalizedRect>,
     /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview belongs to. `None` if unknown.
@@ -46,7 +46,7 @@ impl ShownImage {
 
 /// Recent renders, including the one being viewed.
 #[derive(Debug, Default)]
-pub(super) struct History {
+pub(super) struct RenderHistory {
     /// Recent renders, oldest first.
     past: VecDeque<HistoryEntry>,
     /// Number of scene edits so far.
@@ -64,17 +64,17 @@ struct HistoryEntry {
     time: Instant,
     /// Number of the last edit included in the image.
     edits: u64,
-    origin: ImageOrigin,
+    origin: ImageProvenance,
     /// Number of the render that finished the image. `None` if the image is unfinished.
     run: Option<u64>,
     /// Changes since the previous entry, first those in files, then those made with keys. `None` for the
     /// first entry.
     changes: Option<[Vec<String>; 2]>,
     /// Thumbnail for the history strip, created on first use.
-    small: OnceCell<Picture>,
+    small: OnceCell<Srgb8Image>,
 }
 
-impl History {
+impl RenderHistory {
     /// Records a scene edit. New entries include the edit once the scene has been read.
     pub(super) fn record_edit(&mut self) {
         self.edits += 1;
@@ -93,7 +93,9 @@ impl History {
     /// Lists file changes between the render being viewed and the newest one.
     pub(super) fn edits_since_viewed(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
-        let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
+        let edits = open
+            .zip(self.past.back())
+            .map(|(open, newest)| newest.origin.describe_file_changes(&open.origin));
         edits.unwrap_or_default().join("; ")
     }
 
@@ -128,7 +130,7 @@ impl History {
 
     /// Adds an image. It replaces any earlier image from the same request, or the last entry's image if it
     /// looks the same.
-    pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
+    pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageProvenance) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
         let is_last =
@@ -153,13 +155,13 @@ impl History {
                 self.compare_with_previous(self.past.len() - 1);
             }
         }
-        while self.past.len() > 1 && self.bytes() > MAX_BYTES {
+        while self.past.len() > 1 && self.memory_bytes() > MAX_BYTES {
             self.remove(0);
         }
     }
 
     /// Replaces an entry's image with a newer version.
-    fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageOrigin) {
+    fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageProvenance) {
         let Some(past) = self.past.get_mut(at) else { return };
         let is_other_picture = past.shown.picture != shown.picture;
         if is_other_picture {
@@ -235,13 +237,13 @@ impl History {
     }
 
     /// Number of the render that finished an entry. `None` if the entry is unfinished.
-    pub(super) fn run(&self, at: usize) -> Option<u64> {
+    pub(super) fn render_number(&self, at: usize) -> Option<u64> {
         self.past.get(at)?.run
     }
 
     /// Memory used by images and scene texts, in bytes. Entries with the same scene share the text.
-    fn bytes(&self) -> usize {
-        let pictures: usize = self.past.iter().map(HistoryEntry::bytes).sum();
+    fn memory_bytes(&self) -> usize {
+        let pictures: usize = self.past.iter().map(HistoryEntry::memory_bytes).sum();
         let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
         let texts: HashMap<*const u8, usize> = texts.map(|text| (text.as_ptr(), text.len())).collect();
         pictures + texts.values().sum::<usize>()
@@ -251,17 +253,17 @@ impl History {
     fn compare_with_previous(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
-        let edits = past.origin.edits(&before.origin);
+        let edits = past.origin.describe_file_changes(&before.origin);
         // If `c` wrote the camera to the scene, list the change as an edit, not as a camera movement.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
-        let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
+        let keys = past.origin.toggles.describe_differences(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
             past.changes = Some([edits, keys]);
         }
     }
 
     /// Scene and settings of the older render being viewed. `None` for the newest one.
-    pub(super) fn viewed_origin(&self) -> Option<&ImageOrigin> {
+    pub(super) fn viewed_provenance(&self) -> Option<&ImageProvenance> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
@@ -315,7 +317,7 @@ impl History {
     }
 
     /// Image of the newest entry.
-    pub(super) fn last_picture(&self) -> Option<&Arc<Picture>> {
+    pub(super) fn last_picture(&self) -> Option<&Arc<Srgb8Image>> {
         self.past.back().map(|newest| &newest.shown.picture)
     }
 
@@ -325,7 +327,7 @@ impl History {
     }
 
     /// The thumbnail of a history entry.
-    pub(super) fn thumbnail(&self, at: usize) -> Option<&Picture> {
+    pub(super) fn thumbnail(&self, at: usize) -> Option<&Srgb8Image> {
         let past = self.past.get(at)?;
         Some(past.small.get_or_init(|| thumbnail(&past.shown.picture)))
     }
@@ -360,7 +362,7 @@ impl History {
     }
 
     /// Returns to the newest image.
-    pub(super) fn close(&mut self) -> Option<ShownImage> {
+    pub(super) fn return_to_newest(&mut self) -> Option<ShownImage> {
         self.open.take().map(|(_, newest)| newest)
     }
 
@@ -374,7 +376,7 @@ impl History {
 impl HistoryEntry {
     /// Whether the entry shows the same image as `shown`. An unfinished image is not considered the same as a
     /// finished one.
-    fn is_same_image(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
+    fn is_same_image(&self, shown: &ShownImage, origin: &ImageProvenance) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
         // An unfinished image may look the same at first and change later.
@@ -387,13 +389,13 @@ impl HistoryEntry {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
-    fn bytes(&self) -> usize {
+    fn memory_bytes(&self) -> usize {
         self.shown.picture.pixels.len() * size_of::<[u8; 3]>()
     }
 }
 
 /// Scales an image down to at most [`SMALL`] columns and rows.
-fn thumbnail(picture: &Picture) -> Picture {
+fn thumbnail(picture: &Srgb8Image) -> Srgb8Image {
     let scale = (SMALL / picture.width.max(picture.height).max(1) as f32).min(1.0);
     let side = |length: u32| ((length as f32 * scale).round() as u32).max(1);
     resized(picture, side(picture.width), side(picture.height))
@@ -412,8 +414,8 @@ pub(super) fn age_in_words(time: Duration) -> String {
 mod tests {
     use super::*;
     use crate::fixtures::uniform_picture;
-    use crate::pipeline::settings::{CameraChange, View};
-    use crate::pipeline::{Content, FileRead};
+    use crate::pipeline::settings::{CameraChange, ViewMode};
+    use crate::pipeline::{FileContentId, FileRead};
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::state::KeyOverrides;
 
@@ -430,27 +432,27 @@ mod tests {
 
     #[test]
     fn oldest_entries_are_dropped_at_the_limit() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         for generation in 0..10 {
             let picture = uniform_picture(1000, 1000, [generation as u8, 0, 0]);
             history.record(
                 ShownImage { picture, ..shown_image(generation, 1) },
                 Instant::now(),
-                ImageOrigin::default(),
+                ImageProvenance::default(),
             );
         }
         assert_eq!(history.past.len(), 5, "each image takes 3 MB");
-        history.record(shown_image(10, 10_000), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(10, 10_000), Instant::now(), ImageProvenance::default());
         assert_eq!(history.past.len(), 1, "the last image is always kept");
     }
 
     #[test]
     fn shared_scene_texts_are_counted_once() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         let shared: Arc<str> = "x".repeat(3 << 20).into();
         let mut record = |generation: u64, text: Arc<str>| {
             let picture = uniform_picture(1, 1, [generation as u8, 0, 0]);
-            let origin = ImageOrigin { text: Some(text), ..ImageOrigin::default() };
+            let origin = ImageProvenance { text: Some(text), ..ImageProvenance::default() };
             history.record(ShownImage { picture, ..shown_image(generation, 1) }, Instant::now(), origin);
             history.past.len()
         };
@@ -462,10 +464,10 @@ mod tests {
 
     #[test]
     fn equal_images_share_an_entry() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         for generation in 0..3 {
             history.record_edit();
-            history.record(shown_image(generation, 10), Instant::now(), ImageOrigin::default());
+            history.record(shown_image(generation, 10), Instant::now(), ImageProvenance::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -473,11 +475,11 @@ mod tests {
     /// A render that resumes from an image shows that image at first.
     #[test]
     fn unfinished_image_is_a_separate_entry() {
-        let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
-        let mut history = History::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        let unfinished = ImageProvenance { is_unfinished: true, ..ImageProvenance::default() };
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         history.record(shown_image(2, 10), Instant::now(), unfinished.clone());
-        let generations = |history: &History| -> Vec<u64> {
+        let generations = |history: &RenderHistory| -> Vec<u64> {
             history.past.iter().map(|past| past.shown.generation).collect()
         };
         assert_eq!(generations(&history), [1, 2]);
@@ -485,55 +487,55 @@ mod tests {
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
         // The finished image may be identical.
-        history.record(shown_image(2, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 10), Instant::now(), ImageProvenance::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
     fn edits_without_visible_effect_are_skipped() {
-        let mut history = History::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         edit(&mut history);
-        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         // Break the scene, then fix it.
         edit(&mut history);
         history.record_invalid_scene();
         edit(&mut history);
-        history.record(shown_image(4, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(4, 20), Instant::now(), ImageProvenance::default());
         let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
         // Images rendered after a key press include the last edit.
-        history.close();
-        history.record(shown_image(5, 30), Instant::now(), ImageOrigin::default());
+        history.return_to_newest();
+        history.record(shown_image(5, 30), Instant::now(), ImageProvenance::default());
         let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
         assert_eq!(before.generation, 1);
     }
 
     #[test]
     fn before_edit_ignores_broken_edits() {
-        let mut history = History::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         edit(&mut history);
-        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         history.record_edit();
         history.record_invalid_scene();
-        history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
     /// A preview of a finished or unfinished image, and the image's origin.
-    fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
+    fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageProvenance) {
         let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
         let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
-        let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
+        let origin = ImageProvenance { is_unfinished: !is_finished, ..ImageProvenance::default() };
         (ShownImage { source, picture, ..shown_image(generation, 10) }, origin)
     }
 
     #[test]
     fn interrupted_renders_share_one_entry() {
-        let mut history = History::default();
-        let record = |history: &mut History, generation, name, is_finished| {
+        let mut history = RenderHistory::default();
+        let record = |history: &mut RenderHistory, generation, name, is_finished| {
             let (shown, origin) = of_image(generation, name, is_finished);
             history.record(shown, Instant::now(), origin);
             history.len()
@@ -559,33 +561,33 @@ mod tests {
 
     #[test]
     fn entries_have_their_render_numbers() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
             history.record(shown, Instant::now(), origin);
             assert!(history.is_newest(generation) && history.is_newest_unfinished());
             run.into_iter().for_each(|run| history.finish_newest(run));
         }
-        assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
+        assert_eq!([0, 1, 2].map(|at| history.render_number(at)), [Some(1), None, Some(2)]);
         // A later request produces the same image.
         let (shown, origin) = of_image(4, "3", true);
         history.record(shown, Instant::now(), origin);
         assert!(!history.is_newest_unfinished());
         history.finish_newest(5);
-        assert_eq!((history.len(), history.run(2)), (3, Some(5)));
+        assert_eq!((history.len(), history.render_number(2)), (3, Some(5)));
     }
 
-    fn edit(history: &mut History) {
+    fn edit(history: &mut RenderHistory) {
         history.record_edit();
         history.record_scene_read();
     }
 
     #[test]
     fn saving_the_camera_counts_as_an_edit() {
-        let mut history = History::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
-        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
-        history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
+        history.record(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         history.record_saved_camera(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "expected the image before the camera moved");
@@ -593,25 +595,25 @@ mod tests {
 
     #[test]
     fn each_request_has_one_entry() {
-        let mut history = History::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
-        history.record(shown_image(1, 20), Instant::now(), ImageOrigin::default());
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record(shown_image(1, 20), Instant::now(), ImageProvenance::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
     /// Creates an image's origin from its scene text and view.
-    fn origin(text: &str, view: Option<View>) -> ImageOrigin {
+    fn origin(text: &str, view: Option<ViewMode>) -> ImageProvenance {
         let toggles = KeyOverrides { view, ..KeyOverrides::default() };
-        ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }
+        ImageProvenance { toggles, text: Some(text.into()), ..ImageProvenance::default() }
     }
 
-    fn changes(history: &History) -> Vec<String> {
+    fn changes(history: &RenderHistory) -> Vec<String> {
         (0..history.len()).map(|at| history.changes(at, false).join("; ")).collect()
     }
 
     #[test]
     fn entries_list_changes_since_the_previous_one() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
@@ -619,7 +621,7 @@ mod tests {
         history.record_edit();
         history.record_edit();
         history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
-        history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
+        history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(ViewMode::Normal)));
         history.record_edit();
         history.record(shown_image(4, 40), Instant::now(), origin(seed, None));
         history.record(shown_image(5, 50), Instant::now(), origin(seed, None));
@@ -638,11 +640,11 @@ mod tests {
 
     #[test]
     fn saved_camera_is_listed_once() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = KeyOverrides { camera, ..KeyOverrides::default() };
         history.record(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
-        let before = ImageOrigin { toggles: moved, ..origin("camera.fov = 40", None) };
+        let before = ImageProvenance { toggles: moved, ..origin("camera.fov = 40", None) };
         history.record(shown_image(2, 20), Instant::now(), before.clone());
         history.record(shown_image(3, 30), Instant::now(), origin("camera.fov = 30", None));
         history.record(shown_image(4, 40), Instant::now(), before);
@@ -659,11 +661,15 @@ mod tests {
 
     #[test]
     fn ineffective_saves_are_not_listed() {
-        let mut history = History::default();
-        let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
+        let mut history = RenderHistory::default();
+        let record = |history: &mut RenderHistory, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
             let toggles = KeyOverrides { photons, ..KeyOverrides::default() };
-            history.record(shown, Instant::now(), ImageOrigin { toggles, text: Some(text.into()), ..origin });
+            history.record(
+                shown,
+                Instant::now(),
+                ImageProvenance { toggles, text: Some(text.into()), ..origin },
+            );
         };
         let (first, second) = ("render.samples = 64", "render.samples = 16");
         record(&mut history, 1, "on", true, first, None);
@@ -691,7 +697,7 @@ mod tests {
         history.record(
             shown,
             Instant::now(),
-            ImageOrigin { toggles: moved, text: Some(before.into()), ..origin },
+            ImageProvenance { toggles: moved, text: Some(before.into()), ..origin },
         );
         assert_eq!(changes(&history)[4], "camera moved");
         record(&mut history, 8, "fov", true, text, Some(true));
@@ -700,9 +706,9 @@ mod tests {
 
     #[test]
     fn entry_keeps_its_original_changes() {
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         let mut generation = 0;
-        let mut record = |history: &mut History, name: &str, toggles: KeyOverrides, text: &str| {
+        let mut record = |history: &mut RenderHistory, name: &str, toggles: KeyOverrides, text: &str| {
             generation += 1;
             // Record the image in progress, when it is finished, and once more.
             for _ in 0..3 {
@@ -710,7 +716,7 @@ mod tests {
                 history.record(
                     shown,
                     Instant::now(),
-                    ImageOrigin { toggles, text: Some(text.into()), ..origin },
+                    ImageProvenance { toggles, text: Some(text.into()), ..origin },
                 );
             }
             edit(history);
@@ -725,7 +731,7 @@ mod tests {
         let named = format!("{output}\nname = \"globe\"");
         assert_eq!(record(&mut history, "wide", keys, &named), words);
         // A camera moved with keys is listed as such unless it has been saved to the scene.
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = KeyOverrides { camera, ..KeyOverrides::default() };
         record(&mut history, "own", keys, "camera.fov = 44");
@@ -740,13 +746,14 @@ mod tests {
 
     #[test]
     fn changed_files_are_listed_by_name() {
-        let file = |name: &str, hash: u8| FileRead { path: name.into(), content: Content::Hash([hash; 32]) };
+        let file =
+            |name: &str, hash: u8| FileRead { path: name.into(), content: FileContentId::Hash([hash; 32]) };
         let files = |bricks, knot| -> Arc<[FileRead]> {
             [file("textures/bricks.png", bricks), file("knot.obj", knot)].into()
         };
-        let mut history = History::default();
+        let mut history = RenderHistory::default();
         for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
-            let origin = ImageOrigin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
+            let origin = ImageProvenance { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
             history.record(shown_image(number, 10 * number as u32), Instant::now(), origin);
         }
         let words =
@@ -756,12 +763,16 @@ mod tests {
 
     #[test]
     fn thumbnail_is_updated_with_its_image() {
-        let mut history = History::default();
-        history.record(shown_image(1, 1000), Instant::now(), ImageOrigin::default());
-        let size = |history: &History| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));
+        let mut history = RenderHistory::default();
+        history.record(shown_image(1, 1000), Instant::now(), ImageProvenance::default());
+        let size = |history: &RenderHistory| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((32, [1, 2, 3])));
         let picture = uniform_picture(10, 10, [9, 8, 7]);
-        history.record(ShownImage { picture, ..shown_image(1, 1) }, Instant::now(), ImageOrigin::default());
+        history.record(
+            ShownImage { picture, ..shown_image(1, 1) },
+            Instant::now(),
+            ImageProvenance::default(),
+        );
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }
 

@@ -7,7 +7,7 @@ use super::event::KeyPress;
 use super::messages;
 
 /// A row in a table of key bindings.
-pub(super) struct Binding<A = Action> {
+pub(super) struct KeyBinding<A = Action> {
     /// Keys that trigger the action.
     pub keys: &'static [KeyPress],
     /// Label in the help. Empty if the label in the previous row covers this key.
@@ -25,8 +25,8 @@ const fn binding<A: Copy>(
     action: A,
     help: &'static str,
     hint: &'static str,
-) -> Binding<A> {
-    Binding { keys, label, action, help, hint }
+) -> KeyBinding<A> {
+    KeyBinding { keys, label, action, help, hint }
 }
 
 const LEFT: KeyPress = KeyPress::special(KeyCode::Left);
@@ -35,7 +35,7 @@ const UP: KeyPress = KeyPress::special(KeyCode::Up);
 const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
 /// All key bindings, in the order in which the help lists them.
-pub(super) const KEYMAP: &[Binding] = &[
+pub(super) const KEYMAP: &[KeyBinding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
@@ -141,7 +141,7 @@ pub(super) enum OverlayAction {
 }
 
 /// Key bindings for overlays.
-pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
+pub(super) const OVERLAY: &[KeyBinding<OverlayAction>] = &[
     binding(
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
         "j k",
@@ -194,7 +194,7 @@ pub(super) fn action_for(key: KeyPress) -> Option<Action> {
 }
 
 /// The table row for an action. Every action has one.
-pub(super) fn binding_for(action: Action) -> Option<&'static Binding> {
+pub(super) fn binding_for(action: Action) -> Option<&'static KeyBinding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }
 

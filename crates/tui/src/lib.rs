@@ -54,12 +54,12 @@ use glimt_pipeline as pipeline;
 use glimt_scene as scene;
 
 pub use color::{ColorChoice, ColorDepth, xterm_rgb};
-pub use editor::editor;
+pub use editor::editor_and_variable;
 pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
-pub use options::{Changed, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchUpdate};
-pub use probe::{Probe, ProbeReplies, probe};
+pub use options::{ContentChange, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchUpdate};
+pub use probe::{ProbeReplies, TerminalProbe, probe_terminal};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};
 pub use view::preview::draw_for_dark_xterm;
-pub use view::text::wrapped;
+pub use view::text::wrap_text;

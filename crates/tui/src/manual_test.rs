@@ -9,10 +9,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::fixtures::{
-    asset_progress, camera, diagnostic, done_event, effective_settings, own_settings, stage_report,
+    asset_progress, camera, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
-use super::{Changed, ColorChoice, Options, PreviewChoice, WatchUpdate, run};
-use crate::film::Picture;
+use super::{ColorChoice, ContentChange, Options, PreviewChoice, WatchUpdate, run};
+use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{
     Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
 };
@@ -28,9 +28,9 @@ fn interactive_session() {
     let (watcher, news) = channel();
     let previews = PreviewSlot::default();
     let slot = Arc::clone(&previews);
-    thread::spawn(move || work(&orders, &sender, &slot));
+    thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
     let watched = scene.clone();
-    thread::spawn(move || watch(&watched, &watcher));
+    thread::spawn(move || watch_scene(&watched, &watcher));
     let outcome = run(Options {
         scene,
         overrides: Overrides::default(),
@@ -55,14 +55,14 @@ fn interactive_session() {
     }
 }
 
-fn watch(scene: &PathBuf, news: &Sender<WatchUpdate>) {
+fn watch_scene(scene: &PathBuf, news: &Sender<WatchUpdate>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
         let now = std::fs::read(scene).ok();
         if now != last {
             last = now;
-            let changed = WatchUpdate::Changed(Changed { noticed: Instant::now() });
+            let changed = WatchUpdate::Changed(ContentChange { noticed: Instant::now() });
             if [changed, WatchUpdate::Settled].into_iter().any(|said| news.send(said).is_err()) {
                 return;
             }
@@ -70,7 +70,11 @@ fn watch(scene: &PathBuf, news: &Sender<WatchUpdate>) {
     }
 }
 
-fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<LatestPreview>>) {
+fn run_simulated_worker(
+    orders: &Receiver<Command>,
+    events: &Sender<Event>,
+    slot: &Mutex<Option<LatestPreview>>,
+) {
     let mut next = None;
     loop {
         match next.take().or_else(|| orders.recv().ok()) {
@@ -104,7 +108,7 @@ fn simulate_render(
         settings: Box::new(effective_settings()),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     say(Event::Stage { generation, stage: stage_report(Stage::Textures, Status::Running, 0.0, "") });
     let start = Instant::now();
@@ -112,7 +116,7 @@ fn simulate_render(
         say(Event::Asset { generation, progress: asset_progress("bricks", u64::from(step.min(10)), 10) });
         if let Some(size) = request.preview {
             let height = (size.width * 3 / 4).min(size.height).max(1);
-            let picture = Arc::new(pretty(height * 4 / 3, height, step + text.len() as u32 * 20));
+            let picture = Arc::new(draw_test_picture(height * 4 / 3, height, step + text.len() as u32 * 20));
             *slot.lock().expect("a slot") = Some(LatestPreview {
                 generation,
                 picture,
@@ -150,9 +154,9 @@ fn simulate_render(
     None
 }
 
-fn pretty(width: u32, height: u32, phase: u32) -> Picture {
+fn draw_test_picture(width: u32, height: u32, phase: u32) -> Srgb8Image {
     let pixel = |x: u32, y: u32| [(x * 255 / width) as u8, (y * 255 / height) as u8, (phase * 6 % 256) as u8];
     let pixels =
         (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
-    Picture { width, height, pixels }
+    Srgb8Image { width, height, pixels }
 }

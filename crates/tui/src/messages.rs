@@ -27,7 +27,7 @@ pub const NOTHING_TO_RESET: &str = "nothing to reset";
 pub const RESET: &str = "reset to the scene's settings";
 
 /// Shown when the field of view is at its limit.
-pub fn field_limit(degrees: f64) -> String {
+pub fn fov_limit(degrees: f64) -> String {
     format!("field of view limit: {degrees}°")
 }
 
@@ -227,7 +227,7 @@ pub fn output_changed(file: &str, how: &str) -> String {
 }
 
 /// Shown when another program modified an output file, which `w` will therefore not replace.
-pub fn output_kept(file: &str, how: &str) -> String {
+pub fn output_not_overwritten(file: &str, how: &str) -> String {
     format!("{file} {how} · name another file with -o")
 }
 
@@ -243,13 +243,13 @@ pub fn unfinished_image(file: &str) -> String {
 }
 
 /// Shown when `w` wrote an image with these changes but another image is displayed.
-pub fn image_with(file: &str, changes: &str) -> String {
+pub fn image_written_with_changes(file: &str, changes: &str) -> String {
     format!("{file} was written with {changes}")
 }
 
 /// Shown when `w` wrote an image with these changes but the scene's own image is displayed.
-pub fn other_image_with(file: &str, changes: &str) -> String {
-    format!("{} · w: write this image", image_with(file, changes))
+pub fn written_image_differs(file: &str, changes: &str) -> String {
+    format!("{} · w: write this image", image_written_with_changes(file, changes))
 }
 
 /// Shown when the scene is invalid, so the last valid render is shown.
@@ -264,12 +264,12 @@ pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
 /// Shown when the render of the scene's own image was interrupted.
-pub fn own_image_unfinished(file: &str, percent: u32) -> String {
+pub fn scene_image_unfinished(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: press 0 to continue")
 }
 
 /// Shown when the scene was edited after its own image was rendered.
-pub fn own_image_outdated(file: &str) -> String {
+pub fn scene_image_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: press 0 to render it")
 }
 
@@ -287,7 +287,7 @@ pub fn renders_on_changes(file: &str) -> String {
 }
 
 /// Describes the bytes and round-trip time for sending the last preview.
-pub fn preview_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
+pub fn preview_transfer_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
     let round_trip = round_trip_ms.map_or(String::new(), |time| format!(" · {time} ms round trip"));
     format!("{kilobytes} kB sent{round_trip}")
 }

@@ -8,7 +8,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{Changed, ExternalChange, OutputChange, WatchUpdate};
+pub use crate::pipeline::watch::{ContentChange, ExternalChange, OutputChange, WatchUpdate};
 
 choice! {
     /// How to draw the preview.

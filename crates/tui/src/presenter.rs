@@ -11,14 +11,14 @@ use ratatui::layout::Rect;
 
 use super::display::Display;
 use super::event::Event;
-use super::file_urls::FileUrls;
-use super::paint::{Fidelity, FrameExtras, FrameTiming, Hyperlink, PacingAdvice, advise};
+use super::file_urls::FileUrlBuilder;
+use super::paint::{Fidelity, FrameTiming, Hyperlink, LinksAndDelayedText, PacingAdvice, advise};
 use super::state::State;
 use super::view;
-use super::view::ViewExtras;
+use super::view::FileLinksAndDelayedText;
 use super::view::layout::Layout;
 use super::window_title::WindowTitle;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
 /// Frame interval. Output is limited to 20 frames per second, except in response to keys.
@@ -30,7 +30,7 @@ pub(super) struct Presenter {
     drawn: DrawnPreview,
     previews: PreviewSlot,
     /// Creates URLs for written files.
-    files: FileUrls,
+    files: FileUrlBuilder,
     /// Earliest time of the next frame, except for urgent frames.
     next_frame: Instant,
     /// The newest request for which a preview has been drawn.
@@ -40,7 +40,7 @@ pub(super) struct Presenter {
 /// The last drawn preview.
 #[derive(Default)]
 struct DrawnPreview {
-    picture: Option<Arc<Picture>>,
+    picture: Option<Arc<Srgb8Image>>,
     generation: u64,
     /// Mean samples per pixel when the preview was drawn.
     samples: f64,
@@ -62,7 +62,7 @@ impl Presenter {
             display,
             drawn: DrawnPreview::default(),
             previews,
-            files: FileUrls::local(),
+            files: FileUrlBuilder::local(),
             next_frame: now,
             newest: 0,
         }
@@ -82,7 +82,7 @@ impl Presenter {
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
     fn is_preview_incompatible(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
-        let what = |picture: &Picture| (picture.width, picture.height);
+        let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
             let is_same = what(&new.picture) == what(&old.picture) && new.section == old.section;
             !is_same || new.lacks_photons != old.lacks_photons
@@ -101,7 +101,7 @@ impl Presenter {
         let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_complete() };
         FrameTiming {
             bytes_per_second: self.display.bytes_per_second(),
-            cells: picture.map_or(0, |picture| self.preview_cells(state, picture)),
+            cells: picture.map_or(0, |picture| self.preview_cell_count(state, picture)),
             samples: samples_per_pixel(state),
             aimed_samples: picture.map(|_| self.drawn.samples),
             since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
@@ -116,11 +116,11 @@ impl Presenter {
     }
 
     /// Returns the number of cells in a preview, or an equivalent number if it is drawn as pixels.
-    fn preview_cells(&self, state: &State, picture: &Picture) -> u32 {
+    fn preview_cell_count(&self, state: &State, picture: &Srgb8Image) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
         }
-        let across = state.display.pixels_across();
+        let across = state.display.horizontal_pixels_per_cell();
         let pixels = (across * across) as f32 * state.display.window.cell_aspect;
         (f64::from(picture.width) * f64::from(picture.height) / f64::from(pixels)) as u32
     }
@@ -133,7 +133,7 @@ impl Presenter {
     }
 
     /// Delays the next frame, even an urgent one, until one frame interval after `now`.
-    pub(super) fn postpone(&mut self, state: &mut State, now: Instant) {
+    pub(super) fn postpone_next_frame(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
         self.next_frame = now + FRAME;
     }
@@ -146,7 +146,7 @@ impl Presenter {
             return;
         }
         self.drawn.is_refined |= is_refined;
-        self.postpone(state, now);
+        self.postpone_next_frame(state, now);
         state.dirty = false;
         self.display.set_preview_kind(state.display.kind);
         let window = state.display.window;
@@ -159,16 +159,16 @@ impl Presenter {
         // A preview counts as the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::for_state(state).preview;
-        self.display.place_pixels(view::preview::placement(state, area), is_final_preview(state));
-        let extras = self.frame_extras(state, drawn);
+        self.display.place_pixels(view::preview::image_placement(state, area), is_final_preview(state));
+        let extras = self.links_and_delayed_text(state, drawn);
         self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
 
     /// The frame's hyperlinks, if the terminal supports them, and the text to draw after the preview.
-    fn frame_extras(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
+    fn links_and_delayed_text(&self, state: &State, drawn: FileLinksAndDelayedText) -> LinksAndDelayedText {
         let files = drawn.files.into_iter().filter(|_| state.display.capabilities.links);
         let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.url(&path) };
-        FrameExtras { later: drawn.later, links: files.map(link).collect() }
+        LinksAndDelayedText { later: drawn.later, links: files.map(link).collect() }
     }
 
     /// Whether the connection is idle while a key moves the camera. The last preview is then on the screen at
@@ -214,7 +214,7 @@ impl Presenter {
         is_late: impl Fn() -> bool,
     ) -> Vec<Event> {
         let has_sent = self.display.send_next_slice(now, is_late);
-        let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();
+        let mut events: Vec<Event> = self.display.take_send_report().map(Event::Frame).into_iter().collect();
         if self.drawn.is_old && self.pacing_advice(state, now) != PacingAdvice::Wait {
             events.extend(self.take_preview());
         }

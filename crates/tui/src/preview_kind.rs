@@ -2,7 +2,7 @@
 
 use super::color::ColorDepth;
 use super::graphics::ImageProtocol;
-use super::mosaic::Grid;
+use super::mosaic::CellGrid;
 use super::options::PreviewChoice;
 use super::pixel_request::ImageProtocolRequest;
 
@@ -52,12 +52,12 @@ impl PreviewKind {
     }
 
     /// The grid that divides a cell into parts. `None` if cells are not divided.
-    pub(super) fn grid(self) -> Option<Grid> {
+    pub(super) fn grid(self) -> Option<CellGrid> {
         match self {
-            Self::HalfBlock => Some(Grid::Halves),
-            Self::Quadrant => Some(Grid::Quadrants),
-            Self::Sextant => Some(Grid::Sextants),
-            Self::Octant => Some(Grid::Octants),
+            Self::HalfBlock => Some(CellGrid::Halves),
+            Self::Quadrant => Some(CellGrid::Quadrants),
+            Self::Sextant => Some(CellGrid::Sextants),
+            Self::Octant => Some(CellGrid::Octants),
             Self::Ascii | Self::Pixels(_) | Self::None => None,
         }
     }

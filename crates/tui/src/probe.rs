@@ -18,7 +18,7 @@ use super::terminals::{TerminalBrand, TerminalId};
 
 /// Terminal properties determined from replies and environment variables.
 #[derive(Clone, Debug)]
-pub struct Probe {
+pub struct TerminalProbe {
     /// Number of columns and rows.
     pub cells: (u16, u16),
     /// Cell size in pixels, if the terminal reports it.
@@ -54,9 +54,9 @@ pub struct ProbeReplies {
     pub background: Option<[u8; 3]>,
 }
 
-impl Probe {
+impl TerminalProbe {
     /// Name of the character set that `--preview auto` uses.
-    pub fn preview(&self) -> &'static str {
+    pub fn auto_preview_name(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
         match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::supported_by)) {
@@ -75,7 +75,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 ///
 /// Multiplexers and consoles are queried only for device attributes because they may print other queries as
 /// text.
-pub fn probe() -> Option<Probe> {
+pub fn probe_terminal() -> Option<TerminalProbe> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;
     }
@@ -97,7 +97,7 @@ pub fn probe() -> Option<Probe> {
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };
     let brand = variable("TERM_PROGRAM").and_then(|program| TerminalBrand::from_program(&program));
-    Some(Probe {
+    Some(TerminalProbe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
         depth: color::resolve_depth(ColorChoice::Auto, variable),

@@ -2,18 +2,18 @@
 
 use std::borrow::Cow;
 
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
 /// Resizes an image to `width` × `height`.
-pub(super) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
-    Picture { width, height, pixels: resized_pixels(picture, width, height).into_owned() }
+pub(super) fn resized(picture: &Srgb8Image, width: u32, height: u32) -> Srgb8Image {
+    Srgb8Image { width, height, pixels: resized_pixels(picture, width, height).into_owned() }
 }
 
 /// Returns the resized image's pixels. Downscaling averages the covered pixels in linear light, weighted by
 /// area. Upscaling repeats the nearest pixel.
-pub(super) fn resized_pixels(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
+pub(super) fn resized_pixels(picture: &Srgb8Image, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
     if (picture.width, picture.height) == (width, height) {
         return Cow::Borrowed(&picture.pixels);
     }
@@ -46,7 +46,7 @@ fn covered_pixels(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
         .collect()
 }
 
-fn mean_color(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 3] {
+fn mean_color(picture: &Srgb8Image, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 3] {
     let at = |x: u32, y: u32| {
         picture.pixels.get(y as usize * picture.width as usize + x as usize).copied().unwrap_or_default()
     };
@@ -67,10 +67,10 @@ fn mean_color(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) ->
 mod tests {
     use super::*;
 
-    fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
+    fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Srgb8Image {
         let pixels =
             (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
-        Picture { width, height, pixels }
+        Srgb8Image { width, height, pixels }
     }
 
     #[test]

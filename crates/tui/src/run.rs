@@ -20,7 +20,7 @@ use super::signals::{self, SignalListener};
 use super::state::{InitialState, State};
 use super::terminal::{self, TerminalSession};
 use super::terminals::TerminalId;
-use super::update::{start, update};
+use super::update::{request_first_render, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
 use crate::system::threads::spawn;
@@ -45,7 +45,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
     if capabilities.focus {
-        terminal::enable_focus_reports();
+        terminal::mark_focus_reports_used();
     }
     let screen = TerminalSession::open()?;
     let link = TerminalEnvironment {
@@ -129,10 +129,10 @@ enum LoopEnd {
 
 impl EventLoop {
     fn run(mut self) -> Result<TuiOutcome, TuiError> {
-        let effects = start(&mut self.state);
-        let mut end = self.perform(effects);
+        let effects = request_first_render(&mut self.state);
+        let mut end = self.perform_effects(effects);
         while end.is_none() {
-            end = self.draw_and_send().or_else(|| self.wait());
+            end = self.draw_and_send().or_else(|| self.wait_and_handle_events());
         }
         // Keep the checkpoint if a signal arrived, or if the terminal was closed or failed.
         if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
@@ -149,7 +149,7 @@ impl EventLoop {
             }
             Some(LoopEnd::Error(error)) => return Err(error),
             Some(LoopEnd::Quit(status)) => {
-                self.leave();
+                self.leave_screen();
                 status
             }
             None => ExitStatus::QUIT,
@@ -163,14 +163,14 @@ impl EventLoop {
             write_results: saving.write_results,
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),
-            not_kept: exit_summary::unsaved_as_options(&self.state),
+            not_kept: exit_summary::unsaved_changes_as_options(&self.state),
         })
     }
 
     /// Leaves the screen and waits briefly for pending replies, which the shell would otherwise read as typed
     /// text.
-    fn leave(&mut self) {
-        self.screen.leave();
+    fn leave_screen(&mut self) {
+        self.screen.leave_screen();
         let deadline = self.presenter.display.reply_timeout().map(|patience| Instant::now() + patience);
         while let Some(deadline) = deadline.filter(|_| self.presenter.display.reply_timeout().is_some()) {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
@@ -184,7 +184,7 @@ impl EventLoop {
     }
 
     /// Waits for events and handles all that have arrived.
-    fn wait(&mut self) -> Option<LoopEnd> {
+    fn wait_and_handle_events(&mut self) -> Option<LoopEnd> {
         let now = Instant::now();
         let wake = self.presenter.next_action_time(&self.state, now);
         let first = match (self.postponed.pop_front(), wake) {
@@ -199,7 +199,7 @@ impl EventLoop {
         };
         let mut next = Some(first);
         while let Some(event) = next {
-            if let Some(end) = self.handle(event) {
+            if let Some(end) = self.handle_event(event) {
                 return Some(end);
             }
             next = self.postponed.pop_front().or_else(|| self.events.try_recv().ok());
@@ -207,47 +207,47 @@ impl EventLoop {
         None
     }
 
-    fn handle(&mut self, event: Event) -> Option<LoopEnd> {
+    fn handle_event(&mut self, event: Event) -> Option<LoopEnd> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => {
                 let taken = self.presenter.handle_preview(generation, &self.state, Instant::now());
-                return taken.and_then(|picture| self.apply(picture));
+                return taken.and_then(|picture| self.apply_event(picture));
             }
             Event::TerminalReply(answer) => {
                 self.presenter.display.handle_reply(answer, Instant::now());
-                return self.apply(event);
+                return self.apply_event(event);
             }
             Event::Written { bytes } => self.presenter.display.record_written(bytes),
             Event::Unwritable(kind) => return Some(end_for_write_error(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
-                let end = self.apply(event);
+                let end = self.apply_event(event);
                 // A camera step is drawn together with its first preview, which arrives immediately and needs
                 // the CPU.
-                self.state.urgent |= self.state.dirty && !self.state.is_step_without_preview();
+                self.state.urgent |= self.state.dirty && !self.state.awaits_camera_step_preview();
                 return end;
             }
-            event => return self.apply(event),
+            event => return self.apply_event(event),
         }
         None
     }
 
-    fn apply(&mut self, event: Event) -> Option<LoopEnd> {
+    fn apply_event(&mut self, event: Event) -> Option<LoopEnd> {
         let effects = update(&mut self.state, event, Instant::now());
-        self.perform(effects)
+        self.perform_effects(effects)
     }
 
-    fn perform(&mut self, effects: Vec<Effect>) -> Option<LoopEnd> {
-        effects.into_iter().find_map(|effect| self.perform_one(effect))
+    fn perform_effects(&mut self, effects: Vec<Effect>) -> Option<LoopEnd> {
+        effects.into_iter().find_map(|effect| self.perform_effect(effect))
     }
 
-    fn perform_one(&mut self, effect: Effect) -> Option<LoopEnd> {
+    fn perform_effect(&mut self, effect: Effect) -> Option<LoopEnd> {
         match effect {
             Effect::Send(command) => (self.commands)(command),
             Effect::Quit(status) => return Some(LoopEnd::Quit(status)),
             Effect::GiveUp => {
                 return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
             }
-            Effect::StopJob if !signals::has_shell() => return self.apply(Event::NoShell),
+            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::NoShell),
             Effect::StopJob => {
                 return signals::stop_job()
                     .err()
@@ -255,7 +255,7 @@ impl EventLoop {
                     .map(LoopEnd::Error);
             }
             Effect::Suspend if signals::has_shell() => {
-                self.leave();
+                self.leave_screen();
                 self.screen.suspend();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
                 signals::stop_process();
@@ -263,9 +263,9 @@ impl EventLoop {
             Effect::Suspend => {}
             Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
             Effect::Edit(place) => return self.run_editor(&place),
-            Effect::Aside(bytes) => self.presenter.display.send_after_preview(bytes),
-            Effect::ReportFocus => self.screen.report_focus(),
-            Effect::Redraw => return self.redraw(),
+            Effect::Aside(bytes) => self.presenter.display.queue_after_preview(bytes),
+            Effect::ReportFocus => self.screen.request_focus_reports(),
+            Effect::Redraw => return self.resume_and_redraw(),
             Effect::Measure => {
                 // The window may have shrunk and grown back, which cuts off its content.
                 self.presenter.display.invalidate();
@@ -277,7 +277,7 @@ impl EventLoop {
 
     /// Lets the editor use the terminal until it exits.
     fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
-        self.leave();
+        self.leave_screen();
         input::set_input_paused(true);
         self.screen.suspend();
         // Outside raw mode, keys send signals.
@@ -286,12 +286,12 @@ impl EventLoop {
         let outcome = editor::run(&editor::editor_command(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
         input::set_input_paused(false);
-        let end = self.apply(Event::Back).or_else(|| self.redraw());
+        let end = self.apply_event(Event::Back).or_else(|| self.resume_and_redraw());
         drop(child_signals);
-        end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
+        end.or_else(|| outcome.err().and_then(|why| self.apply_event(Event::NoEditor(why))))
     }
 
-    fn redraw(&mut self) -> Option<LoopEnd> {
+    fn resume_and_redraw(&mut self) -> Option<LoopEnd> {
         if let Err(error) = self.screen.resume() {
             return Some(end_for_write_error(error));
         }
@@ -300,19 +300,19 @@ impl EventLoop {
     }
 
     fn update_window_size(&mut self) -> Option<LoopEnd> {
-        self.apply(Event::Resize(terminal::query_window(self.cell_aspect)))
+        self.apply_event(Event::Resize(terminal::query_window(self.cell_aspect)))
     }
 
     /// Draws a frame if one is due and sends as much as the connection allows.
     fn draw_and_send(&mut self) -> Option<LoopEnd> {
-        if !self.screen.is_taken() {
-            self.presenter.postpone(&mut self.state, Instant::now());
+        if !self.screen.is_screen_active() {
+            self.presenter.postpone_next_frame(&mut self.state, Instant::now());
             return None;
         }
         self.presenter.draw_if_due(&mut self.state, Instant::now());
         let begin = Instant::now();
         let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= TURN);
-        events.into_iter().find_map(|event| self.apply(event))
+        events.into_iter().find_map(|event| self.apply_event(event))
     }
 }
 

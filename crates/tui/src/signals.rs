@@ -69,8 +69,8 @@ impl SignalListener {
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
         spawn("signals", move || {
             loop {
-                signals.wait().for_each(|number| handler.handle(number));
-                *lock_round_count() += 1;
+                signals.wait().for_each(|number| handler.handle_signal(number));
+                *lock_signal_round_count() += 1;
                 ROUNDS.1.notify_all();
             }
         })?;
@@ -95,7 +95,7 @@ static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 /// Number of rounds in which the signal thread has handled all pending signals.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
-fn lock_round_count() -> MutexGuard<'static, u64> {
+fn lock_signal_round_count() -> MutexGuard<'static, u64> {
     ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -107,7 +107,7 @@ const SIGNAL_TIMEOUT: Duration = Duration::from_secs(10);
 /// may have started before the call.
 fn wait_for_pending_signals() {
     for _ in 0..2 {
-        let before = lock_round_count();
+        let before = lock_signal_round_count();
         let last = *before;
         if low_level::raise(MARK).is_ok() {
             drop(ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
@@ -128,7 +128,7 @@ fn lock_child() -> MutexGuard<'static, ForegroundChild> {
 }
 
 /// Sets the child process to which terminating signals are forwarded. `None` if it has exited.
-pub(super) fn set_child(id: Option<Pid>) {
+pub(super) fn set_foreground_child(id: Option<Pid>) {
     let mut child = lock_child();
     child.id = id;
     if let (Some(id), Some(number)) = (id, child.ending) {
@@ -179,7 +179,7 @@ struct SignalThread {
 }
 
 impl SignalThread {
-    fn handle(&self, number: i32) {
+    fn handle_signal(&self, number: i32) {
         if number == MARK {
             return;
         }

@@ -5,13 +5,13 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 
 use super::color::{self, ColorChoice, ColorDepth, ColorMapper};
-use super::event::Window;
+use super::event::WindowSize;
 use super::options::PreviewChoice;
 use super::paint::as_text_lines;
 use super::terminal;
 use super::view::preview::{PreviewColors, draw_image, size_in_cells};
 use super::view::text::{text_columns, truncated_text};
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Minimum terminal width for showing images.
 const MIN_COLUMNS: u16 = 30;
@@ -30,7 +30,7 @@ pub struct NamedImage {
     /// The caption, which must not contain control characters.
     pub name: String,
     /// The image. Images printed together must have the same size.
-    pub picture: Picture,
+    pub picture: Srgb8Image,
 }
 
 /// Draws images as lines of text, side by side, or stacked if the terminal is narrow. Uses the terminal's
@@ -48,7 +48,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
 }
 
 /// Returns the window size and cell aspect ratio, with defaults for terminals that report a size of 0.
-fn window_size(window: &Window) -> ((u16, u16), f32) {
+fn window_size(window: &WindowSize) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
@@ -94,7 +94,7 @@ mod tests {
     use crate::color::XTERM;
 
     fn laid_out_lines(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
-        let picture = Picture { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
+        let picture = Srgb8Image { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };

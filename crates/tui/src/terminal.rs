@@ -23,7 +23,7 @@ use crossterm::{execute, terminal};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, Termios, tcflush, tcgetattr, tcsetattr};
 
-use super::event::Window;
+use super::event::WindowSize;
 use super::graphics;
 use super::options::TuiError;
 use super::paint::LINK_OFF;
@@ -87,19 +87,19 @@ impl TerminalSession {
     /// Sets up the terminal: raw mode, alternate screen, hidden cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         install_panic_hook();
-        prepare_abort();
+        prepare_restore_on_abort();
         set_up_terminal().map_err(|source| TuiError::Terminal { action: "set up", source })?;
         Ok(Self(()))
     }
 
     /// Whether the front end may draw on the screen.
-    pub(super) fn is_taken(&self) -> bool {
+    pub(super) fn is_screen_active(&self) -> bool {
         TAKEN.load(Ordering::Acquire)
     }
 
     /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] is called or the session
     /// ends, so that late replies are not echoed.
-    pub(super) fn leave(&mut self) {
+    pub(super) fn leave_screen(&mut self) {
         leave_screen();
     }
 
@@ -124,8 +124,8 @@ impl TerminalSession {
     }
 
     /// Enables focus reports.
-    pub(super) fn report_focus(&mut self) {
-        enable_focus_reports();
+    pub(super) fn request_focus_reports(&mut self) {
+        mark_focus_reports_used();
         writer::queue_slice(FOCUS_ON.as_bytes().to_vec());
     }
 
@@ -221,7 +221,7 @@ struct RestoreData {
 }
 
 /// Prepares to restore the terminal on abort, for example after a failed allocation.
-fn prepare_abort() {
+fn prepare_restore_on_abort() {
     LAST_WORDS.get_or_init(|| {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
         // Writing to a vector cannot fail.
@@ -259,12 +259,12 @@ fn restore_on_abort() {
 }
 
 /// Records that kitty images may be stored and that control strings may be cut off.
-pub(super) fn record_images() {
+pub(super) fn mark_images_used() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
 /// Enables focus reports each time the terminal is set up.
-pub(super) fn enable_focus_reports() {
+pub(super) fn mark_focus_reports_used() {
     FOCUS.store(true, Ordering::Release);
 }
 
@@ -275,12 +275,12 @@ pub(super) fn title_saving_bytes() -> &'static [u8] {
 }
 
 /// Records that a progress bar may be shown.
-pub(super) fn record_progress_bar() {
+pub(super) fn mark_progress_bar_used() {
     HAS_PROGRESS.store(true, Ordering::Release);
 }
 
 /// Records that a hyperlink may be open.
-pub(super) fn record_links() {
+pub(super) fn mark_links_used() {
     HAS_LINKS.store(true, Ordering::Release);
 }
 
@@ -381,9 +381,9 @@ pub(super) fn terminal_exists() -> bool {
 
 /// Window size and cell aspect ratio. If `cell_aspect` is `None`, the aspect ratio is derived from the window
 /// size in pixels, or is 2 if that size is unknown.
-pub(super) fn query_window(cell_aspect: Option<f32>) -> Window {
+pub(super) fn query_window(cell_aspect: Option<f32>) -> WindowSize {
     match terminal::window_size() {
-        Ok(size) => limit_window(Window {
+        Ok(size) => clamp_window_size(WindowSize {
             columns: size.columns,
             rows: size.rows,
             cell_aspect: cell_aspect
@@ -392,7 +392,7 @@ pub(super) fn query_window(cell_aspect: Option<f32>) -> Window {
         }),
         Err(_) => {
             let (columns, rows) = terminal::size().unwrap_or((80, 24));
-            limit_window(Window {
+            clamp_window_size(WindowSize {
                 columns,
                 rows,
                 cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT),
@@ -409,11 +409,11 @@ const MAX_COLUMNS: u16 = 4096;
 const MAX_CELLS: u32 = 1 << 20;
 
 /// Limits a window to the maximum size.
-fn limit_window(window: Window) -> Window {
+fn clamp_window_size(window: WindowSize) -> WindowSize {
     let columns = window.columns.min(MAX_COLUMNS);
     let most_rows = MAX_CELLS / u32::from(columns.max(1));
     let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
-    Window { columns, rows, ..window }
+    WindowSize { columns, rows, ..window }
 }
 
 /// Height-to-width ratio of a cell. Reported pixel sizes are often zero or implausible. Values within 3% of 2
@@ -468,8 +468,8 @@ mod tests {
         let all = || undo_bytes().collect::<Vec<_>>();
         assert!(all().is_empty());
         assert_eq!((title_saving_bytes(), title_saving_bytes()), (KEEP_TITLE, &b""[..]));
-        record_progress_bar();
-        record_links();
+        mark_progress_bar_used();
+        mark_links_used();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
         assert_eq!(title_saving_bytes(), KEEP_TITLE, "the new title should be saved again");
@@ -503,7 +503,12 @@ mod tests {
     fn number_of_cells_is_limited() {
         let of = |columns, rows| {
             let cell_pixels = DEFAULT_CELL_PIXELS;
-            let drawn = limit_window(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
+            let drawn = clamp_window_size(WindowSize {
+                columns,
+                rows,
+                cell_aspect: DEFAULT_CELL_ASPECT,
+                cell_pixels,
+            });
             (drawn.columns, drawn.rows)
         };
         for usual in [(80, 24), (640, 360), (4096, 256), (0, 0), (0, 24), (1, u16::MAX)] {

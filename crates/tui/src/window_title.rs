@@ -8,7 +8,7 @@ use super::graphics::base64;
 use super::state::{State, WorkerActivity};
 use super::terminals::NotificationProtocol;
 use super::view;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// How long a render must run before the title and progress bar show it. This delay prevents flicker while
 /// the camera moves.
@@ -36,7 +36,7 @@ pub(super) enum ProgressBar {
 }
 
 impl ProgressBar {
-    fn bytes(self) -> Vec<u8> {
+    fn to_escape_sequence(self) -> Vec<u8> {
         let bar = |state: u8, percent: u32| format!("\x1b]9;4;{state};{percent}\x1b\\").into_bytes();
         match self {
             Self::None => PROGRESS_OFF.to_vec(),
@@ -73,13 +73,13 @@ impl WindowTitle {
     }
 
     /// Returns the bytes that change the title and progress bar from `self` to `to`.
-    pub(super) fn changes(&self, to: &Self) -> Vec<u8> {
+    pub(super) fn update_sequence(&self, to: &Self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {
-            bytes.extend_from_slice(format!("\x1b]2;{}\x1b\\", visible(title)).as_bytes());
+            bytes.extend_from_slice(format!("\x1b]2;{}\x1b\\", escape_invisible_chars(title)).as_bytes());
         }
         if let Some(bar) = to.bar.filter(|_| self.bar.unwrap_or_default() != to.bar.unwrap_or_default()) {
-            bytes.extend(bar.bytes());
+            bytes.extend(bar.to_escape_sequence());
         }
         bytes
     }
@@ -95,7 +95,7 @@ fn title_text(state: &State, percent: Option<u32>) -> String {
 /// The scene's file name.
 fn scene_file_name(state: &State) -> String {
     let name = state.request.scene.file_name().unwrap_or(state.request.scene.as_os_str());
-    visible(&name.to_string_lossy()).into_owned()
+    escape_invisible_chars(&name.to_string_lossy()).into_owned()
 }
 
 fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
@@ -144,7 +144,7 @@ mod tests {
 
     fn sent(before: &mut WindowTitle, ui: &TestUi, is_slow: bool) -> String {
         let now = WindowTitle::for_state(&ui.state, is_slow).unwrap_or_else(|| before.clone());
-        let bytes = before.changes(&now);
+        let bytes = before.update_sequence(&now);
         *before = now;
         String::from_utf8(bytes).expect("UTF-8")
     }
@@ -161,10 +161,10 @@ mod tests {
         assert_eq!(sent(&mut shown_title, &ui, false), part);
         let coarse = "\x1b]2;cornell.toml: rendering 30 % · glimt\x1b\\\x1b]9;4;1;30\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, true), coarse);
-        ui.press(' ');
+        ui.press_character(' ');
         let held = "\x1b]2;cornell.toml: paused 30 % · glimt\x1b\\\x1b]9;4;4;30\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, true), held);
-        ui.press(' ');
+        ui.press_character(' ');
         ui.finish_render([200, 30, 30]);
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), done);

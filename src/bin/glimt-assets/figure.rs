@@ -109,14 +109,14 @@ fn distance_gradient(point: Vector) -> Vector {
 fn bear_distance([x, y, z]: Vector) -> f64 {
     // The bear is symmetric.
     let point = [x.abs(), y, z];
-    PARTS.iter().map(|ends| round_cone(point, ends)).fold(f64::MAX, |a, b| {
+    PARTS.iter().map(|ends| round_cone_distance(point, ends)).fold(f64::MAX, |a, b| {
         let near = (BLEND - (a - b).abs()).max(0.0) / BLEND;
         a.min(b) - near * near * BLEND / 4.0
     })
 }
 
 /// Distance to a round cone: a ball swept from one end to the other with a changing radius.
-fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
+fn round_cone_distance(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
     let along = subtract(*to, *from);
     let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);
     let aside = subtract(point, mix(*from, *to, t));

@@ -1,7 +1,7 @@
 //! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands at the
 //! origin and faces +z.
 
-use super::parts::{ball, bar, block, join, solid_of_revolution, translate};
+use super::parts::{ball, bar, beveled_box, join, solid_of_revolution, translate};
 use super::surface::Surface;
 use super::vector::{Vector, sin_cos_turns};
 
@@ -9,26 +9,26 @@ use super::vector::{Vector, sin_cos_turns};
 pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
     vec![
         ("furniture/cushion.ply", cushion()),
-        ("furniture/armrest.ply", block([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
-        ("furniture/base.ply", block([-0.5, 0.1, -0.42], [0.5, 0.3, 0.4], 0.02)),
+        ("furniture/armrest.ply", beveled_box([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
+        ("furniture/base.ply", beveled_box([-0.5, 0.1, -0.42], [0.5, 0.3, 0.4], 0.02)),
         ("furniture/foot.ply", foot()),
-        ("furniture/leg.ply", leg()),
-        ("furniture/board.ply", block([-0.5, 0.0, -0.5], [0.5, 0.03, 0.5], 0.006)),
-        ("furniture/plate.ply", plate()),
+        ("furniture/leg.ply", table_leg()),
+        ("furniture/board.ply", beveled_box([-0.5, 0.0, -0.5], [0.5, 0.03, 0.5], 0.006)),
+        ("furniture/plate.ply", glass_plate()),
         ("furniture/shelf.ply", shelf()),
-        ("furniture/cover.ply", cover()),
-        ("furniture/pages.ply", pages()),
+        ("furniture/cover.ply", book_cover()),
+        ("furniture/pages.ply", book_pages()),
         ("furniture/chair.ply", chair()),
-        ("furniture/stand.ply", stand()),
-        ("furniture/shade.ply", shade()),
+        ("furniture/stand.ply", floor_lamp_stand()),
+        ("furniture/shade.ply", lampshade()),
         ("furniture/decanter.ply", decanter()),
         ("furniture/tumbler.ply", tumbler()),
         ("furniture/bowl.ply", bowl()),
-        ("furniture/pot.ply", pot()),
+        ("furniture/pot.ply", flower_pot()),
         ("furniture/leaf.ply", leaf()),
         ("furniture/curtain.ply", curtain()),
         ("furniture/window.ply", window()),
-        ("furniture/frame.ply", frame()),
+        ("furniture/frame.ply", picture_frame()),
         ("furniture/door.ply", door()),
         ("furniture/jamb.ply", jamb()),
         ("furniture/bed.ply", bed()),
@@ -79,12 +79,12 @@ fn foot() -> Surface {
 }
 
 /// A table leg of height 1, scaled by the scene.
-fn leg() -> Surface {
+fn table_leg() -> Surface {
     solid_of_revolution(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
 }
 
 /// A round glass plate of radius 0.5 with a rounded edge.
-fn plate() -> Surface {
+fn glass_plate() -> Surface {
     let outline =
         [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
     solid_of_revolution(&outline, 64)
@@ -92,39 +92,39 @@ fn plate() -> Surface {
 
 /// A 1.2 by 2.0 shelf, 0.3 deep, with four boards between its sides.
 fn shelf() -> Surface {
-    let side = |x: f64| block([x, 0.0, -0.15], [x + 0.03, 2.0, 0.15], 0.003);
+    let side = |x: f64| beveled_box([x, 0.0, -0.15], [x + 0.03, 2.0, 0.15], 0.003);
     let boards = (0..5).map(|index| {
         let y = 0.06 + 0.47 * f64::from(index);
-        block([-0.57, y, -0.148], [0.57, y + 0.028, 0.145], 0.003)
+        beveled_box([-0.57, y, -0.148], [0.57, y + 0.028, 0.145], 0.003)
     });
     join(
-        [side(-0.6), side(0.57), block([-0.57, 0.05, -0.15], [0.57, 1.98, -0.14], 0.002)]
+        [side(-0.6), side(0.57), beveled_box([-0.57, 0.05, -0.15], [0.57, 1.98, -0.14], 0.002)]
             .into_iter()
             .chain(boards),
     )
 }
 
 /// The cover of a 1 by 1 by 1 book, scaled by the scene. The spine is at +z.
-fn cover() -> Surface {
+fn book_cover() -> Surface {
     join([
-        block([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
-        block([0.42, 0.0, -0.5], [0.5, 1.0, 0.5], 0.01),
-        block([-0.43, 0.0, 0.44], [0.43, 1.0, 0.5], 0.01),
+        beveled_box([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
+        beveled_box([0.42, 0.0, -0.5], [0.5, 1.0, 0.5], 0.01),
+        beveled_box([-0.43, 0.0, 0.44], [0.43, 1.0, 0.5], 0.01),
     ])
 }
 
 /// The pages inside a book's cover.
-fn pages() -> Surface {
-    block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
+fn book_pages() -> Surface {
+    beveled_box([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }
 
 /// A 0.44 by 0.92 by 0.46 wooden chair.
 fn chair() -> Surface {
     let post = |x: f64| bar(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
     let rung = |from: Vector, to: Vector| bar(&[from, to], 0.01, 6);
-    let slat = |y: f64, z: f64| block([-0.2, y, z - 0.01], [0.2, y + 0.07, z + 0.01], 0.004);
+    let slat = |y: f64, z: f64| beveled_box([-0.2, y, z - 0.01], [0.2, y + 0.07, z + 0.01], 0.004);
     join([
-        block([-0.22, 0.44, -0.22], [0.22, 0.475, 0.23], 0.01),
+        beveled_box([-0.22, 0.44, -0.22], [0.22, 0.475, 0.23], 0.01),
         bar(&[[-0.19, 0.0, 0.19], [-0.19, 0.45, 0.19]], 0.018, 8),
         bar(&[[0.19, 0.0, 0.19], [0.19, 0.45, 0.19]], 0.018, 8),
         post(-0.19),
@@ -139,7 +139,7 @@ fn chair() -> Surface {
 }
 
 /// The stand of a floor lamp, 1.5 high.
-fn stand() -> Surface {
+fn floor_lamp_stand() -> Surface {
     let outline = [
         [0.0, 0.0],
         [0.14, 0.0],
@@ -154,7 +154,7 @@ fn stand() -> Surface {
 }
 
 /// A conical lampshade, open at both ends, 0.26 high.
-fn shade() -> Surface {
+fn lampshade() -> Surface {
     let outline = [
         [0.22, 0.0],
         [0.22, 0.0],
@@ -217,7 +217,7 @@ fn bowl() -> Surface {
 }
 
 /// A flower pot with soil.
-fn pot() -> Surface {
+fn flower_pot() -> Surface {
     let outline = [
         [0.0, 0.0],
         [0.12, 0.0],
@@ -277,35 +277,36 @@ fn curtain() -> Surface {
 
 /// A 1.8 by 1.6 window frame with two bars, centered on its sill.
 fn window() -> Surface {
-    let upright = |x: f64, half: f64| block([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
+    let upright = |x: f64, half: f64| beveled_box([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
     join([
         upright(-0.87, 0.03),
         upright(0.87, 0.03),
         upright(0.0, 0.025),
-        block([-0.9, 0.0, -0.04], [0.9, 0.06, 0.04], 0.006),
-        block([-0.9, 1.54, -0.04], [0.9, 1.6, 0.04], 0.006),
-        block([-0.9, 1.05, -0.025], [0.9, 1.09, 0.025], 0.006),
-        block([-0.96, -0.04, -0.04], [0.96, 0.0, 0.16], 0.01),
+        beveled_box([-0.9, 0.0, -0.04], [0.9, 0.06, 0.04], 0.006),
+        beveled_box([-0.9, 1.54, -0.04], [0.9, 1.6, 0.04], 0.006),
+        beveled_box([-0.9, 1.05, -0.025], [0.9, 1.09, 0.025], 0.006),
+        beveled_box([-0.96, -0.04, -0.04], [0.96, 0.0, 0.16], 0.01),
     ])
 }
 
 /// A 1 by 1 picture frame on a wall that faces +z.
-fn frame() -> Surface {
+fn picture_frame() -> Surface {
     let (inside, outside) = (0.5, 0.55);
     join([
-        block([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.008),
-        block([-outside, inside, 0.0], [outside, outside, 0.03], 0.008),
-        block([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.008),
-        block([inside, -inside, 0.0], [outside, inside, 0.03], 0.008),
+        beveled_box([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.008),
+        beveled_box([-outside, inside, 0.0], [outside, outside, 0.03], 0.008),
+        beveled_box([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.008),
+        beveled_box([inside, -inside, 0.0], [outside, inside, 0.03], 0.008),
     ])
 }
 
 /// A 0.9 by 2.05 door with panels on both sides. The hinges are at the origin.
 fn door() -> Surface {
-    let panel = |x: f64, y: f64, height: f64| block([x, y, -0.005], [x + 0.3, y + height, 0.045], 0.012);
+    let panel =
+        |x: f64, y: f64, height: f64| beveled_box([x, y, -0.005], [x + 0.3, y + height, 0.045], 0.012);
     let knob = |z: f64| ball(2, [0.83, 1.02, z], 0.028);
     join([
-        block([0.0, 0.0, 0.0], [0.9, 2.05, 0.04], 0.004),
+        beveled_box([0.0, 0.0, 0.0], [0.9, 2.05, 0.04], 0.004),
         panel(0.1, 0.15, 0.7),
         panel(0.5, 0.15, 0.7),
         panel(0.1, 1.05, 0.85),
@@ -319,25 +320,26 @@ fn door() -> Surface {
 /// The door frame, for a wall 0.12 thick behind the origin.
 fn jamb() -> Surface {
     join([
-        block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
-        block([0.9, 0.0, -0.14], [0.99, 2.06, 0.02], 0.006),
-        block([-0.09, 2.05, -0.14], [0.99, 2.15, 0.025], 0.006),
+        beveled_box([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
+        beveled_box([0.9, 0.0, -0.14], [0.99, 2.06, 0.02], 0.006),
+        beveled_box([-0.09, 2.05, -0.14], [0.99, 2.15, 0.025], 0.006),
     ])
 }
 
 /// A 1.0 by 2.0 bed without cushions. The head is at −z.
 fn bed() -> Surface {
-    let post =
-        |x: f64, z: f64, height: f64| block([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008);
+    let post = |x: f64, z: f64, height: f64| {
+        beveled_box([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008)
+    };
     join([
         post(-0.5, -1.0, 0.95),
         post(0.5, -1.0, 0.95),
         post(-0.5, 1.0, 0.5),
         post(0.5, 1.0, 0.5),
-        block([-0.47, 0.35, -1.02], [0.47, 0.88, -0.98], 0.008),
-        block([-0.47, 0.25, 0.98], [0.47, 0.45, 1.02], 0.008),
-        block([-0.52, 0.24, -0.97], [-0.48, 0.34, 0.97], 0.006),
-        block([0.48, 0.24, -0.97], [0.52, 0.34, 0.97], 0.006),
-        translate(block([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
+        beveled_box([-0.47, 0.35, -1.02], [0.47, 0.88, -0.98], 0.008),
+        beveled_box([-0.47, 0.25, 0.98], [0.47, 0.45, 1.02], 0.008),
+        beveled_box([-0.52, 0.24, -0.97], [-0.48, 0.34, 0.97], 0.006),
+        beveled_box([0.48, 0.24, -0.97], [0.52, 0.34, 0.97], 0.006),
+        translate(beveled_box([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
     ])
 }

@@ -26,7 +26,7 @@ fn map_positions(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
 }
 
 /// A box between two corners with edges beveled by `edge`.
-pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
+pub(crate) fn beveled_box(from: Vector, to: Vector, edge: f64) -> Surface {
     let (middle, half) = (scale(add(from, to), 0.5), scale(subtract(to, from), 0.5));
     let sign = |corner: u32, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
     // Use three vertices per corner, one for each adjacent side.

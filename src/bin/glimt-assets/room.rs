@@ -34,7 +34,7 @@ impl ObjWriter {
         self.vertices += 4;
     }
 
-    fn material(&mut self, object: &str, material: &str) {
+    fn start_object(&mut self, object: &str, material: &str) {
         let _ = writeln!(self.text, "o {object}\nusemtl {material}");
     }
 
@@ -61,23 +61,23 @@ pub(crate) fn obj() -> Vec<u8> {
     let (width, depth) = (2.0 * x, 2.0 * z);
     let text = "# A room that is open to the front. Made by glimt-assets.\nmtllib room.mtl\n".to_owned();
     let mut room = ObjWriter { text, vertices: 0, quads: 0 };
-    room.material("floor", "planks");
+    room.start_object("floor", "planks");
     room.quad([-x, 0.0, z], [width, 0.0, 0.0], [0.0, 0.0, -depth], [2.0, 2.0]);
-    room.material("ceiling", "plaster");
+    room.start_object("ceiling", "plaster");
     room.quad([-x, height, -z], [width, 0.0, 0.0], [0.0, 0.0, depth], [1.0, 1.0]);
-    room.material("back_wall", "plaster");
+    room.start_object("back_wall", "plaster");
     room.quad([-x, 0.0, -z], [width, 0.0, 0.0], [0.0, height, 0.0], [1.0, 1.0]);
-    room.material("left_wall", "teal");
+    room.start_object("left_wall", "teal");
     room.quad([-x, 0.0, z], [0.0, 0.0, -depth], [0.0, height, 0.0], [1.0, 1.0]);
-    room.material("right_wall", "ochre");
+    room.start_object("right_wall", "ochre");
     room.quad([x, 0.0, -z], [0.0, 0.0, depth], [0.0, height, 0.0], [1.0, 1.0]);
-    room.material("plinth", "plaster");
+    room.start_object("plinth", "plaster");
     room.block([-0.55, -0.45], [0.28, 0.62, 0.28], 0.06);
-    room.material("chest", "lacquer");
+    room.start_object("chest", "lacquer");
     room.block([0.5, -0.1], [0.36, 0.24, 0.28], -0.07);
-    room.material("step", "tiles");
+    room.start_object("step", "tiles");
     room.block([0.5, -0.1], [0.5, 0.06, 0.42], -0.07);
-    room.material("lamp", "lamp");
+    room.start_object("lamp", "lamp");
     room.quad([-0.35, height - 0.02, -0.3], [0.7, 0.0, 0.0], [0.0, 0.0, 0.6], [1.0, 1.0]);
     room.text.into_bytes()
 }
@@ -122,6 +122,6 @@ Ke 9.0 8.4 7.4
 }
 
 /// A camera that looks through the open front from slightly above and to the left.
-pub(crate) fn orbiter() -> Vec<u8> {
+pub(crate) fn orbiter_camera_file() -> Vec<u8> {
     "c 0.0 0.95 0.0\np 0.05 0.02\nr 5.0 11.0\ns 4.6 2.0\nf 38.0 640.0 480.0\n".as_bytes().to_vec()
 }

@@ -29,7 +29,7 @@ pub(crate) fn rope() -> Surface {
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
         let middle = |s: f64| {
-            let (center, normal, binormal) = curve_frame(s, trefoil);
+            let (center, normal, binormal) = curve_frame(s, trefoil_point);
             let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
@@ -43,7 +43,7 @@ pub(crate) fn rope() -> Surface {
 
 /// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
 pub(crate) fn knot() -> Surface {
-    Surface::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil))
+    Surface::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
 }
 
 /// A hollow vase, a surface of revolution about y, 1.6 high.
@@ -98,12 +98,12 @@ pub(crate) fn dodecahedron() -> Surface {
         unit(add(a, add(b, c)))
     };
     let positions = triangles.iter().map(center).collect();
-    let faces = (0..corners.len() as u32).map(|corner| pentagon(corner, &triangles)).collect();
+    let faces = (0..corners.len() as u32).map(|corner| triangle_fan_around(corner, &triangles)).collect();
     Surface { positions, faces, ..Surface::default() }
 }
 
 /// The triangles around a corner, in order. The last edge of each triangle is the first edge of the next.
-fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
+fn triangle_fan_around(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut next = HashMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         if let Some(place) = triangle.iter().position(|&other| other == corner) {
@@ -154,7 +154,7 @@ pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Su
 
 /// A trefoil knot within a radius of about 1. It winds twice around the y axis and three times around the
 /// circle of radius 0.66 in the plane y = 0.
-fn trefoil(s: f64) -> Vector {
+fn trefoil_point(s: f64) -> Vector {
     let (sin2, cos2) = sin_cos_turns(2.0 * s);
     let (sin3, cos3) = sin_cos_turns(3.0 * s);
     let radius = 0.66 + 0.3 * cos3;

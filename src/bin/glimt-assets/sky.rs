@@ -12,13 +12,13 @@ pub(crate) fn evening_sky_hdr() -> Vec<u8> {
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
             .into_bytes();
     for (row, column) in (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (row, column))) {
-        file.extend(rgbe(radiance(direction(column, row))));
+        file.extend(rgbe(radiance(pixel_direction(column, row))));
     }
     file
 }
 
 /// Direction of a pixel. The center of the map is −z. A quarter of the width to the right of the center is +x.
-fn direction(column: u32, row: u32) -> Vector {
+fn pixel_direction(column: u32, row: u32) -> Vector {
     let (sin, cos) = sin_cos_turns((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
     let (across, y) = sin_cos_turns((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);
     [across * sin, y, -across * cos]

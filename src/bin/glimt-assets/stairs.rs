@@ -1,7 +1,7 @@
 //! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin
 //! and placed by the scene. Flights and rails are at their final positions.
 
-use super::parts::{ball, bar, block, hexahedron, join, solid_of_revolution, translate};
+use super::parts::{ball, bar, beveled_box, hexahedron, join, solid_of_revolution, translate};
 use super::surface::Surface;
 use super::vector::{Vector, add, sin_cos_turns};
 
@@ -32,29 +32,29 @@ pub(crate) fn stair_meshes() -> Vec<(&'static str, Surface)> {
         ("stairs/rail1.ply", rail(FOOT, LANDING)),
         ("stairs/rail2.ply", rail(LANDING, GALLERY)),
         ("stairs/rail3.ply", rail(GALLERY, [RIGHT_WALL, GALLERY[1], GALLERY[2]])),
-        ("stairs/candle.ply", candle()),
-        ("stairs/bowl.ply", bowl()),
-        ("stairs/shade.ply", shade()),
-        ("stairs/stand.ply", stand()),
+        ("stairs/candle.ply", candle_bulb()),
+        ("stairs/bowl.ply", wall_lamp()),
+        ("stairs/shade.ply", lampshade()),
+        ("stairs/stand.ply", table_lamp_foot()),
         ("stairs/chandelier.ply", chandelier()),
         ("stairs/door.ply", door()),
-        ("stairs/frame.ply", frame()),
-        ("stairs/console.ply", console()),
+        ("stairs/frame.ply", picture_frame()),
+        ("stairs/console.ply", console_table()),
     ]
 }
 
 /// A board whose nosing faces +z. One end extends past the open side of the flight.
 fn tread() -> Surface {
-    block([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
+    beveled_box([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
 }
 
 /// The steps up to the landing, and the landing itself, solid down to the floor.
 fn first_flight() -> Surface {
     let step = |index: u32| {
         let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
-        upright_block([LEFT_WALL, 0.0, front - GO], [FOOT[0], top, front])
+        sharp_block([LEFT_WALL, 0.0, front - GO], [FOOT[0], top, front])
     };
-    let landing = upright_block([LEFT_WALL, 0.0, BACK_WALL], [LANDING[0], LANDING[1], LANDING[2]]);
+    let landing = sharp_block([LEFT_WALL, 0.0, BACK_WALL], [LANDING[0], LANDING[1], LANDING[2]]);
     join((0..8).map(step).chain([landing]))
 }
 
@@ -84,14 +84,14 @@ fn second_flight() -> Surface {
 fn gallery() -> Surface {
     let [x, y, z] = GALLERY;
     join([
-        block([x, y - 0.25, BACK_WALL], [RIGHT_WALL, y, z], 0.004),
-        block([x, y - 0.035, z], [RIGHT_WALL, y, z + 0.03], 0.008),
-        block([x, y - 0.25, z], [RIGHT_WALL, y - 0.2, z + 0.02], 0.006),
+        beveled_box([x, y - 0.25, BACK_WALL], [RIGHT_WALL, y, z], 0.004),
+        beveled_box([x, y - 0.035, z], [RIGHT_WALL, y, z + 0.03], 0.008),
+        beveled_box([x, y - 0.25, z], [RIGHT_WALL, y - 0.2, z + 0.02], 0.006),
     ])
 }
 
 /// A block with sharp edges.
-fn upright_block(from: Vector, to: Vector) -> Surface {
+fn sharp_block(from: Vector, to: Vector) -> Surface {
     let corner = |x: Vector, y: Vector, z: Vector| [x[0], y[1], z[2]];
     let floor = |y| [corner(from, y, from), corner(to, y, from), corner(to, y, to), corner(from, y, to)];
     let [a, b, c, d] = floor(from);
@@ -123,8 +123,8 @@ fn baluster() -> Surface {
 /// A square newel post topped with a ball.
 fn newel() -> Surface {
     join([
-        block([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),
-        block([-0.065, 1.12, -0.065], [0.065, 1.16, 0.065], 0.012),
+        beveled_box([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),
+        beveled_box([-0.065, 1.12, -0.065], [0.065, 1.16, 0.065], 0.012),
         ball(2, [0.0, 1.205, 0.0], 0.055),
     ])
 }
@@ -136,14 +136,14 @@ fn rail(from: Vector, to: Vector) -> Surface {
 }
 
 /// A flame-shaped bulb, 0.1 high.
-fn candle() -> Surface {
+fn candle_bulb() -> Surface {
     let outline =
         [[0.0, 0.0], [0.012, 0.004], [0.02, 0.02], [0.022, 0.036], [0.016, 0.058], [0.007, 0.08], [0.0, 0.1]];
     solid_of_revolution(&outline, 8)
 }
 
 /// A thick-walled wall lamp, open at the top.
-fn bowl() -> Surface {
+fn wall_lamp() -> Surface {
     let outer = [[0.0, -0.09], [0.05, -0.085], [0.09, -0.06], [0.12, -0.02], [0.135, 0.03], [0.135, 0.03]];
     let inner =
         [[0.128, 0.03], [0.128, 0.03], [0.113, -0.018], [0.085, -0.055], [0.047, -0.078], [0.0, -0.082]];
@@ -151,7 +151,7 @@ fn bowl() -> Surface {
 }
 
 /// A conical lampshade, open at both ends.
-fn shade() -> Surface {
+fn lampshade() -> Surface {
     let outline = [
         [0.14, 0.0],
         [0.14, 0.0],
@@ -167,7 +167,7 @@ fn shade() -> Surface {
 }
 
 /// The foot of a table lamp.
-fn stand() -> Surface {
+fn table_lamp_foot() -> Surface {
     let outline = [
         [0.0, 0.0],
         [0.07, 0.0],
@@ -212,39 +212,39 @@ fn chandelier() -> Surface {
 
 /// A 0.9 by 2.05 door with four panels and a frame, on a wall that faces +z.
 fn door() -> Surface {
-    let panel = |x: f64, y: f64, height: f64| block([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
+    let panel = |x: f64, y: f64, height: f64| beveled_box([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
     join([
-        block([-0.45, 0.0, 0.0], [0.45, 2.05, 0.02], 0.004),
+        beveled_box([-0.45, 0.0, 0.0], [0.45, 2.05, 0.02], 0.004),
         panel(-0.36, 0.15, 0.7),
         panel(0.06, 0.15, 0.7),
         panel(-0.36, 1.02, 0.85),
         panel(0.06, 1.02, 0.85),
-        block([-0.57, 0.0, 0.0], [-0.45, 2.05, 0.06], 0.01),
-        block([0.45, 0.0, 0.0], [0.57, 2.05, 0.06], 0.01),
-        block([-0.6, 2.05, 0.0], [0.6, 2.18, 0.07], 0.01),
+        beveled_box([-0.57, 0.0, 0.0], [-0.45, 2.05, 0.06], 0.01),
+        beveled_box([0.45, 0.0, 0.0], [0.57, 2.05, 0.06], 0.01),
+        beveled_box([-0.6, 2.05, 0.0], [0.6, 2.18, 0.07], 0.01),
     ])
 }
 
 /// A 1 by 1 picture frame on a wall that faces +z.
-fn frame() -> Surface {
+fn picture_frame() -> Surface {
     let (inside, outside) = (0.5, 0.57);
     join([
-        block([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.01),
-        block([-outside, inside, 0.0], [outside, outside, 0.03], 0.01),
-        block([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.01),
-        block([inside, -inside, 0.0], [outside, inside, 0.03], 0.01),
+        beveled_box([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.01),
+        beveled_box([-outside, inside, 0.0], [outside, outside, 0.03], 0.01),
+        beveled_box([-outside, -inside, 0.0], [-inside, inside, 0.03], 0.01),
+        beveled_box([inside, -inside, 0.0], [outside, inside, 0.03], 0.01),
     ])
 }
 
 /// A narrow 1.1 by 0.36 table, 0.78 high.
-fn console() -> Surface {
+fn console_table() -> Surface {
     let leg = |x: f64, z: f64| {
         let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];
         translate(solid_of_revolution(&outline, 10), [x, 0.0, z])
     };
     join([
-        block([-0.55, 0.75, -0.18], [0.55, 0.78, 0.18], 0.008),
-        block([-0.5, 0.65, -0.14], [0.5, 0.75, 0.14], 0.004),
+        beveled_box([-0.55, 0.75, -0.18], [0.55, 0.78, 0.18], 0.008),
+        beveled_box([-0.5, 0.65, -0.14], [0.5, 0.75, 0.14], 0.004),
         leg(-0.47, -0.11),
         leg(0.47, -0.11),
         leg(-0.47, 0.11),

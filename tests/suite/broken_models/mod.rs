@@ -101,7 +101,9 @@ fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
     let read = match name.ends_with("gltf") || name.ends_with("glb") {
-        true => GltfFile::open(&path, &ignore_progress, &token).and_then(|file| file.scene(&token)).map(drop),
+        true => GltfFile::open(&path, &ignore_progress, &token)
+            .and_then(|file| file.convert_scene(&token))
+            .map(drop),
         false => load(&path, &ignore_progress, &token).map(drop),
     };
     let message = read.map_or_else(|error| error.to_string(), |()| String::new());

@@ -126,7 +126,11 @@ fn solid_split_into_parts_renders_the_same() {
         let material = tinted(1.5, v(0.6, 0.9, 0.8));
         let (one, several) = (room(&[whole], &material), room(&parts, &material));
         let found = bodies(&several);
-        assert!(!found.has_open() && found.open().is_empty(), "round {round}: {:?}", found.open());
+        assert!(
+            !found.has_open() && found.open_objects().is_empty(),
+            "round {round}: {:?}",
+            found.open_objects()
+        );
         let last = several.scene.objects.len() as u32 - 1;
         for part in 2..=last {
             assert_eq!(found.solid_id(part), last, "round {round}");
@@ -156,7 +160,7 @@ fn reversed_part_is_flipped() {
         }
         let build = room(&parts, &material);
         let found = bodies(&build);
-        assert!(found.open().is_empty(), "round {round}: {:?}", found.open());
+        assert!(found.open_objects().is_empty(), "round {round}: {:?}", found.open_objects());
         for (object, flip) in (2..).zip(&flips) {
             assert_eq!(found.is_inside_out(object), *flip, "round {round}");
         }
@@ -193,11 +197,11 @@ fn long_edge_matches_several_short_edges() {
         parts.iter().fold(scene(), |build, part| build.mesh(part.clone(), askew, glass(1.5)))
     };
     let closed = bodies(&build(&[lid(0.0), sides.clone(), lid(1.0)]));
-    assert!(closed.open().is_empty(), "{:?}", closed.open());
+    assert!(closed.open_objects().is_empty(), "{:?}", closed.open_objects());
     assert_eq!([0, 1, 2].map(|part| closed.solid_id(part)), [2; 3]);
     let without = bodies(&build(&[sides, lid(1.0)]));
     assert!(without.has_open());
-    let [open] = without.open() else { panic!("{:?}", without.open()) };
+    let [open] = without.open_objects() else { panic!("{:?}", without.open_objects()) };
     assert_eq!((open.object, open.edges, open.disagrees, open.is_covered), (0, 28, false, false));
     assert!((open.missing - 1.68 / (1.68 + 0.9 * 5.2)).abs() < 1e-5, "{}", open.missing);
 }
@@ -228,33 +232,33 @@ fn quads_and_disks_close_solids() {
         |shapes: Vec<Shape>| shapes.into_iter().fold(scene(), |build, shape| build.shape(shape, glass(1.5)));
     for flips in 0..64 {
         let own = bodies(&of(quads(v(0.1, 0.2, -0.3), v(1.4, 0.9, 0.7), flips)));
-        assert!(own.open().is_empty(), "{flips}: {:?}", own.open());
+        assert!(own.open_objects().is_empty(), "{flips}: {:?}", own.open_objects());
         for quad in 0..6 {
             assert_eq!((own.solid_id(quad), own.is_inside_out(quad)), (5, flips >> quad & 1 == 1), "{flips}");
         }
     }
     // One quad is missing.
     let five = bodies(&of(quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0)[1..].to_vec()));
-    assert!(five.has_open() && five.open().len() == 4, "{:?}", five.open());
+    assert!(five.has_open() && five.open_objects().len() == 4, "{:?}", five.open_objects());
     // Two boxes that share a face are two solids, although four quads meet at each shared edge.
     let (one, other) =
         (quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0), quads(v(1.0, 0.0, 0.0), v(2.0, 1.0, 1.0), 0));
     let two = bodies(&of([one, other].concat()));
-    assert!(two.open().is_empty(), "{:?}", two.open());
+    assert!(two.open_objects().is_empty(), "{:?}", two.open_objects());
     assert_eq!((0..12).map(|quad| two.solid_id(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
     // A tube with lids, one of them facing inward. A cone with a separate base.
     let (a, b) = (v(0.3, -0.2, 0.1), v(1.0, 0.5, -0.4));
     let tube = Shape::Cylinder { a, b, radius: 0.4, caps: false };
     let lid = |center: DVec3, normal: DVec3| Shape::Disk { center, normal, radius: 0.4 };
     let own = bodies(&of(vec![tube.clone(), lid(a, b - a), lid(b, b - a)]));
-    assert!(own.open().is_empty(), "{:?}", own.open());
+    assert!(own.open_objects().is_empty(), "{:?}", own.open_objects());
     assert_eq!(
         [0, 1, 2].map(|part| (own.solid_id(part), own.is_inside_out(part))),
         [(2, false), (2, true), (2, false)]
     );
     let hat = Shape::Cone { base: a, tip: b, radius: 0.4, cap: false };
-    assert!(bodies(&of(vec![lid(a, a - b), hat])).open().is_empty());
-    assert_eq!(bodies(&of(vec![tube, lid(a, a - b)])).open().len(), 1);
+    assert!(bodies(&of(vec![lid(a, a - b), hat])).open_objects().is_empty());
+    assert_eq!(bodies(&of(vec![tube, lid(a, a - b)])).open_objects().len(), 1);
 }
 
 #[test]
@@ -397,7 +401,7 @@ fn texture_seams_are_not_holes() {
     assert_eq!(of(loose), GlassSolids::default());
     assert_eq!(of(whole.clone()), GlassSolids::default());
     // An inside-out mesh.
-    assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open().is_empty());
+    assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open_objects().is_empty());
     // A mirrored instance.
     let mirrored =
         scene().mesh(whole, [v(-1.0, 1.0, 2.0), v(10.0, 20.0, 30.0), v(5.0, 0.0, 1.0)], glass(1.5));
@@ -419,9 +423,9 @@ fn glass_with_a_hole_is_reported() {
         };
         let missing = area(&part(&whole, |i| i == lost));
         let expected = f64::from(missing / (area(&whole) - missing));
-        assert!(!open.open().is_empty(), "round {round}");
-        assert_eq!(open.open().iter().map(|open| open.edges).sum::<usize>(), 3, "round {round}");
-        for one in open.open() {
+        assert!(!open.open_objects().is_empty(), "round {round}");
+        assert_eq!(open.open_objects().iter().map(|open| open.edges).sum::<usize>(), 3, "round {round}");
+        for one in open.open_objects() {
             assert!(
                 (one.missing - expected).abs() < 1e-4 * expected,
                 "round {round}: {one:?}, expected {expected}"
@@ -435,7 +439,7 @@ fn glass_with_a_hole_is_reported() {
             [a, c, b]
         });
         let odd = bodies(&room(&parts, &glass(1.5)));
-        assert!(!odd.open().is_empty(), "round {round}");
+        assert!(!odd.open_objects().is_empty(), "round {round}");
     }
 }
 
@@ -453,17 +457,17 @@ fn sheet_between_opaque_walls_is_closed() {
     for reach in [1.0, 1.2] {
         let own = bodies(&pool(reach));
         assert!(
-            !own.has_open() && own.open().iter().all(|open| open.is_covered),
+            !own.has_open() && own.open_objects().iter().all(|open| open.is_covered),
             "{reach}: {:?}",
-            own.open()
+            own.open_objects()
         );
     }
     for reach in [0.5, 0.98] {
         let own = bodies(&pool(reach));
         assert!(
-            own.has_open() && own.open().iter().all(|open| !open.is_covered),
+            own.has_open() && own.open_objects().iter().all(|open| !open.is_covered),
             "{reach}: {:?}",
-            own.open()
+            own.open_objects()
         );
     }
 }
@@ -479,7 +483,11 @@ fn curved_opaque_surface_closes_open_glass() {
         scene().mesh(bare.clone(), AS_IT_IS, glass(1.5)).mesh(label, AS_IT_IS, matte(0.5))
     };
     let fits = bodies(&with(label.clone()));
-    assert!(!fits.has_open() && fits.open().iter().all(|open| open.is_covered), "{:?}", fits.open());
+    assert!(
+        !fits.has_open() && fits.open_objects().iter().all(|open| open.is_covered),
+        "{:?}",
+        fits.open_objects()
+    );
     // The label does not touch the ball.
     let off =
         TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
@@ -544,7 +552,7 @@ fn each_hole_is_tested_separately() {
     let build = parts.into_iter().flatten().fold(build, |build, quad| build.shape(quad, glass(1.5)));
     let found = bodies(&build);
     let is_open = [0, 1, 2, 3].map(|part| found.is_open(found.solid_id(2 + 5 * part)));
-    assert_eq!(is_open, [false, true, true, false], "{:?}", found.open());
+    assert_eq!(is_open, [false, true, true, false], "{:?}", found.open_objects());
 }
 
 #[test]

@@ -3,10 +3,10 @@
 use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec2, DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Bump, Integrator, Material, NormalMap, Shadows, TextureFilter, Wrap};
+use glimt::scene::description::{Bump, Integrator, Material, NormalMap, ShadowMode, TextureFilter, Wrap};
 
 use super::scenes::{
     AS_IT_IS, Build, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled,
@@ -51,7 +51,7 @@ fn ramp_is_shaded_like_a_tilted_plane() {
     let eye = v(1.0, 1.5, 0.4);
     let lit = scene()
         .point_light(v(2.0, 4.0, 1.0), 30.0, Falloff::Square)
-        .shadows(Shadows::Off, 1)
+        .shadows(ShadowMode::Off, 1)
         .seen(eye, DVec3::ZERO);
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
         // A mirror reflects the background, but not a point light.
@@ -107,7 +107,7 @@ fn ramp_equals_constant_normal_map() {
 
 /// Shading normal at the point that the camera sees.
 fn normal(build: &Build) -> DVec3 {
-    build.clone().viewed(View::Normal).color() * 2.0 - 1.0
+    build.clone().viewed(ViewMode::Normal).color() * 2.0 - 1.0
 }
 
 /// Height and gradient of the waves at an image position.
@@ -259,11 +259,11 @@ fn no_light_from_behind_the_shading_normal() {
     let slope = 3.0_f64.sqrt();
     for (name, material) in materials().into_iter().filter(|(name, _)| !["glass", "mirror"].contains(name)) {
         for (degrees, shadows) in [
-            (3.0, Shadows::Soft),
-            (5.0, Shadows::Hard),
-            (8.0, Shadows::Off),
-            (12.0, Shadows::Soft),
-            (20.0, Shadows::Hard),
+            (3.0, ShadowMode::Soft),
+            (5.0, ShadowMode::Hard),
+            (8.0, ShadowMode::Off),
+            (12.0, ShadowMode::Soft),
+            (20.0, ShadowMode::Hard),
         ] {
             let (sine, cosine) = f64::to_radians(degrees).sin_cos();
             let mut build = scene()
@@ -287,7 +287,7 @@ fn hard_and_soft_point_shadows_agree_on_bumps() {
         ("plastic", plastic(0.7, 0.3)),
         ("frosted", frosted(1.5, 0.3)),
     ] {
-        let [soft, hard] = [Shadows::Soft, Shadows::Hard].map(|shadows| {
+        let [soft, hard] = [ShadowMode::Soft, ShadowMode::Hard].map(|shadows| {
             let mut build =
                 scene().point_light(v(1.0, 3.0, 2.0), 10.0, Falloff::Square).shadows(shadows, 1).depth(1);
             let texture = heights(&mut build, 16, |at| 0.5 + 0.5 * (TAU * (2.0 * at.x + at.y)).sin());

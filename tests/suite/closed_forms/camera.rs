@@ -4,7 +4,7 @@ use glimt::film::Rect;
 use glimt::integrators::RenderSettings;
 use glimt::math::{DVec2, DVec3, Vec2};
 use glimt::scene::description::Camera;
-use glimt::scene::description::Render;
+use glimt::scene::description::RenderOptions;
 
 use super::scenes::{emitter, scene, tile};
 use super::{Random, assert_close, assert_mean, v};
@@ -48,7 +48,7 @@ fn rays_pass_through_projected_points() {
         let scale = 1.0 / (0.5 * fov.to_radians()).tan();
         let ndc = DVec2::new(eye.x * scale * 200.0 / 333.0 / eye.z, eye.y * scale / eye.z);
         let settings = build.settings(0);
-        let render = Render { width: 333, height: 200, ..settings.render };
+        let render = RenderOptions { width: 333, height: 200, ..settings.render };
         let settings = RenderSettings { render, ..settings };
         let pixel = DVec2::new((ndc.x + 1.0) / 2.0 * 333.0, (1.0 - ndc.y) / 2.0 * 200.0);
         let ray = camera.ray(settings.pixel_to_camera(pixel), Vec2::ZERO);

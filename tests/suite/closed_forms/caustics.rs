@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glimt::choice::Choice;
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Material, Shape};
 use rayon::prelude::*;
@@ -52,12 +52,12 @@ fn means(picture: &[DVec3]) -> Vec<f64> {
 }
 
 /// Mean and standard error of each value of `means`, for each view.
-fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
+fn spread(build: &Build, views: &[ViewMode], samples: u32) -> Vec<Vec<(f64, f64)>> {
     let world = build.world();
     let rect = Rect { x: 0, y: 0, width: SIDE as u32, height: SIDE as u32 };
     let one = |seed: u32| -> Vec<Vec<f64>> {
         let settings = |view| build.clone().viewed(view).settings(seed);
-        let maps = maps(&world, &settings(View::Beauty), samples);
+        let maps = maps(&world, &settings(ViewMode::Beauty), samples);
         let picture = |&view| tile_by(maps.as_ref(), &world, &settings(view), rect, samples);
         views.iter().map(picture).map(|picture| means(&picture)).collect()
     };
@@ -70,7 +70,7 @@ fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
 /// Checks that both methods agree: each block within 5 standard errors plus 1.5 %, the whole image within 4
 /// standard errors plus `SLACK`.
 #[track_caller]
-fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort) {
+fn assert_same_light(what: &str, build: &Build, views: &[ViewMode], effort: &Effort) {
     let &Effort { path_samples, passes, photons, radius } = effort;
     let depth = build.scene.render.max_depth;
     let by_photons = spread(&build.clone().photons(photons, radius), views, passes);
@@ -93,7 +93,7 @@ fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort)
 /// [`assert_same_light`] for the caustic view only.
 #[track_caller]
 fn assert_same_caustic(what: &str, build: &Build, effort: &Effort) {
-    assert_same_light(what, build, &[View::Caustic], effort);
+    assert_same_light(what, build, &[ViewMode::Caustic], effort);
 }
 
 /// A floor at y = 0.
@@ -136,11 +136,18 @@ fn photon_components_match_path_and_add_up() {
     let glossy = room(phong(0.4, 0.4, 20.0, 0.0), |radiance| phong(0.4, 0.0, 1.0, radiance));
     let whole = glossy.pictured(v(0.0, 1.4, 0.9), v(0.15, 0.1, 0.4), 40.0, SIDE as u32, SIDE as u32).depth(5);
     let effort = Effort { path_samples: 128, passes: 20, photons: 15_000, radius: 0.03 };
-    let views = [View::Emission, View::Diffuse, View::Specular, View::Caustic, View::Indirect, View::Beauty];
+    let views = [
+        ViewMode::Emission,
+        ViewMode::Diffuse,
+        ViewMode::Specular,
+        ViewMode::Caustic,
+        ViewMode::Indirect,
+        ViewMode::Beauty,
+    ];
     assert_same_light("emissive room", &whole, &views, &effort);
     let part = |view| whole.clone().photons(5000, 0.05).viewed(view).picture(4, 3);
-    let parts = [View::Emission, View::Diffuse, View::Specular].map(part);
-    for (pixel, beauty) in part(View::Beauty).into_iter().enumerate() {
+    let parts = [ViewMode::Emission, ViewMode::Diffuse, ViewMode::Specular].map(part);
+    for (pixel, beauty) in part(ViewMode::Beauty).into_iter().enumerate() {
         let sum: DVec3 = parts.iter().map(|part| part[pixel]).sum();
         assert!((sum - beauty).abs().max_element() <= 1e-5 * beauty.max_element(), "{pixel}: {sum} {beauty}");
     }
@@ -224,7 +231,7 @@ fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
 fn mirrored(build: Build, (far, near): (f64, f64), (z, width): (f64, f64)) -> Build {
     let corner = v(0.0, -near, z + 0.5 * width);
     let lit = build.quad(corner, v(0.0, near - far, 0.0), v(0.0, 0.0, -width), mirror(1.0));
-    sun(lit, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).viewed(View::Caustic)
+    sun(lit, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).viewed(ViewMode::Caustic)
 }
 
 /// Radiance of a surface with reflectance 0.7 in the reflected sunlight.
@@ -355,7 +362,7 @@ fn photons_do_not_leak_under_a_wall() {
     let seen = |side: f64, gap: f64| {
         let strip = looked_at(ground(gap), v(side * 0.5 * width, 0.0, 0.0), width, 0.5).depth(3);
         let lit = sun(strip, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).photons(8000, radius);
-        spread(&lit, &[View::Caustic], passes)[0][BLOCKS * BLOCKS]
+        spread(&lit, &[ViewMode::Caustic], passes)[0][BLOCKS * BLOCKS]
     };
     let exact = 0.9 * 0.5_f64.sqrt() * 0.7 / PI;
     let (before, error) = seen(-1.0, 0.0);

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::DVec3;
-use glimt::scene::description::Shadows;
+use glimt::scene::description::ShadowMode;
 use glimt::scene::description::light::Falloff;
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
@@ -15,7 +15,7 @@ use super::{assert_close, assert_mean, lambert, v};
 #[track_caller]
 pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     for (samples, shadow_samples) in [(256, 1), (16, 16)] {
-        let values = lit.clone().shadows(Shadows::Soft, shadow_samples).values(samples, 256);
+        let values = lit.clone().shadows(ShadowMode::Soft, shadow_samples).values(samples, 256);
         assert_mean(&format!("{what}, {shadow_samples} shadow rays"), &values, 0.7 * irradiance / PI);
     }
 }
@@ -24,7 +24,7 @@ pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
 /// visible or fully hidden.
 #[track_caller]
 pub fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
-    let values = lit.clone().shadows(Shadows::Hard, 4).values(64, 64);
+    let values = lit.clone().shadows(ShadowMode::Hard, 4).values(64, 64);
     assert_mean(&format!("{what}, hard"), &values, 0.7 * irradiance / PI);
 }
 
@@ -41,7 +41,7 @@ fn square_above(height: f64) -> Build {
 fn point_light_falloff_is_exact() {
     // E = I·cos θ/d² = 10·(2/√5)/5 = 1.788854382; L = 0.7·E/π. Without falloff E = I·cos θ.
     let lit = |falloff| at_origin().point_light(v(1.0, 2.0, 0.0), 10.0, falloff);
-    for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+    for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
         let value = |falloff| lit(falloff).shadows(shadows, 3).value();
         assert_close("square", value(Falloff::Square), 0.398_587_024_3);
         assert_close("none", value(Falloff::None), 0.7 / PI * 10.0 * 2.0 / 5.0_f64.sqrt());
@@ -66,7 +66,7 @@ fn point_light_shadow_edge_is_exact() {
         let cosine = 4.0 / (16.0 + x * x).sqrt();
         assert_close("lit", lit(x, b).value(), 0.7 / PI * cosine);
         assert_eq!(lit(edge - 1e-5, b).value(), 0.0);
-        let off = lit(edge - 1e-5, b).shadows(Shadows::Off, 1).value();
+        let off = lit(edge - 1e-5, b).shadows(ShadowMode::Off, 1).value();
         assert_close("no shadows", off, 0.7 / PI * cosine);
     }
 }
@@ -247,7 +247,7 @@ fn half_plane_penumbra_is_exact() {
         let formula = lambert(v(x, 0.0, 0.0), DVec3::Y, &part);
         assert!((formula - exact).abs() < 1e-9);
         assert_irradiance(&format!("penumbra at {x}"), &penumbra(x, true), formula);
-        let off = |blocker| penumbra(x, blocker).shadows(Shadows::Off, 4).values(8, 16);
+        let off = |blocker| penumbra(x, blocker).shadows(ShadowMode::Off, 4).values(8, 16);
         assert_eq!(off(true), off(false));
         // The light's center is hidden for x < 0. For x > 0, the whole light counts.
         let square = [v(-0.5, 4.0, -0.5), v(0.5, 4.0, -0.5), v(0.5, 4.0, 0.5), v(-0.5, 4.0, 0.5)];
@@ -262,17 +262,17 @@ fn half_plane_penumbra_is_exact() {
 fn shadow_view_shows_visible_fraction() {
     // By symmetry, half of the light is visible from the middle of the penumbra.
     for shadow_samples in [1, 16] {
-        let view = penumbra(0.0, true).viewed(View::Shadow).shadows(Shadows::Soft, shadow_samples);
+        let view = penumbra(0.0, true).viewed(ViewMode::Shadow).shadows(ShadowMode::Soft, shadow_samples);
         assert_mean("half", &view.values(64, 64), 0.5);
     }
-    assert_eq!(penumbra(0.3, true).viewed(View::Shadow).value(), 1.0);
+    assert_eq!(penumbra(0.3, true).viewed(ViewMode::Shadow).value(), 1.0);
     // Two point lights. The hidden one has E = 3/2², the visible one E = 5/1, so the visible fraction is 5/(5
     // + ¾).
     let lit = at_origin()
         .point_light(v(0.0, 2.0, 0.0), 3.0, Falloff::Square)
         .point_light(v(0.0, 1.0, 0.0), 5.0, Falloff::Square)
         .quad(v(-1.0, 1.5, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), matte(0.5));
-    assert_close("two lights", lit.viewed(View::Shadow).value(), 5.0 / 5.75);
+    assert_close("two lights", lit.viewed(ViewMode::Shadow).value(), 5.0 / 5.75);
 }
 
 #[test]

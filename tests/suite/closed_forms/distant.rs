@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
-use glimt::scene::description::{ColorSource, Light, MaterialKind, Shadows};
+use glimt::scene::description::{ColorSource, Light, MaterialKind, ShadowMode};
 
 use super::direct::at_origin;
 use super::scenes::{Build, matte, plain, receiver, scene};
@@ -39,7 +39,7 @@ fn spotlight_fades_toward_cone_edge() {
         (10.0, 19.8, 0.0, 0.0),
         (100.0, 300.0, 1.0, 50.0 / 150.0),
     ] {
-        for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+        for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
             let build = |falloff| lit(degrees.to_radians(), angle, blend, falloff).shadows(shadows, 2);
             let (cosine, distance2) = (2.0 / 5.0_f64.sqrt(), 5.0);
             let expected = 0.7 / PI * 10.0 * cosine * share;
@@ -55,12 +55,12 @@ fn spotlight_fades_toward_cone_edge() {
 fn directional_light_is_uniform() {
     let direction = v(3.0, -4.0, 0.0);
     for place in [DVec3::ZERO, v(1e3, 0.0, -50.0)] {
-        for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+        for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
             let lit = sun(receiver(place, 0.7), direction, 5.0, 0.0).shadows(shadows, 3);
             assert_close("lit", lit.value(), 0.7 / PI * 5.0 * 0.8);
             // A blocker on the line to the light, one next to this line, and one on the opposite side.
             let blocked = |at: DVec3| lit.clone().sphere(place + at, 0.5, matte(0.5)).value();
-            let expected = if shadows == Shadows::Off { lit.value() } else { 0.0 };
+            let expected = if shadows == ShadowMode::Off { lit.value() } else { 0.0 };
             assert_eq!(blocked(v(-300.0, 400.0, 0.0)), expected);
             assert_eq!(blocked(v(-300.0, 400.0, 0.6)), lit.value());
             assert_eq!(blocked(v(300.0, 400.0, 0.0)), lit.value());
@@ -75,7 +75,7 @@ fn sun_disk_irradiance_and_shadow_are_exact() {
         let lit = sun(at_origin(), v(1.0, -2.0, 0.0), 5.0, degrees);
         let expected = 0.7 / PI * 5.0 * 2.0 / 5.0_f64.sqrt();
         assert_mean(&format!("{degrees}"), &lit.values(64, 64), expected);
-        let hard = lit.clone().shadows(Shadows::Hard, 1);
+        let hard = lit.clone().shadows(ShadowMode::Hard, 1);
         assert_mean(&format!("{degrees}, hard"), &hard.values(64, 64), expected);
     }
     // The half-plane x < 0 at height 1 hides half of the disk from the origin, because its edge crosses the

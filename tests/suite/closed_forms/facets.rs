@@ -6,7 +6,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Bump, NormalMap, Shadows, TextureFilter, Wrap};
+use glimt::scene::description::{Bump, NormalMap, ShadowMode, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
@@ -122,7 +122,7 @@ fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
 /// Distance from the center to the nearest surface in the given direction.
 fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
     let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
-    let hit = world.geometry.closest(&Ray::new(Vec3::ZERO, direction.as_vec3()));
+    let hit = world.geometry.closest_hit(&Ray::new(Vec3::ZERO, direction.as_vec3()));
     f64::from(hit.expect("the mesh must surround the center").shape.t)
 }
 
@@ -186,7 +186,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
         _ => build.cuboid(lamp, v(0.4, 0.6, 0.5), v(10.0, 20.0, 30.0), emitter(20.0)),
     };
     let at = transform.point(eye);
-    build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
+    build.shadows(ShadowMode::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
 }
 
 /// Checks that no pixel is lit inside any of a thousand closed opaque meshes with point and area lights

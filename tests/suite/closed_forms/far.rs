@@ -7,7 +7,7 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Accel, ColorSource, MaterialKind, Shadows, Shape, TextureFilter, Wrap};
+use glimt::scene::description::{Accel, ColorSource, MaterialKind, ShadowMode, Shape, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::v;
@@ -76,7 +76,7 @@ fn everything_at(at: DVec3, accel: Accel) -> Build {
         )
         .point_light(p(-2.0, 2.0, -2.0), 8.0, Falloff::Square)
         .background(0.25)
-        .shadows(Shadows::Soft, 1)
+        .shadows(ShadowMode::Soft, 1)
         .pictured(p(0.125, 0.25, 0.5), p(0.0, 0.0, -5.0), 50.0, 48, 40)
 }
 

@@ -5,7 +5,7 @@ use glimt::control::CancelToken;
 use glimt::film::Film;
 use glimt::integrators::render_tile;
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{PixelFilter, Render};
+use glimt::scene::description::{PixelFilter, RenderOptions};
 use glimt::world::World;
 
 use super::scenes::{Build, emitter, matte, scene};
@@ -16,12 +16,12 @@ fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u3
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
         let done = render_tile(world, &build.settings(seed), rect, from..to, &CancelToken::new());
-        film.add(tile, &done.expect("the token is not cancelled").0);
+        film.add_samples(tile, &done.expect("the token is not cancelled").0);
     }
 }
 
 fn film(build: &Build) -> Film {
-    let Render { width, height, .. } = build.scene.render;
+    let RenderOptions { width, height, .. } = build.scene.render;
     Film::new(width, height, None).expect("a film")
 }
 

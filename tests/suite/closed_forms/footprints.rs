@@ -1,6 +1,6 @@
 //! Pixel footprints and the mip levels of textures.
 
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     ColorSource, EmissionSource, Integrator, Material, MaterialKind, TextureFilter, Wrap,
@@ -173,7 +173,7 @@ fn mirror_ball_matches_its_smooth_mesh() {
 #[test]
 fn views_use_the_same_mip_level() {
     let far = floor(TextureFilter::Mipmap).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 8, 8);
-    let albedo = grays(&far.clone().viewed(View::Albedo));
+    let albedo = grays(&far.clone().viewed(ViewMode::Albedo));
     assert_eq!(albedo, grays(&far));
 }
 

@@ -1,10 +1,10 @@
 //! Light transmitted by rough surfaces: rough glass, and principled materials with transmission.
 
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    EmissionSource, Integrator, Material, MaterialKind, NumberSource, Shadows, Shape,
+    EmissionSource, Integrator, Material, MaterialKind, NumberSource, ShadowMode, Shape,
 };
 
 use super::global::by_paths;
@@ -53,7 +53,7 @@ fn techniques_agree_on_transmitted_light() {
         let lit = build.clone().sphere(at, 0.5, emitter(2.0));
         let path = mean_and_error(&by_paths(lit.clone(), 1).values(1024, 16));
         let whitted = lit.clone().depth(1);
-        let sampled = whitted.clone().shadows(Shadows::Off, 1);
+        let sampled = whitted.clone().shadows(ShadowMode::Off, 1);
         // Light samples cannot find a light inside a glass shell without refraction, but lobe samples can.
         let inside = what.contains("from outside");
         let shell = glass(if inside { 1.5 } else { 1.0 });
@@ -242,9 +242,10 @@ fn frosted_glass_components_add_up() {
         .pictured(v(0.0, 1.0, 3.5), v(0.0, 0.6, -0.4), 40.0, 24, 16);
     for integrator in [Integrator::Whitted, Integrator::Path] {
         let build = build.clone().with(|scene| scene.render.integrator = integrator);
-        let picture = |view: View| build.clone().viewed(view).picture(8, 3);
-        let parts = [View::Ambient, View::Diffuse, View::Specular, View::Emission].map(picture);
-        for (pixel, beauty) in picture(View::Beauty).into_iter().enumerate() {
+        let picture = |view: ViewMode| build.clone().viewed(view).picture(8, 3);
+        let parts =
+            [ViewMode::Ambient, ViewMode::Diffuse, ViewMode::Specular, ViewMode::Emission].map(picture);
+        for (pixel, beauty) in picture(ViewMode::Beauty).into_iter().enumerate() {
             let sum: DVec3 = parts.iter().map(|part| part[pixel]).sum();
             let off = (sum - beauty).abs().max_element();
             assert!(off <= 2e-5 * beauty.max_element().max(1.0), "{integrator:?}, {pixel}: {sum} {beauty}");
@@ -259,7 +260,7 @@ fn shadow_view_includes_rough_glass() {
         .cuboid(DVec3::ZERO, v(2.0, 0.2, 2.0), DVec3::ZERO, frosted(1.5, 0.5))
         .sphere(v(0.0, 2.0, 0.0), 0.3, emitter(2.0))
         .seen(v(0.3, 1.0, 0.2), v(0.1, 0.1, 0.0))
-        .viewed(View::Shadow);
+        .viewed(ViewMode::Shadow);
     assert_close("in sight", build.value(), 1.0);
 }
 
@@ -362,7 +363,7 @@ fn rough_glass_is_lit_inside_without_shadows() {
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.9))
         .quad(v(-4.0, 3.0, -9.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, 8.0), emitter(8.0))
         .depth(2)
-        .with(|scene| scene.render.shadows = Shadows::Off)
+        .with(|scene| scene.render.shadows = ShadowMode::Off)
         .pictured(v(0.0, 0.0, 0.0), v(0.0, 0.0, -5.0), 18.0, 12, 12);
     let spark = ball.clone().point_light(v(0.0, 0.0, -5.0), 1e-6, Falloff::Square);
     assert_eq!([&ball, &spark].map(|build| build.world().is_unlit_glass(0)), [true, false]);

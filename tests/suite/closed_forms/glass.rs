@@ -5,7 +5,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract};
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Material, Mesh, Shape};
+use glimt::scene::description::{Material, MeshReference, Shape};
 use glimt::world::Geometry;
 
 use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene, tinted};
@@ -92,7 +92,7 @@ fn slab_shifts_rays_laterally() {
 
 /// Traces a ray through glass with n = 1.5 until it leaves. `None` for total internal reflection.
 fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
-    while let Some(hit) = geometry.closest(&ray) {
+    while let Some(hit) = geometry.closest_hit(&ray) {
         let surface = geometry.surface(&ray, &hit);
         let entering = surface.normal.dot(ray.direction) < 0.0;
         let (normal, eta) = if entering { (surface.normal, 1.5) } else { (-surface.normal, 1.0 / 1.5) };
@@ -327,7 +327,7 @@ fn shading_normals_create_no_light() {
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
     let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
-        if let Shape::Mesh(Mesh { smooth, .. }) = &mut scene.objects[0].shape {
+        if let Shape::Mesh(MeshReference { smooth, .. }) = &mut scene.objects[0].shape {
             *smooth = true;
         }
     });
@@ -338,7 +338,7 @@ fn shading_normals_create_no_light() {
         let eye = (random.direction() * 0.85).as_vec3();
         let direction = random.direction().as_vec3();
         let ray = Ray::new(eye, direction);
-        let hit = geometry.closest(&ray).expect("inside a closed mesh");
+        let hit = geometry.closest_hit(&ray).expect("inside a closed mesh");
         let surface = geometry.surface(&ray, &hit);
         let (_, cosine) = dielectric(surface.shading_normal.dot(direction), 1.0 / 1.5);
         let refracted = cosine.map(|c| refract(direction, -surface.shading_normal, 1.0 / 1.5, c));

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind, Shadows, Shape};
+use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind, ShadowMode, Shape};
 
 use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tinted};
@@ -176,8 +176,8 @@ fn path_components_add_up() {
             .pictured(v(0.0, 0.0, 0.9), v(0.0, -0.3, 0.0), 80.0, 24, 16);
         by_paths(room, 6).viewed(view).picture(8, 3)
     };
-    let beauty = build(View::Beauty);
-    let parts = [View::Ambient, View::Diffuse, View::Specular, View::Emission].map(build);
+    let beauty = build(ViewMode::Beauty);
+    let parts = [ViewMode::Ambient, ViewMode::Diffuse, ViewMode::Specular, ViewMode::Emission].map(build);
     assert!(parts[0].iter().all(|pixel| *pixel == DVec3::ZERO), "path has no ambient light");
     for (i, whole) in beauty.iter().enumerate() {
         let sum: DVec3 = parts.iter().map(|part| part[i]).sum();
@@ -430,7 +430,7 @@ fn light_samples_inside_glass_are_tinted() {
     let distance = 1.25_f64.sqrt();
     let exact = 0.6 / PI * (1.0 / distance) / 1.25 * tint.powf(distance) * to_eye;
     for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
-        for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+        for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
             assert_close(what, build.clone().shadows(shadows, 1).value(), exact);
         }
     }

@@ -4,7 +4,7 @@
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Shadows, Shape};
+use glimt::scene::description::{ShadowMode, Shape};
 
 use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
@@ -39,8 +39,8 @@ fn unoccluded_light_ignores_shadow_mode() {
     // Includes lights close to the receiver.
     for (height, size) in [(2.0, 0.5), (1.2, 1.0), (10.0, 0.3)] {
         for (name, build) in lights(height, size) {
-            let values = |shadows: Shadows| build.clone().shadows(shadows, 4).values(256, 16);
-            let [off, hard, soft] = [Shadows::Off, Shadows::Hard, Shadows::Soft].map(values);
+            let values = |shadows: ShadowMode| build.clone().shadows(shadows, 4).values(256, 16);
+            let [off, hard, soft] = [ShadowMode::Off, ShadowMode::Hard, ShadowMode::Soft].map(values);
             assert!(off[0] > 0.0, "{name}");
             assert_eq!(off, hard, "{name} at {height}");
             let ((mean, error), (soft, soft_error)) = (mean_and_error(&off), mean_and_error(&soft));
@@ -68,15 +68,19 @@ fn metal_lobes_use_the_same_shadow_ray() {
     let middle = corner + v(0.0, 0.8, 1.0);
     for roughness in [0.1, 0.3] {
         let open = mean_and_error(&lit(floor(roughness)).values(1024, 16));
-        let with = |at: DVec3, shadows: Shadows| {
+        let with = |at: DVec3, shadows: ShadowMode| {
             let build = lit(floor(roughness)).sphere(at, 0.02, matte(0.0)).shadows(shadows, 1);
             mean_and_error(&build.values(1024, 16))
         };
-        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "no light must arrive if the center is hidden");
+        assert_eq!(
+            with(middle * 0.5, ShadowMode::Hard).0,
+            0.0,
+            "no light must arrive if the center is hidden"
+        );
         let beside = corner + v(0.0, 1.5, 1.9);
         for (name, (mean, error)) in [
-            ("off-center blocker", with(beside * 0.5, Shadows::Hard)),
-            ("without shadows", with(middle * 0.5, Shadows::Off)),
+            ("off-center blocker", with(beside * 0.5, ShadowMode::Hard)),
+            ("without shadows", with(middle * 0.5, ShadowMode::Off)),
         ] {
             let error = error.hypot(open.1);
             assert!(error < 0.02 * open.0, "{name}: too noisy: ± {error} of {}", open.0);
@@ -90,7 +94,7 @@ fn hard_shadows_are_exact_for_close_lights() {
     // A unit square at a height of 0.1. E/L = 3.042128 from the closed form for a parallel rectangle.
     let corner = v(-0.5, 0.1, -0.5);
     let lamp = receiver(DVec3::ZERO, 0.8).quad(corner, v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(1.0));
-    let values = lamp.shadows(Shadows::Hard, 16).values(256, 16);
+    let values = lamp.shadows(ShadowMode::Hard, 16).values(256, 16);
     let (mean, error) = mean_and_error(&values);
     let exact = 3.042_128 * 0.8 / std::f64::consts::PI;
     assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} ± {error}, expected {exact}");
@@ -101,7 +105,7 @@ fn center_ray_determines_visibility() {
     let lamp = |build: Build| {
         build
             .quad(v(-1.0, 2.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0))
-            .shadows(Shadows::Hard, 4)
+            .shadows(ShadowMode::Hard, 4)
     };
     let free = lamp(receiver(DVec3::ZERO, 0.8)).value();
     let blocked = |x: f64| {
@@ -139,7 +143,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
         receiver(DVec3::ZERO, 0.8).quad(at - half, sides[0], sides[1], matte(0.0))
     };
     for (name, lamp) in [("box", &cube as &dyn Fn(Build) -> Build), ("mesh", &mesh)] {
-        let hard = |build: Build| lamp(build).shadows(Shadows::Hard, 16);
+        let hard = |build: Build| lamp(build).shadows(ShadowMode::Hard, 16);
         let free = hard(receiver(DVec3::ZERO, 0.8));
         assert_eq!(rays(&free), 1, "{name}");
         let value = |build: Build| {
@@ -152,7 +156,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
         assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
         let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
         assert_eq!(beside, all, "{name}");
-        let soft = value(lamp(receiver(DVec3::ZERO, 0.8)).shadows(Shadows::Soft, 16));
+        let soft = value(lamp(receiver(DVec3::ZERO, 0.8)).shadows(ShadowMode::Soft, 16));
         assert!((soft / all - 1.0).abs() < 0.02, "{name}: soft {soft}, hard {all}");
     }
 }

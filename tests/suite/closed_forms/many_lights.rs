@@ -2,11 +2,11 @@
 
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
-use glimt::lights::SamplingMode;
+use glimt::integrators::ViewMode;
+use glimt::lights::LightSamplingPurpose;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
-use glimt::scene::description::{Light, Shadows, Shape};
+use glimt::scene::description::{Light, ShadowMode, Shape};
 
 use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
@@ -88,10 +88,11 @@ fn every_light_kind_matches_the_full_sum() {
     let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
     let picked = with_dark_lights(build.clone());
     assert!(
-        build.world().lights.sampler(SamplingMode::Eye).is_none()
-            && picked.world().lights.sampler(SamplingMode::Eye).is_some()
+        build.world().lights.sampler(LightSamplingPurpose::Eye).is_none()
+            && picked.world().lights.sampler(LightSamplingPurpose::Eye).is_some()
     );
-    for (shadows, samples) in [(Shadows::Soft, 1), (Shadows::Soft, 2), (Shadows::Hard, 1), (Shadows::Off, 1)]
+    for (shadows, samples) in
+        [(ShadowMode::Soft, 1), (ShadowMode::Soft, 2), (ShadowMode::Hard, 1), (ShadowMode::Off, 1)]
     {
         let [all, some] = [&build, &picked].map(|build| build.clone().shadows(shadows, samples));
         assert_same(&format!("whitted, {shadows:?}"), &some, &all, (64, 16), 4e-3);
@@ -100,7 +101,7 @@ fn every_light_kind_matches_the_full_sum() {
         let [all, some] = [&build, &picked].map(|build| by_paths(build.clone(), depth));
         assert_same(&format!("path, depth {depth}"), &some, &all, (64, 24), 6e-3);
     }
-    for view in [View::Specular, View::Diffuse] {
+    for view in [ViewMode::Specular, ViewMode::Diffuse] {
         let [all, some] = [&build, &picked].map(|build| build.clone().viewed(view));
         assert_same(&format!("{view:?}"), &some, &all, (64, 16), 1e-2);
     }
@@ -176,8 +177,11 @@ fn mesh_light_matches_separate_triangles() {
         ..TriangleMesh::default()
     };
     let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
-    assert!(mesh.world().lights.sampler(SamplingMode::Eye).is_none(), "a mesh must be a single light");
-    assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (64, 16), 5e-3);
+    assert!(
+        mesh.world().lights.sampler(LightSamplingPurpose::Eye).is_none(),
+        "a mesh must be a single light"
+    );
+    assert_same("whitted", &mesh.clone().shadows(ShadowMode::Soft, 8), &alone, (64, 16), 5e-3);
     assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (64, 24), 1e-2);
 }
 

@@ -1,10 +1,10 @@
 //! Metal, plastic and principled materials with every integrator.
 
 use glimt::choice::Choice;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{EmissionSource, Integrator, Material, Shadows};
+use glimt::scene::description::{EmissionSource, Integrator, Material, ShadowMode};
 
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
@@ -74,7 +74,8 @@ fn techniques_agree_on_area_lights() {
         for (what, build) in lamps_over_a_floor(&kind) {
             let whitted = build.clone().depth(1);
             // Without occluders, the shadow mode has no effect.
-            let [off, hard] = [Shadows::Off, Shadows::Hard].map(|kind| whitted.clone().shadows(kind, 1));
+            let [off, hard] =
+                [ShadowMode::Off, ShadowMode::Hard].map(|kind| whitted.clone().shadows(kind, 1));
             let path = mean_and_error(&by_paths(build, 1).values(512, 16));
             let others = [("whitted", &whitted, 512), ("unshadowed", &off, 512), ("hard", &hard, 512)];
             // In these two cases, a ball occludes part of a light.
@@ -120,7 +121,7 @@ fn whitted_shows_reflections_in_rough_lobes() {
             .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
         // Whitted excludes indirect light from the diffuse lobe, so compare only the specular components.
-        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(1024, 16));
+        let part = |build: Build| mean_and_error(&build.viewed(ViewMode::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
         if material == "smooth plastic" {
             continue;
@@ -166,7 +167,7 @@ fn rough_reflection_components_add_up() {
     for integrator in [Integrator::Whitted, Integrator::Path] {
         let build = build.clone().with(|scene| scene.render.integrator = integrator);
         let picture = |name: &str| {
-            let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
+            let view = ViewMode::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
             build.clone().viewed(view).picture(8, 3)
         };
         let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);

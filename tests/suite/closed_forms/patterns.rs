@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::SamplingMode;
+use glimt::lights::LightSamplingPurpose;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -98,11 +98,11 @@ fn by_directions(build: &Build) -> f64 {
             let (sin, phi) = (sin2.sqrt(), TAU * turn.fract());
             let ray =
                 Ray::new(Vec3::Y * 1e-4, v(sin * phi.cos(), (1.0 - sin2).sqrt(), sin * phi.sin()).as_vec3());
-            let Some(hit) = world.geometry.closest(&ray) else { continue };
+            let Some(hit) = world.geometry.closest_hit(&ray) else { continue };
             let surface = world.geometry.surface(&ray, &hit);
             if surface.normal.dot(ray.direction) < 0.0 {
                 let emission = &world.materials[world.material_index(&hit)].emission;
-                sum += f64::from(emission.at(&TexturePoint::sharp(surface.uv), 1.0, &mut 0).x);
+                sum += f64::from(emission.radiance(&TexturePoint::from_uv(surface.uv), 1.0, &mut 0).x);
             }
         }
     }
@@ -197,7 +197,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler(SamplingMode::Eye).is_some());
+    assert!(build.world().lights.sampler(LightSamplingPurpose::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

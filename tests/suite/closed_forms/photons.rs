@@ -6,7 +6,9 @@ use std::ops::Range;
 use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_with_photons};
+use glimt::integrators::{
+    PhotonMap, PhotonMapper, PhotonMaps, PhotonSettings, ViewMode, render_tile_with_photons,
+};
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::Shape;
 use glimt::scene::description::light::Falloff;
@@ -47,7 +49,7 @@ fn stored_photons_carry_emitted_power() {
         let (world, token) = (build.world(), CancelToken::new());
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
-        let (_, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+        let (_, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not cancelled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
@@ -68,10 +70,10 @@ fn no_photons_without_mirrors_or_glass() {
     let build = room(|| matte(0.5)).point_light(v(0.2, -0.1, 0.3), 1.0, Falloff::Square).photons(100, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (photons, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+    let (photons, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
         .expect("the token is not cancelled");
     assert!(!photons.emits_photons());
-    assert_eq!((pass.emitted, pass.stored()), (0, 0));
+    assert_eq!((pass.emitted, pass.photon_count()), (0, 0));
 }
 
 #[test]
@@ -207,7 +209,7 @@ fn photons_match_path_on_smooth_meshes() {
         .sphere(v(0.0, 1.6, 0.9), 0.4, emitter(3.0))
         .sphere(v(0.0, 1.6, 0.9), 0.5, glass(1.5))
         .pictured(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.6), 8.0, 16, 16)
-        .viewed(View::Indirect);
+        .viewed(ViewMode::Indirect);
     let means = both(&build.depth(3), 3, [512, 16], (10_000, 0.2));
     assert_same_light("a bent wall", means, 2.5e-2, 0.0);
 }
@@ -265,7 +267,7 @@ fn photons_do_not_leak_through_a_thin_wall() {
     let mirrored = wall.quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror(0.9));
     let lit = mirrored.point_light(v(0.2, 0.3, 0.5), 1.0, Falloff::Square).depth(8).photons(4000, 0.3);
     let caustic = |from: DVec3| {
-        let seen = lit.clone().seen(from, v(0.3, -0.4, 0.0)).viewed(View::Caustic);
+        let seen = lit.clone().seen(from, v(0.3, -0.4, 0.0)).viewed(ViewMode::Caustic);
         mean(&seen.values(16, 4).iter().map(|&x| DVec3::splat(x)).collect::<Vec<_>>())
     };
     let (bright, dark) = (caustic(v(0.1, 0.2, 0.9)), caustic(v(0.1, 0.2, -0.9)));
@@ -284,9 +286,9 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+            let (photons, _) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
                 .expect("the token is not cancelled");
-            photons.maps(&world, &settings, 0..4, &token).expect("the token is not cancelled")
+            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not cancelled")
         })
     };
     let all = maps(1);
@@ -310,10 +312,11 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
-            let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+            let (photons, _) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
                 .expect("the token is not cancelled");
-            let maps =
-                photons.maps(&world, &settings, samples.clone(), &token).expect("the token is not cancelled");
+            let maps = photons
+                .trace_passes(&world, &settings, samples.clone(), &token)
+                .expect("the token is not cancelled");
             let own: Vec<_> = at_once
                 .chunks(4)
                 .flat_map(|pixel| &pixel[samples.start as usize..samples.end as usize])
@@ -339,7 +342,7 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
         .photons(1000, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (_, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+    let (_, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
         .expect("the token is not cancelled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

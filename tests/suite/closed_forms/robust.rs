@@ -22,7 +22,7 @@ use super::{Random, v};
 fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
-    geometry.closest(&ray).map(|hit| geometry.surface(&ray, &hit))
+    geometry.closest_hit(&ray).map(|hit| geometry.surface(&ray, &hit))
 }
 
 /// A ray from a surface into the hemisphere around `side`, often at a grazing angle.
@@ -43,7 +43,7 @@ pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, t
         let Some(surface) = aimed(&world.geometry, random, at, size * 4.0) else { continue };
         let ray = leaving(random, &surface, surface.normal);
         tried += 1;
-        hits += u32::from(world.geometry.closest(&ray).is_some());
+        hits += u32::from(world.geometry.closest_hit(&ray).is_some());
     }
     (hits, tried)
 }
@@ -145,7 +145,7 @@ fn no_ray_escapes_through_room_edges() {
                     let to = transform.point(DVec3::from(at) * size);
                     let from = from.as_vec3();
                     let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3().normalize());
-                    let Some(hit) = world.geometry.closest(&ray) else {
+                    let Some(hit) = world.geometry.closest_hit(&ray) else {
                         lost += 1;
                         continue;
                     };
@@ -153,7 +153,7 @@ fn no_ray_escapes_through_room_edges() {
                     let inwards = if surface.normal.dot(ray.direction) < 0.0 { 1.0 } else { -1.0 };
                     let next = leaving(&mut random, &surface, surface.normal * inwards);
                     tried += 1;
-                    lost += u32::from(world.geometry.closest(&next).is_none());
+                    lost += u32::from(world.geometry.closest_hit(&next).is_none());
                 }
                 assert!(
                     tried > 2000 && lost == 0,
@@ -224,12 +224,12 @@ fn ray_into_a_ball_hits_its_back_and_exits() {
                 let at = center + random.direction() * radius * 0.9;
                 let Some(surface) = aimed(&world.geometry, &mut random, at, radius * 4.0) else { continue };
                 let inner = leaving(&mut random, &surface, -surface.normal);
-                let hit = world.geometry.closest(&inner);
+                let hit = world.geometry.closest_hit(&inner);
                 let Some(hit) = hit else { panic!("no exit hit: ball {radius} at {center}") };
                 let back = world.geometry.surface(&inner, &hit);
                 assert!(back.normal.dot(inner.direction) > 0.0, "ball {radius} at {center}");
                 let outer = leaving(&mut random, &back, back.normal);
-                assert_eq!(world.geometry.closest(&outer), None, "ball {radius} at {center}");
+                assert_eq!(world.geometry.closest_hit(&outer), None, "ball {radius} at {center}");
             }
         }
     }
@@ -263,7 +263,7 @@ fn closed_mesh_has_no_leaks() {
             let target = if i % 2 == 0 { a } else { a.lerp(b, random.unit()) };
             let origin = (center + random.direction() * random.unit()).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
-            leaks += u32::from(world.geometry.closest(&ray).is_none());
+            leaks += u32::from(world.geometry.closest_hit(&ray).is_none());
             leaks += u32::from(!world.geometry.occluded(&ray, LightGeometry::Nothing));
         }
         assert_eq!(leaks, 0, "at {center}");
@@ -323,7 +323,7 @@ fn of_everything(k: i32) -> Build {
         .sphere(v(2.0, 2.0, -4.0) * s, 0.3 * s, emitter(6.0))
         .point_light(v(-2.0, 2.0, -2.0) * s, intensity, Falloff::Square)
         .background(0.25)
-        .shadows(glimt::scene::description::Shadows::Soft, 2)
+        .shadows(glimt::scene::description::ShadowMode::Soft, 2)
         .pictured(v(0.1, 0.3, 0.5) * s, v(0.0, 0.0, -5.0) * s, 50.0, 24, 20)
 }
 
@@ -376,20 +376,20 @@ fn assert_no_split(build: &Build) {
 fn invalid_rays_hit_nothing() {
     let world = of_everything(0).with(|_| ()).world();
     let good = Ray::new(Vec3::new(0.1, 0.3, 0.5), Vec3::NEG_Z);
-    assert!(world.geometry.closest(&good).is_some());
+    assert!(world.geometry.closest_hit(&good).is_some());
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for axis in 0..3 {
             let (mut origin, mut direction) = (good, good);
             origin.origin[axis] = bad;
             direction.direction[axis] = bad;
             for ray in [origin, direction] {
-                assert_eq!(world.geometry.closest(&ray), None, "{ray:?}");
+                assert_eq!(world.geometry.closest_hit(&ray), None, "{ray:?}");
                 assert!(!world.geometry.occluded(&ray, LightGeometry::Nothing), "{ray:?}");
             }
         }
     }
     let still = Ray::new(good.origin, Vec3::ZERO);
-    assert_eq!(world.geometry.closest(&still), None);
+    assert_eq!(world.geometry.closest_hit(&still), None);
 }
 
 #[test]
@@ -416,12 +416,12 @@ fn tree_finds_the_same_hit_as_brute_force() {
         let origin = v(random.signed() * 4.0, random.signed() * 4.0, 3.0 + random.unit());
         let direction = if i % 2 == 0 { DVec3::NEG_Z } else { v(random.signed(), random.signed(), -1.0) };
         let ray = Ray::new(origin.as_vec3(), direction.normalize().as_vec3());
-        let one_by_one = (0_u32..)
-            .zip(world.geometry.objects())
-            .filter_map(|(object, shape)| Some(Hit { shape: shape.closest(&ray, &ray.to_f64())?, object }));
+        let one_by_one = (0_u32..).zip(world.geometry.objects()).filter_map(|(object, shape)| {
+            Some(Hit { shape: shape.closest_hit(&ray, &ray.to_f64())?, object })
+        });
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());
-        assert_eq!(world.geometry.closest(&ray), nearest, "{ray:?}");
+        assert_eq!(world.geometry.closest_hit(&ray), nearest, "{ray:?}");
         assert_eq!(world.geometry.occluded(&ray, LightGeometry::Nothing), nearest.is_some());
     }
     assert!(found > 20_000);

@@ -87,7 +87,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let far = reach(shape) + ray.origin.as_dvec3().length();
     let allowed = 64.0 * f64::EPSILON * far;
     let length = ray.direction.as_dvec3().length();
-    let hit = geometry.closest(ray);
+    let hit = geometry.closest_hit(ray);
     assert_eq!(geometry.occluded(ray, LightGeometry::Nothing), hit.is_some(), "{shape:?} {ray:?}");
     let Some(hit) = hit else {
         assert!(!crosses(shape, ray, 0.0, 2.0 * far / length, sign, allowed), "missed {shape:?} {ray:?}");
@@ -197,7 +197,7 @@ fn ray_from_torus_finds_next_intersection() {
                     let from = random_in(&mut random, center, 3.0 * size).as_vec3();
                     let to = random_in(&mut random, center, size);
                     let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
-                    let Some(hit) = geometry.closest(&ray) else { continue };
+                    let Some(hit) = geometry.closest_hit(&ray) else { continue };
                     met += 1;
                     let surface = geometry.surface(&ray, &hit);
                     for side in [1.0_f32, -1.0] {
@@ -284,13 +284,13 @@ fn rays_pass_through_missing_caps() {
         for _ in 0..200 {
             let from = random_in(&mut random, center, 3.0).as_vec3();
             let ray = Ray::new(from, (random_in(&mut random, center, 0.7) - from.as_dvec3()).as_vec3());
-            let bare = open.closest(&ray).map(|hit| hit.shape);
+            let bare = open.closest_hit(&ray).map(|hit| hit.shape);
             assert_eq!(open.occluded(&ray, LightGeometry::Nothing), bare.is_some());
-            match closed.closest(&ray).map(|hit| hit.shape) {
+            match closed.closest_hit(&ray).map(|hit| hit.shape) {
                 Some(hit) if hit.primitive > 0 => {
-                    let cap = closed.surface(&ray, &closed.closest(&ray).expect("as before"));
+                    let cap = closed.surface(&ray, &closed.closest_hit(&ray).expect("as before"));
                     let origin = offset_origin(cap.point, cap.error, cap.normal, ray.direction);
-                    let inner = closed.closest(&Ray::new(origin, ray.direction)).map(|hit| hit.shape);
+                    let inner = closed.closest_hit(&Ray::new(origin, ray.direction)).map(|hit| hit.shape);
                     let inner = inner.filter(|hit| hit.primitive == 0).map(|inner| inner.t + hit.t);
                     assert_eq!(inner.is_some(), bare.is_some(), "{ray:?}");
                     through += u32::from(inner.is_some());
@@ -335,12 +335,12 @@ fn ray_into_closed_round_shape_hits_its_back() {
                     let from = random_in(&mut random, center, 3.0 * size).as_vec3();
                     let to = random_in(&mut random, center, 0.5 * size);
                     let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
-                    let Some(hit) = geometry.closest(&ray) else { continue };
+                    let Some(hit) = geometry.closest_hit(&ray) else { continue };
                     let surface = geometry.surface(&ray, &hit);
                     let inner = leaving(&mut random, &surface, -surface.normal);
                     // Near an edge, the offset for the point's error may leave the shape.
                     if distance(&shape, inner.origin.as_dvec3()) < 0.0 {
-                        let back = geometry.closest(&inner);
+                        let back = geometry.closest_hit(&inner);
                         let back = back.unwrap_or_else(|| panic!("leak in {shape:?} {inner:?}"));
                         let normal = geometry.surface(&inner, &back).normal;
                         assert!(normal.dot(inner.direction) > 0.0, "{shape:?} {inner:?}");

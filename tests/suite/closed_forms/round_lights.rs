@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Shadows, Shape};
+use glimt::scene::description::{ShadowMode, Shape};
 
 use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{Build, emitter, matte, scene};
@@ -25,7 +25,7 @@ fn by_directions(shape: &Shape) -> f64 {
             let sin = sin2.sqrt();
             let direction = v(sin * phi.cos(), (1.0 - sin2).sqrt(), sin * phi.sin()).as_vec3();
             let ray = Ray::new(Vec3::ZERO, direction);
-            if let Some(hit) = geometry.closest(&ray) {
+            if let Some(hit) = geometry.closest_hit(&ray) {
                 fronts += u32::from(geometry.surface(&ray, &hit).normal.dot(direction) < 0.0);
             }
         }
@@ -50,7 +50,7 @@ fn disk_light_is_exact_on_its_axis() {
         assert_irradiance(&format!("disk with radius {radius} at {height}"), &lit(&shape), exact);
         assert_hard("disk", &lit(&shape), exact);
         let turned = lit(&disk(v(0.0, height, 0.0), DVec3::Y, radius));
-        assert_eq!((turned.value(), turned.shadows(Shadows::Hard, 1).value()), (0.0, 0.0));
+        assert_eq!((turned.value(), turned.shadows(ShadowMode::Hard, 1).value()), (0.0, 0.0));
     }
 }
 
@@ -77,7 +77,7 @@ fn assert_same(shape: &Shape) {
     }
     assert!(exact > 0.01, "{shape:?} too dim: {exact}");
     for (samples, shadow_samples) in [(1024, 1), (64, 16)] {
-        let values = lit(shape).shadows(Shadows::Soft, shadow_samples).values(samples, 64);
+        let values = lit(shape).shadows(ShadowMode::Soft, shadow_samples).values(samples, 64);
         let (mean, error) = super::mean_and_error(&values);
         let (mean, error) = (mean * PI / 0.7, error * PI / 0.7);
         assert!(error < 0.01 * exact, "{shape:?}: too noisy: {error}");
@@ -136,7 +136,7 @@ fn distant_light_matches_projected_area() {
     // axis, R·h for a cone from the side and πR² along its axis.
     let far = |center: DVec3, shape: Shape, shown: f64| {
         let exact = shown * center.normalize().y / center.length_squared();
-        let soft = lit(&shape).shadows(Shadows::Soft, 64).values(256, 16);
+        let soft = lit(&shape).shadows(ShadowMode::Soft, 64).values(256, 16);
         let (mean, error) = super::mean_and_error(&soft);
         assert!((mean * PI / 0.7 / exact - 1.0).abs() < 3.0 * error / mean + 1e-3, "{shape:?}");
     };

@@ -52,7 +52,7 @@ fn hits_are_bit_identical_at_any_scale() {
             let s = 2.0_f32.powi(k);
             let hits = rays.iter().map(|ray| {
                 let ray = Ray { origin: ray.origin * s, ..*ray };
-                let hit = geometry.closest(&ray)?;
+                let hit = geometry.closest_hit(&ray)?;
                 let surface = geometry.surface(&ray, &hit);
                 Some((hit.shape.t / s, hit.shape.primitive, surface.point / s, surface.normal, surface.uv))
             });
@@ -88,7 +88,7 @@ fn signed_zero_direction_does_not_change_hit() {
                 let along = |zero: f32| {
                     let mut direction = Vec3::splat(zero);
                     direction[axis] = towards;
-                    geometry.closest(&Ray::new(origin, direction))
+                    geometry.closest_hit(&Ray::new(origin, direction))
                 };
                 assert_eq!(along(0.0), along(-0.0), "{shape:?} {origin:?} {axis}");
                 met += u32::from(along(0.0).is_some());
@@ -111,7 +111,7 @@ fn bounds_contain_every_hit() {
                 let from = (center + random.direction() * 9.0).as_vec3();
                 let to = random_in(&mut random, center, 0.9);
                 let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
-                let Some(hit) = geometry.closest(&ray) else { continue };
+                let Some(hit) = geometry.closest_hit(&ray) else { continue };
                 let point = geometry.surface(&ray, &hit).point;
                 (low, high) = (low.min(point), high.max(point));
             }
@@ -136,7 +136,7 @@ fn tangents_are_texture_coordinate_derivatives() {
                 let to = random_in(&mut random, DVec3::ZERO, 0.8);
                 let seen = |to: DVec3| {
                     let ray = Ray::new(from.as_vec3(), (to - from).as_vec3());
-                    geometry.closest(&ray).map(|hit| (hit.shape.primitive, geometry.surface(&ray, &hit)))
+                    geometry.closest_hit(&ray).map(|hit| (hit.shape.primitive, geometry.surface(&ray, &hit)))
                 };
                 let Some((part, here)) = seen(to) else { continue };
                 assert!(here.uv.min_element() >= 0.0 && here.uv.max_element() <= 1.0);
@@ -169,7 +169,7 @@ fn distant_hits_keep_accurate_normals() {
     for (shape, across) in [(thin, 0.0), (ring, 1.0 - 1e-3)] {
         let geometry = geometry(&shape);
         let ray = Ray::new(Vec3::new(across as f32 + 5e-4, 0.0, 1e6), Vec3::new(0.0, 0.0, -1.0));
-        let hit = geometry.closest(&ray).expect("aimed at it");
+        let hit = geometry.closest_hit(&ray).expect("aimed at it");
         let normal = geometry.surface(&ray, &hit).normal;
         assert!(normal.dot(ray.direction) < 0.0 && normal.y.abs() < 1e-3, "{shape:?} {normal}");
         assert!((normal.length() - 1.0).abs() < 1e-6);

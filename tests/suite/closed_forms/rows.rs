@@ -7,7 +7,9 @@ use glimt::film::Rect;
 use glimt::integrators::render_tile;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{ColorSource, Material, MaterialKind, Shadows, Shape, TextureFilter, Wrap};
+use glimt::scene::description::{
+    ColorSource, Material, MaterialKind, ShadowMode, Shape, TextureFilter, Wrap,
+};
 
 use super::scenes::{Build, emitter, glass, mirror, plain, scene};
 use super::v;
@@ -49,7 +51,9 @@ fn constant_texture_is_bit_identical_to_color() {
     let one_by_one = pictured(|build, color| {
         ColorSource::Texture(build.texture(&[&[color]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE))
     });
-    for (shadows, count) in [(Shadows::Soft, 1), (Shadows::Soft, 3), (Shadows::Hard, 1), (Shadows::Off, 1)] {
+    for (shadows, count) in
+        [(ShadowMode::Soft, 1), (ShadowMode::Soft, 3), (ShadowMode::Hard, 1), (ShadowMode::Off, 1)]
+    {
         let picture = |build: &Build| build.clone().shadows(shadows, count).picture(3, 5);
         let (rows, single) = (picture(&by_rows), picture(&one_by_one));
         assert!(rows.iter().any(|pixel| pixel.x > 0.1), "the image is black");
@@ -59,7 +63,7 @@ fn constant_texture_is_bit_identical_to_color() {
 
 #[test]
 fn sample_bits_do_not_depend_on_tiling() {
-    let build = pictured(|_, color| ColorSource::Constant(color)).shadows(Shadows::Soft, 2);
+    let build = pictured(|_, color| ColorSource::Constant(color)).shadows(ShadowMode::Soft, 2);
     let (world, settings) = (build.world(), build.settings(4));
     let samples = |rect: Rect, samples: Range<u32>| {
         let done = render_tile(&world, &settings, rect, samples, &CancelToken::new());

@@ -8,18 +8,21 @@ use glimt::assets::{FileMaterial, LoadedMesh};
 use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_with_photons};
+use glimt::integrators::{
+    self, PhotonMaps, PhotonSettings, RenderSettings, ViewMode, render_tile_with_photons,
+};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, FresnelSource, Integrator, Light,
-    Located, Material, MaterialKind, Mesh, MeshFile, MeshTransform, NumberSource, Object, OpacitySource,
-    Photons, PixelFilter, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, Integrator, Light, Material,
+    MaterialKind, MeshFile, MeshReference, MeshTransform, NumberSource, Object, OpacitySource, PhotonOptions,
+    PixelFilter, RenderOptions, Scene, ShadowMode, Shape, Spanned, Texture, TextureEncoding, TextureFilter,
+    Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky_map, textures_needed,
-    with_distinct_lights,
+    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, build_lights, choose_scene_origin,
+    separate_coincident_emitters, sky_map, textures_needed,
 };
 
 use super::v;
@@ -29,14 +32,14 @@ use super::v;
 pub struct Build {
     pub scene: Scene,
     pub parts: WorldInputs,
-    pub view: View,
+    pub view: ViewMode,
     texels: Vec<Arc<Texels>>,
     sky: Option<Arc<Texels>>,
 }
 
 /// An empty scene, viewed from (0, 0, 0) along −z through a single narrow pixel.
 pub fn scene() -> Build {
-    let render = Render {
+    let render = RenderOptions {
         error: 0.0,
         width: 1,
         height: 1,
@@ -44,7 +47,7 @@ pub fn scene() -> Build {
         shadow_samples: 1,
         max_depth: 8,
         integrator: Integrator::Whitted,
-        shadows: Shadows::Soft,
+        shadows: ShadowMode::Soft,
         clamp: 0.0,
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
@@ -58,7 +61,7 @@ pub fn scene() -> Build {
         render,
         output: None,
         camera: look_at(DVec3::ZERO, DVec3::NEG_Z, NARROW),
-        photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
+        photons: PhotonOptions { enabled: false, count: 1, radius: 0.0, bounces: 1 },
         textures: Vec::new(),
         materials: Vec::new(),
         mesh_files: Vec::new(),
@@ -66,7 +69,7 @@ pub fn scene() -> Build {
         lights: Vec::new(),
         environment: None,
     };
-    Build { scene, parts: WorldInputs::default(), view: View::Beauty, texels: Vec::new(), sky: None }
+    Build { scene, parts: WorldInputs::default(), view: ViewMode::Beauty, texels: Vec::new(), sky: None }
 }
 
 /// A field of view so narrow that a pixel is effectively a point.
@@ -95,12 +98,12 @@ impl Build {
         self
     }
 
-    pub fn viewed(mut self, view: View) -> Self {
+    pub fn viewed(mut self, view: ViewMode) -> Self {
         self.view = view;
         self
     }
 
-    pub fn shadows(self, shadows: Shadows, samples: u32) -> Self {
+    pub fn shadows(self, shadows: ShadowMode, samples: u32) -> Self {
         self.with(|scene| (scene.render.shadows, scene.render.shadow_samples) = (shadows, samples))
     }
 
@@ -115,7 +118,7 @@ impl Build {
     /// Enables photon mapping with `count` photons per pass and a gather radius of `radius` in the first
     /// pass.
     pub fn photons(self, count: u64, radius: f64) -> Self {
-        self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
+        self.with(|scene| scene.photons = PhotonOptions { enabled: true, count, radius, bounces: 10_000 })
     }
 
     pub fn background(self, radiance: f32) -> Self {
@@ -165,7 +168,7 @@ impl Build {
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
         let placed = MeshTransform::Steps { scale, rotate, translate };
-        self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
+        self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
     /// Enables smooth shading for the last mesh.
@@ -199,14 +202,14 @@ impl Build {
         }));
         self.scene.textures.push(Texture {
             name: format!("{number}"),
-            file: Located { value: PathBuf::from(format!("{number}.exr")), span: 0..0 },
+            file: Spanned { value: PathBuf::from(format!("{number}.exr")), span: 0..0 },
             filter,
             wrap,
             repeat,
             rotate: 0.0,
             offset: Vec2::ZERO,
             uv: UvSet::First,
-            encoding: Encoding::Linear,
+            encoding: TextureEncoding::Linear,
             image: None,
             factor: Vec3::ONE,
         });
@@ -223,7 +226,7 @@ impl Build {
     pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
-        let file = Some(Located { value: PathBuf::from("sky.exr"), span: 0..0 });
+        let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
         self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, rotate }))
     }
 
@@ -238,18 +241,18 @@ impl Build {
             let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
             parts.images.insert(needed.source, image);
         }
-        let origin = origin(&self.scene.camera, None);
-        let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
+        let origin = choose_scene_origin(&self.scene.camera, None);
+        let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not cancelled"));
         let sky = self.sky.as_ref().and_then(sky_map);
-        let lights =
-            lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new()).expect("not cancelled");
+        let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
+            .expect("not cancelled");
         World::new(&self.scene, &parts, geometry, lights)
     }
 
     pub fn settings(&self, seed: u32) -> RenderSettings {
-        let render = Render { seed, ..self.scene.render };
-        let Photons { enabled, count, radius, bounces } = self.scene.photons;
+        let render = RenderOptions { seed, ..self.scene.render };
+        let PhotonOptions { enabled, count, radius, bounces } = self.scene.photons;
         let photons = PhotonSettings { count: count as u32, radius: radius as f32, bounces };
         RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
     }
@@ -287,9 +290,9 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.effective().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
-        let photons = integrators::Photons::new(world, settings, of_photons, &ignore_progress, &token);
+        let photons = integrators::PhotonMapper::new(world, settings, of_photons, &ignore_progress, &token);
         let (photons, _) = photons.expect("not cancelled");
-        photons.maps(world, settings, 0..samples, &token).expect("not cancelled")
+        photons.trace_passes(world, settings, 0..samples, &token).expect("not cancelled")
     })
 }
 
@@ -469,6 +472,7 @@ pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
 
 /// The mesh as the pipeline prepares it for its tree.
 fn distinct_lights(loaded: LoadedMesh, all_emit: bool) -> LoadedMesh {
-    let distinct = with_distinct_lights(&loaded, all_emit, &CancelToken::new()).expect("never canceled");
+    let distinct =
+        separate_coincident_emitters(&loaded, all_emit, &CancelToken::new()).expect("never canceled");
     distinct.unwrap_or(loaded)
 }

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use glimt::choice::Choice;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    ColorSource, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
+    ColorSource, Material, MaterialKind, MeshReference, ShadowMode, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
@@ -54,7 +54,7 @@ fn components_add_up_to_beauty() {
     }
     let lit = lobe(kind, 35.0).with(|scene| scene.render.ambient = Vec3::splat(0.2));
     let view = |view| lit.clone().viewed(view).value();
-    let parts = [view(View::Ambient), view(View::Diffuse), view(View::Specular)];
+    let parts = [view(ViewMode::Ambient), view(ViewMode::Diffuse), view(ViewMode::Specular)];
     let emitted = lit.clone().depth(0).value();
     let cosine = 20.0_f64.to_radians().cos();
     assert_close("ambient", parts[0], 0.12);
@@ -65,7 +65,7 @@ fn components_add_up_to_beauty() {
         0.5 * 22.0 / (2.0 * PI) * 15.0_f64.to_radians().cos().powi(20) * 3.0 * cosine,
     );
     assert_close("emitted", emitted, 0.25);
-    assert_close("the picture", view(View::Beauty), parts.iter().sum::<f64>() + emitted);
+    assert_close("the picture", view(ViewMode::Beauty), parts.iter().sum::<f64>() + emitted);
     // From behind, only ambient light is visible.
     let behind = lit.seen(v(0.5, -2.0, 0.3), DVec3::ZERO);
     assert_close("from behind", behind.value(), 0.12);
@@ -150,7 +150,7 @@ fn texels_are_half_open_intervals() {
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
     let bsdf = &world.materials[0].bsdf;
-    let at = |u, w| bsdf.albedo(&TexturePoint::sharp(glimt::math::DVec2::new(u, w)), &mut 0);
+    let at = |u, w| bsdf.albedo(&TexturePoint::from_uv(glimt::math::DVec2::new(u, w)), &mut 0);
     assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GRAY, RED, GREEN]);
 }
 
@@ -164,7 +164,7 @@ fn sphere_uv_is_longitude_and_latitude() {
     for direction in [v(1.0, 1.0, 1.0), v(-1.0, 0.3, 0.2), v(0.2, -0.9, -0.5), v(-0.7, 0.1, -0.9)] {
         let n = direction.normalize();
         let (u, w) = (0.5 + n.z.atan2(n.x) / (2.0 * PI), 0.5 + n.y.asin() / PI);
-        let uv = from(n).viewed(View::Uv).color();
+        let uv = from(n).viewed(ViewMode::Uv).color();
         assert_close("u", uv.x, u);
         assert_close("v", uv.y, w);
         let color = match (u < 0.5, w < 0.5) {
@@ -175,7 +175,7 @@ fn sphere_uv_is_longitude_and_latitude() {
         };
         assert_eq!(from(n).color().as_vec3(), color);
     }
-    let known = from(DVec3::ONE.normalize()).viewed(View::Uv).color();
+    let known = from(DVec3::ONE.normalize()).viewed(ViewMode::Uv).color();
     assert_close("u", known.x, 0.625);
     assert_close("v", known.y, 0.695_913_3);
 }
@@ -186,7 +186,7 @@ fn sphere_uv_is_longitude_and_latitude() {
 /// facets.
 #[test]
 fn facets_are_invisible_at_the_terminator() {
-    for shadows in [Shadows::Hard, Shadows::Off] {
+    for shadows in [ShadowMode::Hard, ShadowMode::Off] {
         let mut seen = 0;
         for place in 0..2000 {
             let (azimuth, height) = (f64::from(place) * 2.399_963, f64::from(place) / 1000.0 - 0.999_5);
@@ -202,7 +202,7 @@ fn facets_are_invisible_at_the_terminator() {
                     matte(1.0),
                 )
                 .with(|scene| match &mut scene.objects[0].shape {
-                    Shape::Mesh(Mesh { smooth, .. }) => *smooth = true,
+                    Shape::Mesh(MeshReference { smooth, .. }) => *smooth = true,
                     other => panic!("{other:?} is not a mesh"),
                 })
                 .point_light(DVec3::X * 1e4, 1.0, Falloff::None)
@@ -230,7 +230,7 @@ fn components_add_up_in_mirrors_and_glass() {
         .with(|scene| scene.render.ambient = Vec3::new(0.2, 0.1, 0.3))
         .pictured(v(0.0, 1.0, 1.0), v(0.0, 0.0, -6.0), 40.0, 24, 16);
     let picture = |name: &str| {
-        let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
+        let view = ViewMode::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
         build.clone().viewed(view).picture(8, 3)
     };
     let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);
@@ -244,7 +244,7 @@ fn components_add_up_in_mirrors_and_glass() {
     }
     // In each component view, mirrors and glass show that component of the light they reflect or transmit.
     let through = |at: DVec3, name: &str| {
-        let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
+        let view = ViewMode::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
         build.clone().seen(v(0.0, 1.0, 1.0), at).viewed(view).value()
     };
     for (below, above) in [(v(-1.2, -0.5, -6.0), v(-1.2, 0.7, -6.0)), (v(1.2, 0.4, -6.0), v(1.2, -0.7, -6.0))]

@@ -2,10 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::DirectionalLight;
-use glimt::scene::description::{Integrator, Light, Shadows};
+use glimt::scene::description::{Integrator, Light, ShadowMode};
 
 use super::direct::at_origin;
 use super::scenes::{Build, glass, matte, mirror, phong, receiver, scene};
@@ -31,7 +31,7 @@ fn lit(build: Build, (width, texels): (u32, Vec<Vec3>), rotate: f64) -> Build {
 
 #[test]
 fn plane_under_constant_sky_shows_its_albedo() {
-    for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
+    for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
         for build in both(&at_origin().environment(1.0).shadows(shadows, 1)) {
             assert_mean(&format!("{shadows:?}"), &build.values(64, 64), 0.7);
         }
@@ -47,9 +47,9 @@ fn plane_under_constant_sky_shows_its_albedo() {
             .shadows(shadows, 4)
             .values(64, 64)
     };
-    assert_mean("soft", &wall(Shadows::Soft), 0.35);
-    assert_mean("hard", &wall(Shadows::Hard), 0.35);
-    assert_mean("off", &wall(Shadows::Off), 0.7);
+    assert_mean("soft", &wall(ShadowMode::Soft), 0.35);
+    assert_mean("hard", &wall(ShadowMode::Hard), 0.35);
+    assert_mean("off", &wall(ShadowMode::Off), 0.7);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn sky_in_mirrors_and_glass_is_emission() {
     };
     for build in both(&pane(mirror(0.5))) {
         assert_close("mirror", build.value(), 1.0);
-        assert_close("its emission", build.clone().viewed(View::Emission).value(), 1.0);
+        assert_close("its emission", build.clone().viewed(ViewMode::Emission).value(), 1.0);
         assert_eq!(build.depth(0).value(), 0.0);
     }
     assert_close("by itself", scene().environment(2.0).depth(0).value(), 2.0);

@@ -94,7 +94,7 @@ fn cubes_do_not_speckle() {
                     continue;
                 }
                 inside += 1;
-                let Some(hit) = geometry.closest(&ray) else { panic!("{what}: missed by {ray:?}") };
+                let Some(hit) = geometry.closest_hit(&ray) else { panic!("{what}: missed by {ray:?}") };
                 let exact = entry(&ray, 1.0).expect("the ray hits the smaller cube");
                 assert!((f64::from(hit.shape.t) / exact - 1.0).abs() < 1e-5, "{what}: {ray:?}");
                 let surface = geometry.surface(&ray, &hit);

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
     Accel, ColorSource, EmissionSides, Integrator, Material, MaterialKind, NumberSource, OpacitySource,
-    Shadows, Shape, TextureFilter, Wrap,
+    ShadowMode, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{AS_IT_IS, Build, emitter, matte, mirror, phong, plain, receiver, scene};
@@ -146,7 +146,7 @@ fn light_passes_through_panes() {
         let exact = 0.7 * irradiance(count, 0.8) / PI;
         let lit = under_lamp(panes).depth(1);
         for samples in [1, 16] {
-            let values = lit.clone().shadows(Shadows::Soft, samples).values(256 / samples, 256);
+            let values = lit.clone().shadows(ShadowMode::Soft, samples).values(256 / samples, 256);
             assert_mean(&format!("{count} panes, {samples} shadow rays"), &values, exact);
         }
         assert_mean(&format!("{count} panes, path"), &path(lit.clone()).values(256, 256), exact);
@@ -216,7 +216,7 @@ fn shadows_multiply_transmittances() {
         let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
         mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0
     };
-    assert!((under(Shadows::Hard) / under(Shadows::Off) - 0.7).abs() < 0.01);
+    assert!((under(ShadowMode::Hard) / under(ShadowMode::Off) - 0.7).abs() < 0.01);
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn half_opaque_lights_transmit_their_own_light() {
         let exact = whole * f64::from(o) * (2.0 - f64::from(o));
         for (what, build) in [
             ("whitted", both.clone()),
-            ("hard", both.clone().shadows(Shadows::Hard, 1)),
+            ("hard", both.clone().shadows(ShadowMode::Hard, 1)),
             ("path", path(both.clone())),
             ("photons", both.photons(100, 0.1).depth(1)),
         ] {
@@ -393,9 +393,9 @@ fn first_hit_views_pass_transparent_surfaces() {
         sheet(near, -7.0, 0.0, matte(0.25))
     };
     for (opacity, depth, albedo) in [(0.0, 7.0, 0.25), (1.0, 2.0, 0.5)] {
-        assert_close("depth", build(opacity).viewed(View::Depth).value(), depth);
-        assert_close("albedo", build(opacity).viewed(View::Albedo).value(), albedo);
+        assert_close("depth", build(opacity).viewed(ViewMode::Depth).value(), depth);
+        assert_close("albedo", build(opacity).viewed(ViewMode::Albedo).value(), albedo);
     }
-    let shadow = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.25))).viewed(View::Shadow);
+    let shadow = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.25))).viewed(ViewMode::Shadow);
     assert_mean("shadow", &shadow.values(64, 16), 0.75);
 }

@@ -1,16 +1,16 @@
 //! Views that show the acceleration structures and their cost.
 
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::View;
+use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Accel, Integrator, Shadows};
+use glimt::scene::description::{Accel, Integrator, ShadowMode};
 
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::v;
 
 /// A 64 × 64 image along −z. Pixels are 1/64 wide at a distance of 1.
-fn framed(build: Build, view: View) -> Vec<DVec3> {
+fn framed(build: Build, view: ViewMode) -> Vec<DVec3> {
     let fov = 2.0 * 0.5_f64.atan().to_degrees();
     build.pictured(DVec3::ZERO, DVec3::NEG_Z, fov, 64, 64).viewed(view).picture(64, 2)
 }
@@ -26,7 +26,7 @@ fn ball() -> Build {
 
 #[test]
 fn box_edges_are_drawn_at_exact_positions() {
-    let (plain, drawn) = (framed(ball(), View::Beauty), framed(ball(), View::Bounds));
+    let (plain, drawn) = (framed(ball(), ViewMode::Beauty), framed(ball(), ViewMode::Bounds));
     // The near side appears at ¼, 16 pixels from the center, and the far side at ⅙, 10⅔ pixels from the
     // center.
     let root = DVec3::new(1.0, 0.85, 0.1);
@@ -47,7 +47,8 @@ fn box_edges_are_drawn_at_exact_positions() {
 
 #[test]
 fn exposure_does_not_affect_lines() {
-    let lines = |exposure: f32| framed(ball().with(|scene| scene.render.exposure = exposure), View::Bounds);
+    let lines =
+        |exposure: f32| framed(ball().with(|scene| scene.render.exposure = exposure), ViewMode::Bounds);
     let (plain, dark) = (lines(0.0), lines(-3.0));
     assert!((at(&dark, 16, 40) - at(&plain, 16, 40) * 8.0).length() < 1e-5);
 }
@@ -68,7 +69,7 @@ fn bvh_and_kd_tree_show_their_boxes() {
         ..TriangleMesh::default()
     };
     let picture =
-        |accel: Accel| framed(scene().accel(accel).mesh(mesh(), AS_IT_IS, matte(0.5)), View::Bounds);
+        |accel: Accel| framed(scene().accel(accel).mesh(mesh(), AS_IT_IS, matte(0.5)), ViewMode::Bounds);
     let (boxes, planes) = (picture(Accel::Bvh), picture(Accel::KdTree));
     for picture in [&boxes, &planes] {
         // The root extends 24 pixels to each side, and 30.4 up and down.
@@ -85,19 +86,20 @@ fn bvh_and_kd_tree_show_their_boxes() {
 #[test]
 fn cost_counts_boxes_and_shapes() {
     // The cost counts the root, its leaf and the ball. Outside the box, it is zero.
-    let cost = framed(ball(), View::Cost);
+    let cost = framed(ball(), ViewMode::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (3.0, 0.0));
     assert_eq!(at(&cost, 46, 17).x, 3.0, "a ray through the box that misses the ball");
     // Every ray tests an infinite plane.
     let floor = glimt::scene::description::Shape::Plane { point: v(0.0, -2.0, 0.0), normal: DVec3::Y };
-    let cost = framed(ball().shape(floor, matte(0.5)), View::Cost);
+    let cost = framed(ball().shape(floor, matte(0.5)), ViewMode::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (4.0, 1.0));
     // A lit point traces one shadow ray. This ray starts inside the box, so its cost does not depend on the
     // light's position.
-    let lit =
-        |shadows| framed(ball().point_light(DVec3::ZERO, 1.0, Falloff::None).shadows(shadows, 1), View::Cost);
-    assert_eq!(at(&lit(Shadows::Hard), 32, 32).x, 6.0);
-    assert_eq!(at(&lit(Shadows::Off), 32, 32).x, 3.0);
+    let lit = |shadows| {
+        framed(ball().point_light(DVec3::ZERO, 1.0, Falloff::None).shadows(shadows, 1), ViewMode::Cost)
+    };
+    assert_eq!(at(&lit(ShadowMode::Hard), 32, 32).x, 6.0);
+    assert_eq!(at(&lit(ShadowMode::Off), 32, 32).x, 3.0);
 }
 
 #[test]
@@ -105,7 +107,7 @@ fn cost_includes_indirect_rays() {
     let bounce = |depth: u32| {
         let build =
             ball().depth(depth).environment(1.0).with(|scene| scene.render.integrator = Integrator::Path);
-        at(&framed(build, View::Cost), 32, 32).x
+        at(&framed(build, ViewMode::Cost), 32, 32).x
     };
     // A constant sky is sampled only by the scattered ray. It leaves the ball and visits the root and leaf
     // again.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
-use glimt::scene::keys::key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind};
+use glimt::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind};
 use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 
@@ -32,22 +32,22 @@ const WALL: &str = "[materials.wall]\n";
 const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
 fn tables() -> Vec<DefinedTable> {
-    keys::tables().iter().flat_map(of_definition).collect()
+    keys::all_tables().iter().flat_map(of_definition).collect()
 }
 
 /// The scene tables for a definition, one for each type.
 fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
-    let head = table.head().replace("NAME", "it");
+    let head = table.header().replace("NAME", "it");
     let heading = |code: String| format!("`{code}`");
     let key = |info: &'static KeyInfo| DefinedKey { info, name: info.name.to_owned() };
     if table.types.is_empty() {
-        let keys: Vec<DefinedKey> = table.keys_of(None).map(key).collect();
+        let keys: Vec<DefinedKey> = table.keys_for_type(None).map(key).collect();
         let headings = match table.form {
             // The last two keys are common to all shapes.
             TableSyntax::List => {
-                vec![(heading(table.head()), keys.len() - 2), ("Every shape".to_owned(), 2)]
+                vec![(heading(table.header()), keys.len() - 2), ("Every shape".to_owned(), 2)]
             }
-            TableSyntax::Single | TableSyntax::Named => vec![(heading(table.head()), keys.len())],
+            TableSyntax::Single | TableSyntax::Named => vec![(heading(table.header()), keys.len())],
         };
         return vec![DefinedTable { head: format!("{head}\n"), headings, keys }];
     }
@@ -55,7 +55,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
         let code = format!("type = \"{}\"", kind.name);
         // Opacity applies only to surfaces.
         let is_solid = |info: &KeyInfo| kind.name == "glass" && info.name.starts_with("opacity");
-        let keys = table.keys_of(Some(kind)).filter(|info| !is_solid(info)).map(key).collect();
+        let keys = table.keys_for_type(Some(kind)).filter(|info| !is_solid(info)).map(key).collect();
         let own = (heading(code.clone()), kind.keys.len());
         let common = ("Every material".to_owned(), table.keys.len());
         let headings = [own, common].into_iter().filter(|(_, count)| *count > 0).collect();
@@ -84,7 +84,7 @@ impl DefinedTable {
         let required = self
             .keys
             .iter()
-            .filter(|key| matches!(key.info.default, Default::Required(_)) && key.name != without);
+            .filter(|key| matches!(key.info.default, DefaultValue::Required(_)) && key.name != without);
         let lines: String =
             required.map(|key| format!("{} = {}\n", key.name, example(&self.head, &key.name))).collect();
         let camera = if self.head.starts_with("[camera]") { "" } else { CAMERA };
@@ -121,7 +121,7 @@ impl DefinedTable {
     /// Reports a default that differs from the program's default.
     fn wrong_default(&self, key: &DefinedKey) -> Option<String> {
         let (said, without) = self.with(key, "");
-        if matches!(key.info.default, Default::Required(_)) {
+        if matches!(key.info.default, DefaultValue::Required(_)) {
             let needs = said.contains(&format!("needs `{}`", key.name));
             return (!needs).then(|| format!("{}{} is not required", self.head, key.name));
         }
@@ -145,8 +145,8 @@ impl DefinedKey {
     /// The default, if it is a value.
     fn literal(&self) -> Option<&'static str> {
         match self.info.default {
-            Default::Is(value) => Some(value),
-            Default::Required(_) | Default::By(_) | Default::Absent => None,
+            DefaultValue::Is(value) => Some(value),
+            DefaultValue::Required(_) | DefaultValue::By(_) | DefaultValue::Absent => None,
         }
     }
 
@@ -154,7 +154,7 @@ impl DefinedKey {
     fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match self.info.kind {
             // Keys for glTF files, which this test's scene does not use.
-            ValueKind::Whole(..) if self.info.default == Default::Absent => None,
+            ValueKind::Whole(..) if self.info.default == DefaultValue::Absent => None,
             ValueKind::Whole(least, most) => {
                 Some((vec![least as f64, most as f64], vec![least as f64 - 1.0, most as f64 + 1.0]))
             }
@@ -194,15 +194,15 @@ fn ends(limits: Limits) -> Option<(Vec<f64>, Vec<f64>)> {
 /// Whether a row documents the key. The page may reorder choices and add a link at the end.
 fn is_row(row: &[String], key: &KeyInfo) -> bool {
     let [name, kind, unit, range, default, meaning] = row else { return false };
-    let has_kind =
-        *kind == key.kind() || matches!(key.kind, ValueKind::Words(_)) && codes(kind) == codes(&key.kind());
+    let has_kind = *kind == key.kind_text()
+        || matches!(key.kind, ValueKind::Words(_)) && codes(kind) == codes(&key.kind_text());
     let meaning = unlinked(meaning);
     let rest = meaning.strip_prefix(key.doc);
     *name == format!("`{}`", key.name)
         && has_kind
         && unit == key.unit
-        && *range == key.range()
-        && *default == key.default_words()
+        && *range == key.range_text()
+        && *default == key.default_text()
         && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(". See "))
 }
 
@@ -220,19 +220,20 @@ fn documented_rows_match_definitions() {
     let (mut wrong, mut count) = (Vec::new(), 0);
     for DefinedTable { head, headings, keys: _ } in tables() {
         let name = head.trim_matches(['[', '\n']).split([']', '.']).next().unwrap_or_default();
-        let table = keys::table(name).expect("a table");
-        let kind = head.split('"').nth(1).and_then(|kind| table.type_of(Some(kind)));
+        let table = keys::find_table(name).expect("a table");
+        let kind = head.split('"').nth(1).and_then(|kind| table.find_type(Some(kind)));
         let rows = headings.iter().flat_map(|(heading, number)| {
             let rows = page.rows(heading);
             assert_eq!(rows.len(), *number, "{heading}");
             rows
         });
-        for (row, key) in rows.zip(table.keys_of(kind)) {
+        for (row, key) in rows.zip(table.keys_for_type(kind)) {
             count += 1;
             // The page has a single row for the material of all shapes.
             let is_right = is_row(&row, key) || head == "[[mesh]]\n" && key.name == "material";
             if !is_right {
-                let key = [key.kind(), key.unit.into(), key.range(), key.default_words(), key.doc.into()];
+                let key =
+                    [key.kind_text(), key.unit.into(), key.range_text(), key.default_text(), key.doc.into()];
                 wrong.push(format!("{head}| {}\n{key:?}", row.join(" | ")));
             }
         }

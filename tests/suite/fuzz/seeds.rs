@@ -42,7 +42,12 @@ pub(super) fn scenes() -> Vec<Seed> {
         Err(other) => other.into_bytes(),
     };
     let seed = |bytes| Seed { file: "case.toml".to_owned(), bytes };
-    files.iter().map(bytes).map(seed).chain([seed(glimt::scene::starter().as_bytes().to_vec())]).collect()
+    files
+        .iter()
+        .map(bytes)
+        .map(seed)
+        .chain([seed(glimt::scene::starter_scene().as_bytes().to_vec())])
+        .collect()
 }
 
 /// Meshes, images, materials and cameras.

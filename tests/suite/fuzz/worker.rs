@@ -8,9 +8,9 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use glimt::pipeline::check;
+use glimt::pipeline::check_scene;
 use glimt::pipeline::protocol::Failure;
-use glimt::scene::report::{Style, render};
+use glimt::scene::report::{ReportStyle, render_report};
 use nix::sys::resource::{Resource, setrlimit};
 
 use super::seeds::{Seed, root};
@@ -159,7 +159,7 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 /// Installs a hook that records all panics. Calls the library first, because it installs its own hook on
 /// first use.
 fn listen_to_panics(dir: &CaseDir) {
-    let _ = check(
+    let _ = check_scene(
         &dir.place_case(
             Case { kind: FuzzInput::Asset, seed: 0, number: 0 },
             &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
@@ -173,7 +173,7 @@ fn listen_to_panics(dir: &CaseDir) {
 }
 
 fn one(scene: &Path) -> Result<(), String> {
-    let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene, &[])));
+    let checked = panic::catch_unwind(AssertUnwindSafe(|| check_scene(scene, &[])));
     if let Some(panic) = PANIC.lock().expect("no panic").take() {
         // Decoders in other crates may panic. The library turns such panics into errors about the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
@@ -190,7 +190,7 @@ fn one(scene: &Path) -> Result<(), String> {
         Ok(Err(Failure::Work(message))) => return Err(format!("exit code 1: {message}")),
         Err(_) => return Err("panic without a message".to_owned()),
     };
-    let text = render(&diagnostics, 60, Style::Plain);
+    let text = render_report(&diagnostics, 60, ReportStyle::Plain);
     if let Some(harmful) = harmful(&text) {
         return Err(format!("the message contains {harmful:?}"));
     }

@@ -6,9 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glimt::choice::Choice;
-use glimt::cli::args::Draft;
+use glimt::cli::args::SchemaDraft;
 use glimt::cli::commands::schema::{FILE, LINE, schema, schema_text};
-use glimt::scene::starter;
+use glimt::scene::starter_scene;
 use serde_json::Value;
 
 use self::validator::faults;
@@ -37,7 +37,7 @@ fn json(text: &str) -> Option<Value> {
 /// Errors that each draft finds in a scene.
 fn found(text: &str) -> Vec<Vec<(String, String)>> {
     let scene = json(text).expect("TOML");
-    Draft::ALL.iter().map(|draft| faults(&schema(*draft), &scene)).collect()
+    SchemaDraft::ALL.iter().map(|draft| faults(&schema(*draft), &scene)).collect()
 }
 
 fn files(folder: &str) -> Vec<PathBuf> {
@@ -53,7 +53,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 fn bundled_schema_is_current() {
     let path = root().join("scenes").join(FILE);
     let there = fs::read_to_string(&path).unwrap_or_default();
-    assert!(there == schema_text(Draft::Four), "outdated; run: glimt schema > scenes/{FILE}");
+    assert!(there == schema_text(SchemaDraft::Four), "outdated; run: glimt schema > scenes/{FILE}");
     for scene in files("scenes") {
         let text = fs::read_to_string(&scene).expect("a scene");
         assert!(text.starts_with(LINE), "{}: {LINE}", scene.display());
@@ -66,7 +66,7 @@ fn bundled_scenes_and_starter_are_valid() {
         let text = fs::read_to_string(&path).expect("a scene");
         assert_eq!(found(&text), [[], []], "{}", path.display());
     }
-    assert_eq!(found(starter()), [[], []]);
+    assert_eq!(found(starter_scene()), [[], []]);
     // The starter scene with all keys that can be combined.
     let stands_alone = ["orbiter", "matrix", "image", "opacity"];
     let uncommented = |line: &str| match line.strip_prefix("# ") {
@@ -80,7 +80,7 @@ fn bundled_scenes_and_starter_are_valid() {
         }
         _ => format!("{line}\n"),
     };
-    let whole: String = starter().lines().map(uncommented).collect();
+    let whole: String = starter_scene().lines().map(uncommented).collect();
     assert_eq!(found(&whole), [[], []], "{whole}");
 }
 
@@ -118,7 +118,7 @@ fn mistakes_are_located() {
         ("[[sphre]]", "sphre"),
         ("[environment]\nfile = \"sky.txt\"", "environment.file"),
     ] {
-        for (draft, faults) in Draft::ALL.iter().zip(found(&format!("{SCENE}{line}\n"))) {
+        for (draft, faults) in SchemaDraft::ALL.iter().zip(found(&format!("{SCENE}{line}\n"))) {
             assert!(!faults.is_empty(), "{} {line}", draft.name());
             for (path, keyword) in faults {
                 assert_eq!(path, place, "{} {line}: {keyword}", draft.name());
@@ -151,7 +151,7 @@ fn schema_accepts_all_valid_scenes() {
         let text = fs::read_to_string(&path).expect("a file");
         let has_errors = glimt::scene::parse(text.as_str().into(), &path).scene.is_none();
         let Some(scene) = json(&text).filter(|_| !has_errors) else { continue };
-        for draft in Draft::ALL {
+        for draft in SchemaDraft::ALL {
             assert_eq!(faults(&schema(*draft), &scene), [], "{}", path.display());
         }
         count += 1;
@@ -164,8 +164,8 @@ fn new_writes_the_schema() {
     let dir = TestDir::new();
     dir.expect("new --schema first.toml", 0);
     let scene = String::from_utf8(dir.bytes("first.toml")).expect("UTF-8");
-    assert_eq!(scene, format!("{LINE}{}", starter()));
-    assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), schema_text(Draft::Four));
+    assert_eq!(scene, format!("{LINE}{}", starter_scene()));
+    assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), schema_text(SchemaDraft::Four));
     assert!(dir.run("check first.toml").status.success());
     // A current schema file is reused. A different file is kept, and the command fails.
     dir.expect("new --schema second.toml", 0);
@@ -183,8 +183,8 @@ fn new_writes_the_schema() {
 fn both_drafts_are_printed() {
     let dir = TestDir::new();
     for (line, draft, uri) in [
-        ("schema", Draft::Four, "http://json-schema.org/draft-04/schema#"),
-        ("schema --draft 2020-12", Draft::Latest, "https://json-schema.org/draft/2020-12/schema"),
+        ("schema", SchemaDraft::Four, "http://json-schema.org/draft-04/schema#"),
+        ("schema --draft 2020-12", SchemaDraft::Latest, "https://json-schema.org/draft/2020-12/schema"),
     ] {
         let output = dir.run(line);
         let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON");

@@ -103,7 +103,7 @@ fn views_are_shown_and_saved_on_request() {
     terminal.wait_for("v beauty");
     terminal.wait_for("done");
     // Switching back to the scene's own image does not replace the written image.
-    terminal.wait_for_message(&messages::other_image_with("scene.png", "view normal"));
+    terminal.wait_for_message(&messages::written_image_differs("scene.png", "view normal"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
     terminal.press("w");
     terminal.wait_for_message(&messages::files_written("scene.png"));

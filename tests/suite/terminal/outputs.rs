@@ -95,7 +95,7 @@ fn w_is_not_offered_for_another_scenes_image() {
     assert!(other.output().expect("it runs").status.success());
     let image = folder.bytes("scene.png");
     let lost = ExternalChange::ReplacedByOtherScene;
-    terminal.wait_for(&messages::output_kept("scene.png", lost.words()));
+    terminal.wait_for(&messages::output_not_overwritten("scene.png", lost.describe()));
     terminal.press("w");
     terminal.wait_for("other/scene.toml");
     assert_eq!(folder.bytes("scene.png"), image);

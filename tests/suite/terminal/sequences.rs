@@ -124,7 +124,7 @@ enum SequenceEnd {
 }
 
 fn run(seed: u64, text: &str, options: &[&str], known: &mut HashMap<String, Vec<u8>>) {
-    let mut dice = Dice(Box::new(glimt::math::random::unit(seed)));
+    let mut dice = Dice(Box::new(glimt::math::random::unit_generator(seed)));
     let mut run = RandomSession::new(text, options);
     run.terminal.wait("the screen", |screen| screen.contents().contains("scene.toml"));
     for _ in 0..3 + dice.below(8) {

@@ -25,7 +25,7 @@ struct Dice(Box<dyn FnMut() -> f32>);
 
 impl Dice {
     fn new(seed: u64) -> Self {
-        Self(Box::new(glimt::math::random::unit(seed)))
+        Self(Box::new(glimt::math::random::unit_generator(seed)))
     }
 
     /// An integer less than `count`.

@@ -18,10 +18,10 @@ pub fn ignore_progress(_done: u64, _total: u64) {}
 /// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check`] often enough to stop within
 /// 10 ms.
 #[derive(Clone, Debug, Default)]
-pub struct CancelToken(Arc<Shared>);
+pub struct CancelToken(Arc<TokenState>);
 
 #[derive(Debug, Default)]
-struct Shared {
+struct TokenState {
     cancelled: AtomicBool,
     paused: AtomicBool,
     held: Mutex<PauseTime>,

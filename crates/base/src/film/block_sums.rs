@@ -43,7 +43,7 @@ impl Film {
                 try_reserve_exact(&mut sums, area).map_err(|_| lacks())?;
                 earlier.push(sums);
             }
-            self.tile(tile).earlier = earlier;
+            self.lock_tile(tile).earlier = earlier;
         }
         self.blocks = blocks;
         Ok(self)
@@ -67,11 +67,11 @@ mod tests {
     use super::*;
     use crate::film::{Quantity, TileSamples};
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     #[test]
     fn sample_grouping_does_not_change_block_sums() {
-        let mut next = unit(3);
+        let mut next = unit_generator(3);
         let values: Vec<f32> = (0..41).map(|_| next() * 1e3).collect();
         let add = |blocks: SumOrder, counts: &[usize]| {
             let film = Film::new(1, 1, None).and_then(|film| film.with_sum_order(blocks)).expect("a film");
@@ -80,13 +80,13 @@ mod tests {
                 let (some, others) = rest.split_at(count);
                 let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
                 let radiance = some.iter().map(|value| Vec3::splat(*value)).collect();
-                film.add(
+                film.add_samples(
                     0,
                     &TileSamples { pixels: rect.into(), samples: count as u32, radiance, negative: None },
                 );
                 rest = others;
             }
-            let mean = film.tile(0).mean(0).expect("samples");
+            let mean = film.lock_tile(0).mean(0).expect("samples");
             assert_eq!(film.pixel(Quantity::Samples, 0, 0), Some(Vec3::splat(41.0)));
             mean.x
         };

@@ -24,7 +24,7 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
 /// divided by the first step. A rare bright sample affects all three steps and results in a rate of two, as
 /// for independent samples, even if only a few pixels contain one.
 #[derive(Debug, Default)]
-pub(super) struct SquaredSteps {
+pub(super) struct SquaredMeanChanges {
     /// Luminance of each pixel at its last power-of-two sample count.
     last: Vec<f32>,
     /// Luminance of each pixel at the sample count halfway to the next power of two.
@@ -58,9 +58,9 @@ struct StepPair {
     before: Option<f64>,
 }
 
-impl SquaredSteps {
+impl SquaredMeanChanges {
     /// Reserves memory for the steps of `area` pixels. Returns `None` if the allocation fails.
-    pub(super) fn reserved(area: usize) -> Option<Self> {
+    pub(super) fn try_with_capacity(area: usize) -> Option<Self> {
         let reserved = || {
             let mut values = Vec::new();
             try_reserve_exact(&mut values, area).ok()?;
@@ -70,7 +70,7 @@ impl SquaredSteps {
     }
 
     /// Resizes the lists to `area` pixels. Cannot fail if the memory was reserved.
-    pub(super) fn fill(&mut self, area: usize) {
+    pub(super) fn resize(&mut self, area: usize) {
         for values in [&mut self.last, &mut self.half_way, &mut self.recent] {
             values.resize(area, 0.0);
         }
@@ -81,7 +81,7 @@ impl SquaredSteps {
         self.levels.len()
     }
 
-    /// Serializes all numbers as 32-bit words in the order that [`SquaredSteps::read`] expects.
+    /// Serializes all numbers as 32-bit words in the order that [`SquaredMeanChanges::read`] expects.
     pub(super) fn write_words(&self, put: &mut impl FnMut(u32)) {
         for values in [&self.last, &self.half_way, &self.recent] {
             values.iter().for_each(|value| put(value.to_bits()));
@@ -127,7 +127,7 @@ impl SquaredSteps {
 
     /// Number of additional samples after which a pixel with `count` samples is recorded again. Pixels are
     /// recorded at powers of two and halfway between them.
-    pub(super) fn samples_to_next_step(count: u32) -> usize {
+    pub(super) fn samples_to_next_record(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();
         let half_way = power / 4 * 3;
@@ -136,7 +136,7 @@ impl SquaredSteps {
     }
 
     /// Records the luminance of a pixel in the specified cell and half, at a sample count determined by
-    /// [`SquaredSteps::samples_to_next_step`].
+    /// [`SquaredMeanChanges::samples_to_next_record`].
     pub(super) fn record(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let rounded = luminance as f32;
         if !count.is_power_of_two() {
@@ -185,7 +185,7 @@ impl SquaredSteps {
 
     /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of
     /// every cell. `None` if unknown, including for fewer than 16 samples.
-    fn quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
+    fn quadrupling_variance_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
             let steps = self.last_four_steps(level, (cell, half), false)?;
@@ -260,7 +260,7 @@ const CHANCE_FALL: f64 = 2.3;
 const LASTING: f64 = 0.65;
 
 /// Penalty for a variance reduction measured from few pixels: the coefficient of the squared
-/// [`SquaredSteps::variance_uncertainty`].
+/// [`SquaredMeanChanges::variance_uncertainty`].
 const DOUBT: f64 = 2.0;
 
 /// Trusted fraction of a variance reduction measured over two steps.
@@ -281,7 +281,7 @@ const FOURFOLD_MOST: f64 = 40.0;
 impl Convergence {
     /// Typical long-term exponent: the variance falls with this power of the sample count. Does not depend on
     /// the latest steps.
-    pub fn typical_exponent(self) -> f64 {
+    pub fn typical_variance_exponent(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
             Self::Photons => 1.0,
@@ -290,7 +290,7 @@ impl Convergence {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
     /// tile.
-    fn variance_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
+    fn variance_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
         steps
             .variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
@@ -298,8 +298,8 @@ impl Convergence {
 
     /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the
     /// specified halves of a tile.
-    pub(super) fn predicted_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
-        expected_rate(
+    pub(super) fn predicted_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
+        expected_variance_reduction(
             Self::variance_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
@@ -313,7 +313,7 @@ impl Convergence {
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
     pub(super) fn variance(
-        steps: &SquaredSteps,
+        steps: &SquaredMeanChanges,
         (cell, half): (usize, usize),
         count: u32,
         is_relative: bool,
@@ -322,7 +322,7 @@ impl Convergence {
         let StepPair { last, before } = steps.step_pair(level, (cell, half), is_relative)?;
         let fall = Self::variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = expected_rate(fall, steps.reduction_confidence(level, &[half]));
+        let rate = expected_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = pixel_variance(step, count, rate);
         let variance = match Self::variance_by_quadrupling(steps, level, (cell, half), is_relative) {
             Some(four) => (by_two * pixel_variance(four, count, 2.0)).sqrt(),
@@ -334,13 +334,13 @@ impl Convergence {
     /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
     /// predicted from the reduction per quadrupling of the sample count. `None` for fewer than 16 samples.
     fn variance_by_quadrupling(
-        steps: &SquaredSteps,
+        steps: &SquaredMeanChanges,
         level: usize,
         at: (usize, usize),
         is_relative: bool,
     ) -> Option<f64> {
         let [last, before, ..] = steps.last_four_steps(level, at, is_relative)?;
-        let fall = steps.quadrupling_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
+        let fall = steps.quadrupling_variance_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
         let lasting =
             FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.reduction_confidence(level, &[at.1]);
         let rate = (FOURFOLD_RATE + lasting).min(FOURFOLD_MOST);
@@ -350,7 +350,7 @@ impl Convergence {
 
 /// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
 /// confidence in this measurement.
-fn expected_rate(fall: f64, trust: f64) -> f64 {
+fn expected_variance_reduction(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 

@@ -26,7 +26,7 @@ pub(super) fn aces(color: Vec3) -> Vec3 {
 /// linearized with a display gamma of 2.2.
 pub(super) fn agx(color: Vec3) -> Vec3 {
     let inset = apply_color_matrix(&AGX_INSET, color);
-    let encoded = Vec3::from_array(inset.to_array().map(agx_sigmoid_of_stops));
+    let encoded = Vec3::from_array(inset.to_array().map(agx_tone_curve));
     let outset = clamp(apply_color_matrix(&AGX_OUTSET, encoded));
     Vec3::from_array(outset.to_array().map(|x| pow(x, 2.2)))
 }
@@ -45,7 +45,7 @@ const AGX_OUTSET: [Vec3; 3] = [
 /// Log2 range mapped to [0, 1]: from 10 stops below middle gray (0.18) to 6.5 above.
 const AGX_STOPS: [f32; 2] = [-12.473_931, 4.026_069];
 
-fn agx_sigmoid_of_stops(x: f32) -> f32 {
+fn agx_tone_curve(x: f32) -> f32 {
     let [low, high] = AGX_STOPS;
     agx_sigmoid((log2(x.max(f32::MIN_POSITIVE)).clamp(low, high) - low) / (high - low))
 }

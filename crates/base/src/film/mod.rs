@@ -1,8 +1,8 @@
 //! Films (sums of samples), tone mapping and finished images.
 //!
 //! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance`].
-//! [`Previewer`] scales the film to screen size during rendering. [`tone::develop`] converts the radiance or
-//! a preview to a [`Picture`].
+//! [`Previewer`] scales the film to screen size during rendering. [`tone::tone_map_to_8_bits`] converts the radiance or
+//! a preview to a [`Srgb8Image`].
 //!
 //! Large images are processed on all threads of the caller's rayon pool, or on the calling thread outside a
 //! pool. The caller chooses the number of threads.
@@ -27,7 +27,7 @@ pub mod tone;
 pub use convergence::Convergence;
 pub use noise::{CellHalfNoise, ImageNoise, samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, Pixels};
-pub use prepass::{PREPASS_SAMPLES, Prepass};
+pub use prepass::{BrightnessPrepass, PREPASS_SAMPLES};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;
@@ -50,7 +50,7 @@ const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
 /// Whether the current thread belongs to a rayon pool that can share work.
-fn is_in_pool() -> bool {
+fn is_in_thread_pool() -> bool {
     rayon::current_thread_index().is_some()
 }
 
@@ -75,14 +75,14 @@ impl Rect {
 
     /// Pixels in both rectangles, or `None` if they do not overlap.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
-        let (x, width) = overlap((self.x, self.width), (other.x, other.width))?;
-        let (y, height) = overlap((self.y, self.height), (other.y, other.height))?;
+        let (x, width) = intersect_intervals((self.x, self.width), (other.x, other.width))?;
+        let (y, height) = intersect_intervals((self.y, self.height), (other.y, other.height))?;
         Some(Self { x, y, width, height })
     }
 }
 
 /// Intersection of two intervals (start, length). Uses u64 because start + length may overflow u32.
-fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
+fn intersect_intervals(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     let end = |(start, length): (u32, u32)| u64::from(start) + u64::from(length);
     let start = a.0.max(b.0);
     let length = end(a).min(end(b)).checked_sub(u64::from(start)).filter(|&length| length > 0)?;
@@ -133,7 +133,7 @@ impl RadianceImage {
 
     /// Replaces the pixels in a rectangle with `pixels`, which are in row-major order. Non-finite values
     /// become black, as in a [`Film`].
-    pub fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
+    pub fn set_rect(&mut self, rect: Rect, pixels: &[Vec3]) {
         let width = self.width as usize;
         let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);
         for (row, new) in rows.zip(pixels.chunks_exact(rect.width as usize)) {
@@ -153,7 +153,7 @@ impl RadianceImage {
 
 /// An 8-bit sRGB image for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct Srgb8Image {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::convergence::{Convergence, luminance};
-use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
+use super::{CELLS, Film, PixelSubset, Pixels, is_in_thread_pool};
 
 /// Sample count at which the standard error drops to `part` times its value at `count` samples, if the
 /// variance falls with this power of the sample count.
@@ -44,7 +44,7 @@ struct NoiseSums {
 
 impl NoiseSums {
     /// Expected exponent for the next doubling, or the exponent for independent samples if there is no noise.
-    fn power(self) -> f64 {
+    fn convergence_exponent(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
@@ -62,17 +62,17 @@ impl Film {
     ///
     /// About 0 if all samples of each pixel are equal. `None` if a pixel has fewer than two samples.
     pub fn relative_error(&self) -> Option<f64> {
-        self.noise().map(|noise| noise.relative_error)
+        self.image_noise().map(|noise| noise.relative_error)
     }
 
     /// Returns [`Film::relative_error`] and its convergence exponent.
-    pub fn noise(&self) -> Option<ImageNoise> {
+    pub fn image_noise(&self) -> Option<ImageNoise> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(ImageNoise { relative_error, power: sums.power() })
+        Some(ImageNoise { relative_error, power: sums.convergence_exponent() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
@@ -90,7 +90,7 @@ impl Film {
     fn noise_sums(&self) -> Option<NoiseSums> {
         let of_tile = |tile: usize| {
             let mut sums = NoiseSums::default();
-            if self.tile(tile).counts.is_empty() {
+            if self.lock_tile(tile).counts.is_empty() {
                 return None;
             }
             let halves = (CELLS * tile..CELLS * (tile + 1)).flat_map(|cell| [(cell, 0), (cell, 1)]);
@@ -115,13 +115,13 @@ impl Film {
     /// Calls `f` for every tile and returns the results in tile order. Runs in parallel inside a rayon pool.
     pub fn map_tiles<T: Send>(&self, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
-        if is_in_pool() { tiles.into_par_iter().map(f).collect() } else { tiles.map(f).collect() }
+        if is_in_thread_pool() { tiles.into_par_iter().map(f).collect() } else { tiles.map(f).collect() }
     }
 
     /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
     pub fn cell_half_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
-        let tile = self.tile(number / CELLS);
+        let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
         for pixel in self.cell_half_pixels(number, half) {
             sum += luminance(tile.mean(pixel)?);
@@ -141,14 +141,14 @@ impl Film {
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
     /// completed that doubling. `None` if there are not enough steps.
     pub fn tile_variance_reduction(&self, tile: usize) -> Option<f64> {
-        let tile = self.tile(tile);
+        let tile = self.lock_tile(tile);
         tile.steps.variance_reduction(tile.steps.level_count(), &[0, 1])
     }
 
     /// Expected relative standard deviation of a tile's variance, measured in one half of each cell: 1 if a
     /// single pixel dominates, lower if many pixels contribute. Ignores cells with fewer samples than others.
     pub fn tile_variance_uncertainty(&self, tile: usize, half: usize) -> f64 {
-        let tile = self.tile(tile);
+        let tile = self.lock_tile(tile);
         tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])
     }
 
@@ -165,7 +165,8 @@ impl Film {
                 pixels += count;
             }
         }
-        let (variance, mean, power) = (sums.variance / pixels, sums.mean / pixels, sums.power());
+        let (variance, mean, power) =
+            (sums.variance / pixels, sums.mean / pixels, sums.convergence_exponent());
         (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 
@@ -174,7 +175,7 @@ impl Film {
     /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)). `None` if `count` is less than two or exceeds
     /// the pixels' sample count, or if the half has no pixels.
     pub fn cell_half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
-        let tile = self.tile(number / CELLS);
+        let tile = self.lock_tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
         let (sum, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), count, true)?;
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
@@ -204,7 +205,7 @@ impl Film {
     /// Mean luminance of the image, or `None` if a pixel has no samples.
     pub fn mean_luminance(&self) -> Option<f64> {
         let of_tile = |tile: usize| {
-            let tile = self.tile(tile);
+            let tile = self.lock_tile(tile);
             if tile.counts.is_empty() {
                 return None;
             }
@@ -220,7 +221,7 @@ mod tests {
     use super::*;
     use crate::film::{Rect, TILE_SIZE, TileSamples};
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     /// A single-row film with these gray samples for each pixel.
     fn film(pixels: &[&[f32]]) -> Film {
@@ -228,7 +229,7 @@ mod tests {
         for (x, values) in pixels.iter().enumerate() {
             let rect = Rect { x: x as u32, y: 0, width: 1, height: 1 };
             let radiance = values.iter().map(|&value| Vec3::splat(value)).collect();
-            film.add(
+            film.add_samples(
                 x / TILE_SIZE as usize,
                 &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
             );
@@ -287,7 +288,7 @@ mod tests {
     #[test]
     fn independent_samples_have_the_expected_error() {
         // Variance reductions that may be due to chance are only partly trusted.
-        let mut next = unit(5);
+        let mut next = unit_generator(5);
         for count in [16, 64, 100, 1024] {
             let pixels: Vec<Vec<f32>> = (0..4000).map(|_| (0..count).map(|_| next()).collect()).collect();
             let pixels: Vec<&[f32]> = pixels.iter().map(Vec::as_slice).collect();
@@ -308,7 +309,7 @@ mod tests {
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");
-        let mut next = unit(11);
+        let mut next = unit_generator(11);
         let mut square = 0.0;
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
@@ -320,7 +321,10 @@ mod tests {
                 square += (mean - truth) * (mean - truth);
                 radiance.extend(values.into_iter().map(Vec3::splat));
             }
-            film.add(tile, &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None });
+            film.add_samples(
+                tile,
+                &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None },
+            );
         }
         (film, (square / f64::from(SIDE * SIDE)).sqrt() / truth)
     }
@@ -340,7 +344,7 @@ mod tests {
     #[test]
     fn error_is_accurate_for_any_convergence_rate() {
         for count in [16, 64, 256] {
-            let mut next = unit(5);
+            let mut next = unit_generator(5);
             let independent = reported(count, 0.5, |_, _| next());
             assert!((0.95..1.15).contains(&independent), "{count} independent samples: {independent}");
             let smooth = reported(count, 0.5, filling);
@@ -351,7 +355,7 @@ mod tests {
     #[test]
     fn error_is_accurate_for_rare_bright_samples() {
         for count in [16, 64, 256] {
-            let mut next = unit(17);
+            let mut next = unit_generator(17);
             let rare = |number, bits| if next() < 1e-3 { 100.0 } else { filling(number, bits) };
             let ratio = reported(count, 0.1 + 0.5 * 0.999, rare);
             assert!((0.95..1.15).contains(&ratio), "{count}: {ratio}");
@@ -360,9 +364,10 @@ mod tests {
 
     #[test]
     fn convergence_rate_is_estimated() {
-        let power =
-            |sample: &mut dyn FnMut(u32, u32) -> f32| square(64, 0.5, sample).0.noise().expect("noise").power;
-        let mut next = unit(5);
+        let power = |sample: &mut dyn FnMut(u32, u32) -> f32| {
+            square(64, 0.5, sample).0.image_noise().expect("noise").power
+        };
+        let mut next = unit_generator(5);
         let independent = power(&mut |_, _| next());
         assert!((1.0..1.1).contains(&independent), "{independent}");
         assert!(power(&mut filling) > 1.5, "{}", power(&mut filling));

@@ -14,11 +14,11 @@ pub const PREPASS_SAMPLES: u32 = 16;
 
 /// Brightness prepass for an image or crop.
 #[derive(Clone, Copy, Debug)]
-pub struct Prepass {
+pub struct BrightnessPrepass {
     crop: Rect,
 }
 
-impl Prepass {
+impl BrightnessPrepass {
     /// Creates the prepass for the pixels in `crop`.
     pub fn new(crop: Rect) -> Self {
         Self { crop }
@@ -40,26 +40,26 @@ impl Prepass {
     }
 
     /// Mean luminance of the prepass pixels in a film, or `None` if one of them has no samples.
-    pub fn film_mean(&self, film: &Film) -> Option<f64> {
-        self.mean(|number| {
+    pub fn film_mean_luminance(&self, film: &Film) -> Option<f64> {
+        self.mean_luminance(|number| {
             let (x, y) = self.position(number);
             film.pixel(Quantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
         })
     }
 
     /// Mean of the prepass pixels' luminances.
-    pub fn mean(&self, luminance_of: impl Fn(u64) -> Option<f64>) -> Option<f64> {
+    pub fn mean_luminance(&self, luminance_of: impl Fn(u64) -> Option<f64>) -> Option<f64> {
         let sum: Option<f64> = (0..self.count()).map(luminance_of).sum();
         sum.map(|sum| sum / self.count() as f64)
     }
 
     /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film. `None` if
     /// there are no samples.
-    pub fn luminance(mut samples: TileSamples) -> Option<f64> {
+    pub fn sample_luminance(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
         let film = Film::new(1, 1, None).ok()?;
-        film.add(0, &samples);
+        film.add_samples(0, &samples);
         film.pixel(Quantity::Radiance, 0, 0).map(|radiance| luminance(radiance.as_dvec3()))
     }
 }
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn prepass_pixels_are_spread_over_the_image() {
         for crop in [(4096, 2048), (97, 501), (64, 64), (3, 5)] {
-            let prepass = Prepass::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
+            let prepass = BrightnessPrepass::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
             let places: HashSet<_> = (0..prepass.count()).map(|number| prepass.position(number)).collect();
             assert_eq!(places.len() as u64, u64::from(crop.0 * crop.1).min(4096));
             let inside = |&(x, y): &(u32, u32)| (7..7 + crop.0).contains(&x) && (9..9 + crop.1).contains(&y);
@@ -96,17 +96,19 @@ mod tests {
             TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None }
         };
         for tile in 0..film.tile_count() {
-            film.add(tile, &samples(film.tile_rect(tile).expect("a tile")));
+            film.add_samples(tile, &samples(film.tile_rect(tile).expect("a tile")));
         }
-        let prepass = Prepass::new(crop);
-        let apart = prepass.mean(|number| {
+        let prepass = BrightnessPrepass::new(crop);
+        let apart = prepass.mean_luminance(|number| {
             let (x, y) = prepass.position(number);
-            Prepass::luminance(samples(Rect { x, y, width: 1, height: 1 }))
+            BrightnessPrepass::sample_luminance(samples(Rect { x, y, width: 1, height: 1 }))
         });
-        assert_eq!(prepass.film_mean(&film), apart);
+        assert_eq!(prepass.film_mean_luminance(&film), apart);
         assert!(
             apart.is_some()
-                && Prepass::new(crop).film_mean(&Film::new(40, 3, None).expect("a film")).is_none()
+                && BrightnessPrepass::new(crop)
+                    .film_mean_luminance(&Film::new(40, 3, None).expect("a film"))
+                    .is_none()
         );
     }
 }

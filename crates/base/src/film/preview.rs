@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::resample::Axis;
-use super::{Film, Quantity, RadianceImage, is_in_pool};
+use super::resample::AxisResampler;
+use super::{Film, Quantity, RadianceImage, is_in_thread_pool};
 use crate::math::{DVec3, Vec3};
 
 /// Resizes a film with an exact box filter. Each tile's contribution is cached, so an update processes only
@@ -36,14 +36,14 @@ struct TileContribution {
     /// Number of columns.
     width: u32,
     /// Weighted sums in row-major order.
-    cells: Vec<Weighted>,
+    cells: Vec<WeightedColor>,
 }
 
 /// A weighted sum and the sum of its weights: 16 bytes per preview pixel.
-type Weighted = (Vec3, f32);
+type WeightedColor = (Vec3, f32);
 
-/// Like [`Weighted`], in double precision for summation.
-type Sum = (DVec3, f64);
+/// Like [`WeightedColor`], in double precision for summation.
+type WeightedColorF64 = (DVec3, f64);
 
 /// Number of rows summed at a time. Summing in bands avoids a second copy of the whole preview.
 const BAND_ROWS: u32 = 32;
@@ -54,11 +54,11 @@ const TILES_AT_ONCE: usize = 32;
 impl Previewer {
     /// Creates a previewer for images of this size, which must be at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Self::of(Quantity::Radiance, width, height)
+        Self::with_quantity(Quantity::Radiance, width, height)
     }
 
     /// Creates a previewer that shows this quantity.
-    pub fn of(quantity: Quantity, width: u32, height: u32) -> Self {
+    pub fn with_quantity(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }
@@ -76,12 +76,12 @@ impl Previewer {
     /// Bytes used by the cache.
     pub fn memory_bytes(&self) -> u64 {
         let cells: usize = self.shares.iter().map(|share| share.cells.capacity()).sum();
-        (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<TileContribution>()) as u64
+        (cells * size_of::<WeightedColor>() + self.shares.capacity() * size_of::<TileContribution>()) as u64
     }
 
-    /// Whether every tile of the film has been processed at least once. If so, [`Previewer::picture`] has no
+    /// Whether every tile of the film has been processed at least once. If so, [`Previewer::build_image`] has no
     /// gaps but may be slightly outdated.
-    pub fn is_whole(&self) -> bool {
+    pub fn covers_all_tiles(&self) -> bool {
         self.is_whole
     }
 
@@ -94,8 +94,10 @@ impl Previewer {
             self.shares = vec![TileContribution::default(); film.tile_count()];
             (self.next, self.is_whole) = (0, false);
         }
-        let axes = [Axis::new(film.width(), self.width), Axis::new(film.height(), self.height)];
-        let at_once = if is_in_pool() { TILES_AT_ONCE * rayon::current_num_threads() } else { TILES_AT_ONCE };
+        let axes =
+            [AxisResampler::new(film.width(), self.width), AxisResampler::new(film.height(), self.height)];
+        let at_once =
+            if is_in_thread_pool() { TILES_AT_ONCE * rayon::current_num_threads() } else { TILES_AT_ONCE };
         let mut looked = 0;
         while looked < self.shares.len() {
             let end = (self.next + at_once).min(self.shares.len());
@@ -112,13 +114,13 @@ impl Previewer {
 
     /// Builds the preview from the processed tiles. Pixels without samples show `base` (a coarse image of any
     /// size), or black if there is no base.
-    pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
+    pub fn build_image(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
         let mut base = base.map(Cow::Borrowed);
         for top in (0..self.height).step_by(BAND_ROWS as usize) {
             let rows = top..self.height.min(top + BAND_ROWS);
-            let mut band: Vec<Sum> = vec![(DVec3::ZERO, 0.0); width * rows.len()];
+            let mut band: Vec<WeightedColorF64> = vec![(DVec3::ZERO, 0.0); width * rows.len()];
             for share in &self.shares {
                 share.add_to(&mut band, rows.clone(), self.width);
             }
@@ -145,14 +147,14 @@ fn refresh(
     shares: &mut [TileContribution],
     first: usize,
     (film, quantity): (&Film, Quantity),
-    axes: [Axis; 2],
+    axes: [AxisResampler; 2],
 ) {
     let refresh = |(i, share): (usize, &mut TileContribution)| {
-        if film.tile(first + i).revision != share.revision {
+        if film.lock_tile(first + i).revision != share.revision {
             share.refresh((film, quantity), first + i, axes);
         }
     };
-    if is_in_pool() && shares.len() > TILES_AT_ONCE {
+    if is_in_thread_pool() && shares.len() > TILES_AT_ONCE {
         shares.par_iter_mut().enumerate().with_min_len(TILES_AT_ONCE / 4).for_each(refresh);
     } else {
         shares.iter_mut().enumerate().for_each(refresh);
@@ -160,17 +162,22 @@ fn refresh(
 }
 
 impl TileContribution {
-    fn refresh(&mut self, (film, quantity): (&Film, Quantity), tile: usize, [columns, rows]: [Axis; 2]) {
+    fn refresh(
+        &mut self,
+        (film, quantity): (&Film, Quantity),
+        tile: usize,
+        [columns, rows]: [AxisResampler; 2],
+    ) {
         let Some(rect) = film.tile_rect(tile) else { return };
-        let first = |axis: Axis, index| axis.overlaps(index).next().map_or(0, |(new, _)| new);
-        let last = |axis: Axis, index| axis.overlaps(index).last().map_or(0, |(new, _)| new);
+        let first = |axis: AxisResampler, index| axis.overlaps(index).next().map_or(0, |(new, _)| new);
+        let last = |axis: AxisResampler, index| axis.overlaps(index).last().map_or(0, |(new, _)| new);
         (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));
         self.width = last(columns, rect.x + rect.width - 1) - self.x + 1;
         let height = last(rows, rect.y + rect.height - 1) - self.y + 1;
-        let mut sums: Vec<Sum> = vec![(DVec3::ZERO, 0.0); self.width as usize * height as usize];
+        let mut sums: Vec<WeightedColorF64> = vec![(DVec3::ZERO, 0.0); self.width as usize * height as usize];
         let across: Vec<Vec<_>> =
             (rect.x..rect.x + rect.width).map(|x| columns.overlaps(x).collect()).collect();
-        let tile = film.tile(tile);
+        let tile = film.lock_tile(tile);
         self.revision = tile.revision;
         for y in 0..rect.height {
             let down = rows.overlaps(rect.y + y);
@@ -193,7 +200,7 @@ impl TileContribution {
     }
 
     /// Adds this contribution to a range of preview rows.
-    fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
+    fn add_to(&self, band: &mut [WeightedColorF64], rows: Range<u32>, picture_width: u32) {
         let width = self.width.max(1) as usize;
         let first = rows.start.saturating_sub(self.y) as usize;
         let own = self.cells.chunks_exact(width).zip(self.y..).skip(first);
@@ -221,7 +228,7 @@ mod tests {
             {
                 if let Some(value) = value(x, y) {
                     let rect = Rect { x, y, width: 1, height: 1 };
-                    film.add(
+                    film.add_samples(
                         tile,
                         &TileSamples {
                             pixels: rect.into(),
@@ -239,7 +246,7 @@ mod tests {
     fn preview(film: &Film, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
         let mut previewer = Previewer::new(width, height);
         assert!(previewer.update(film, None));
-        previewer.picture(base)
+        previewer.build_image(base)
     }
 
     fn pattern(x: u32, y: u32) -> f32 {
@@ -291,7 +298,7 @@ mod tests {
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
         let mut picture = |film: &Film| {
             previewer.update(film, None);
-            previewer.picture(None)
+            previewer.build_image(None)
         };
         assert_eq!(picture(&first), preview(&first, 9, 5, None));
         let rect = first.tile_rect(1).expect("a tile");
@@ -301,7 +308,7 @@ mod tests {
             radiance: vec![Vec3::Y; rect.area() * 2],
             negative: None,
         };
-        first.add(1, &samples);
+        first.add_samples(1, &samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
         assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile should be visible");
@@ -315,7 +322,7 @@ mod tests {
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
             let value = Vec3::splat(tile as f32);
-            film.add(
+            film.add_samples(
                 tile,
                 &TileSamples {
                     pixels: rect.into(),
@@ -349,15 +356,15 @@ mod tests {
         let past = Instant::now();
         let slices = film.tile_count().div_ceil(TILES_AT_ONCE);
         for slice in 1..=slices {
-            assert!(!previewer.is_whole());
+            assert!(!previewer.covers_all_tiles());
             assert!(!previewer.update(&film, Some(past)), "slice {slice}");
         }
-        assert!(previewer.is_whole());
-        assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
+        assert!(previewer.covers_all_tiles());
+        assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
         // Changes to tiles before the current position are processed in the next pass.
         previewer.update(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
-        film.add(
+        film.add_samples(
             0,
             &TileSamples {
                 pixels: rect.into(),
@@ -369,8 +376,8 @@ mod tests {
         for _ in 0..slices {
             previewer.update(&film, Some(past));
         }
-        assert!(previewer.is_whole());
-        assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
+        assert!(previewer.covers_all_tiles());
+        assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
         assert!(previewer.update(&film, None));
     }
 }

@@ -33,7 +33,7 @@ impl Film {
         let mut image = RadianceImage::black(self.width(), self.height());
         for i in 0..self.tile_count() {
             let rect = tile_rect(self.crop(), i);
-            let tile = self.tile(i);
+            let tile = self.lock_tile(i);
             for row in 0..rect.height {
                 let start = (rect.y + row) as usize * self.width() as usize + rect.x as usize;
                 let line = &mut image.pixels[start..][..rect.width as usize];
@@ -58,7 +58,7 @@ impl Film {
         let place = (down % TILE_SIZE, right % TILE_SIZE);
         let columns = tile_rect(self.crop(), index).width as usize;
         let index_in_tile = place.0 as usize * columns + place.1 as usize;
-        let value = self.tile(index).value(quantity, (index_in_tile, columns));
+        let value = self.lock_tile(index).value(quantity, (index_in_tile, columns));
         value.map(DVec3::as_vec3)
     }
 }
@@ -70,12 +70,12 @@ impl Tile {
         match quantity {
             Quantity::Radiance => self.mean(index),
             Quantity::Samples => (self.count(index) > 0).then(|| DVec3::splat(f64::from(self.count(index)))),
-            Quantity::Error => self.error(index, columns).map(DVec3::splat),
+            Quantity::Error => self.standard_error(index, columns).map(DVec3::splat),
         }
     }
 
     /// Standard error of a pixel's luminance. 0 for a single sample, from which no error can be estimated.
-    fn error(&self, index: usize, columns: usize) -> Option<f64> {
+    fn standard_error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
         let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
@@ -103,20 +103,20 @@ impl Tile {
 mod tests {
     use super::*;
     use crate::film::TileSamples;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     /// A 20 × 20 pixel film with `count` gray samples per pixel.
     fn film(count: u32, mut next: impl FnMut(u32) -> f32) -> Film {
         let film = Film::new(20, 20, None).expect("a film");
         let rect = Rect { x: 0, y: 0, width: 20, height: 20 };
         let radiance = (0..400 * count).map(|i| Vec3::splat(next(i / count))).collect();
-        film.add(0, &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None });
+        film.add_samples(0, &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None });
         film
     }
 
     #[test]
     fn pixel_error_matches_the_exact_error() {
-        let mut next = unit(9);
+        let mut next = unit_generator(9);
         for count in [2, 16, 100] {
             let errors = film(count, |_| next()).image(Quantity::Error).pixels;
             let exact = (1.0 / 12.0 / f64::from(count)).sqrt();
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn noisy_pixels_do_not_affect_distant_pixels() {
-        let mut next = unit(3);
+        let mut next = unit_generator(3);
         // The right half is noisy.
         let half = film(16, |pixel| if pixel % 20 < 10 { 0.4 } else { next() });
         let errors = half.image(Quantity::Error).pixels;

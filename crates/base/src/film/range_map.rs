@@ -10,7 +10,7 @@ pub enum RangeMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is unknown until [`RangeMap::resolved_for`] sets it. Maps everything to black.
+    /// A mapping whose range is unknown until [`RangeMap::with_image_range`] sets it. Maps everything to black.
     Unresolved(DataKind),
     /// A mapping for values in this range.
     Resolved(DataKind, DataRange),
@@ -47,10 +47,10 @@ const LEAST_BIAS: f32 = 1e-3;
 
 impl RangeMap {
     /// Sets the range from the values in an image.
-    pub fn resolved_for(self, image: &RadianceImage) -> Self {
+    pub fn with_image_range(self, image: &RadianceImage) -> Self {
         match self {
             Self::None | Self::Resolved(..) => self,
-            Self::Unresolved(kind) => Self::Resolved(kind, DataRange::of(kind, image)),
+            Self::Unresolved(kind) => Self::Resolved(kind, DataRange::from_image(kind, image)),
         }
     }
 
@@ -75,7 +75,7 @@ impl RangeMap {
 }
 
 impl DataRange {
-    fn of(kind: DataKind, image: &RadianceImage) -> Self {
+    fn from_image(kind: DataKind, image: &RadianceImage) -> Self {
         let mut seen = match kind {
             DataKind::Distances => distances(image),
             DataKind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
@@ -144,7 +144,7 @@ mod tests {
     }
 
     fn shown(kind: DataKind, numbers: &[f32]) -> Vec<f32> {
-        let map = RangeMap::Unresolved(kind).resolved_for(&picture(numbers));
+        let map = RangeMap::Unresolved(kind).with_image_range(&picture(numbers));
         numbers.iter().map(|x| map.apply(Vec3::splat(*x)).x).collect()
     }
 
@@ -159,16 +159,16 @@ mod tests {
         assert_near(&shown(DataKind::Distances, &[3.0; 4]), &[1.0; 4]);
         assert_near(&shown(DataKind::Distances, &[0.0; 4]), &[0.0; 4]);
         let range =
-            RangeMap::Unresolved(DataKind::Distances).resolved_for(&picture(&[2.0, 4.0, 6.0])).range();
+            RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[2.0, 4.0, 6.0])).range();
         assert_eq!(range.map(|range| (range.least, range.greatest)), Some((2.0, 6.0)));
-        let nothing = RangeMap::Unresolved(DataKind::Distances).resolved_for(&picture(&[0.0; 4]));
+        let nothing = RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[0.0; 4]));
         assert_eq!(nothing.range(), None);
     }
 
     #[test]
     fn subpixel_objects_determine_the_range() {
         let range = RangeMap::Unresolved(DataKind::Distances)
-            .resolved_for(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
+            .with_image_range(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
             .range();
         assert_eq!(range.map(|range| range.limits()), Some([2.0, 6.0]));
     }

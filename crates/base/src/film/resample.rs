@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::{RadianceImage, is_in_pool};
+use super::{RadianceImage, is_in_thread_pool};
 use crate::math::DVec3;
 
 /// Maps pixels along one axis to another resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Axis {
+pub(super) struct AxisResampler {
     from: u64,
     to: u64,
 }
 
-impl Axis {
+impl AxisResampler {
     /// Maps `from` pixels to `to` pixels, both at least 1.
     pub(super) fn new(from: u32, to: u32) -> Self {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
@@ -39,8 +39,8 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
     }
     let (width, height) = (width.max(1), height.max(1));
     // Use the inverse mapping to gather the old pixels that each new pixel covers. The overlaps are the same.
-    let columns = Axis::new(image.width, width).inverse();
-    let rows = Axis::new(image.height, height).inverse();
+    let columns = AxisResampler::new(image.width, width).inverse();
+    let rows = AxisResampler::new(image.height, height).inverse();
     let pixel = |i: usize| {
         let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
         for (y, row_weight) in rows.overlaps((i / width as usize) as u32) {
@@ -53,7 +53,7 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
         (sum / weights).as_vec3()
     };
     let all = 0..width as usize * height as usize;
-    let pixels = if is_in_pool() {
+    let pixels = if is_in_thread_pool() {
         all.into_par_iter().with_min_len(256).map(pixel).collect()
     } else {
         all.map(pixel).collect()
@@ -83,7 +83,7 @@ mod tests {
     proptest! {
         #[test]
         fn overlaps_conserve_pixel_areas(from in 1_u32..70, to in 1_u32..70) {
-            let axis = Axis::new(from, to);
+            let axis = AxisResampler::new(from, to);
             let mut filled = vec![0.0; to as usize];
             for old in 0..from {
                 let parts: Vec<_> = axis.overlaps(old).collect();

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 impl Film {
     /// Copies a rectangle of pixels without scaling. Pixels without samples show `base` (a full image of any
     /// size), or black if there is no base.
-    pub fn section(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
+    pub fn copy_region(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
             self.fill_from_base(base, rect, &mut image);
@@ -14,7 +14,7 @@ impl Film {
         for index in 0..self.tile_count() {
             let Some(place) = self.tile_rect(index) else { continue };
             let Some(part) = place.intersection(&rect) else { continue };
-            let tile = self.tile(index);
+            let tile = self.lock_tile(index);
             for y in part.y..part.y + part.height {
                 for x in part.x..part.x + part.width {
                     let columns = place.width as usize;
@@ -56,11 +56,14 @@ mod tests {
         for tile in (0..film.tile_count()).filter(|tile| tile % 2 == 0) {
             let rect = film.tile_rect(tile).expect("a tile");
             let radiance = (0..rect.area()).map(|i| Vec3::splat((tile * 10_000 + i) as f32)).collect();
-            film.add(tile, &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None });
+            film.add_samples(
+                tile,
+                &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
+            );
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };
         let rect = Rect { x: 20, y: 11, width: 60, height: 50 };
-        let section = film.section(Quantity::Radiance, rect, Some(&base));
+        let section = film.copy_region(Quantity::Radiance, rect, Some(&base));
         for (i, pixel) in (0..).zip(&section.pixels) {
             let (x, y) = (rect.x + i % rect.width, rect.y + i / rect.width);
             let below = if x < 50 { Vec3::X } else { Vec3::Y };

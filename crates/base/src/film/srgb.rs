@@ -12,15 +12,15 @@ const ONE_BITS: u32 = 127 << 23;
 const BUCKET_SHIFT: u32 = 23 - 8;
 const BUCKETS: usize = ((ONE_BITS - FIRST_EXPONENT_BITS) >> BUCKET_SHIFT) as usize;
 
-struct ByteTable {
+struct Srgb8Table {
     /// Byte at the start of each bucket.
     start: [u8; BUCKETS],
     /// Bits of the smallest float that encodes to byte `i` or more.
     threshold: [u32; 256],
 }
 
-static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
-    let mut table = ByteTable { start: [0; BUCKETS], threshold: [0; 256] };
+static TABLE: LazyLock<Srgb8Table> = LazyLock::new(|| {
+    let mut table = Srgb8Table { start: [0; BUCKETS], threshold: [0; 256] };
     for (byte, threshold) in table.threshold.iter_mut().enumerate() {
         *threshold = smallest_bits_for_byte(byte);
     }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::convergence::SquaredSteps;
+use super::convergence::SquaredMeanChanges;
 use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
@@ -39,7 +39,7 @@ impl StoredTile {
             let earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
             tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
-        tile.steps = SquaredSteps::read(area, levels, &mut || from.u32())?;
+        tile.steps = SquaredMeanChanges::read(area, levels, &mut || from.u32())?;
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
@@ -55,12 +55,12 @@ impl StoredTile {
     pub fn add_block(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
-            self.tile.fill(area);
+            self.tile.resize(area);
         }
         if self.tile.sums.len() != area {
             return Err(Malformed);
         }
-        let sums = block_of(&of.tile.earlier, &of.tile.sums, block).ok_or(Malformed)?;
+        let sums = block_sums(&of.tile.earlier, &of.tile.sums, block).ok_or(Malformed)?;
         let is_first = self.tile.earlier.is_empty();
         if is_first {
             self.tile.earlier = vec![sums.to_vec()];
@@ -68,7 +68,7 @@ impl StoredTile {
             add_block_sums(&mut self.tile.earlier[0], sums);
         }
         if let Some(negative) = &of.tile.negative {
-            let sums = block_of(&negative.earlier, &negative.sums, block).ok_or(Malformed)?;
+            let sums = block_sums(&negative.earlier, &negative.sums, block).ok_or(Malformed)?;
             let own =
                 self.tile.negative.get_or_insert_with(|| NegativeLobeSums::new(negative.weight, area, 1));
             add_block_sums(&mut own.earlier[0], sums);
@@ -86,7 +86,7 @@ impl StoredTile {
 }
 
 /// Pixel sums for a single block, which may be the block in progress.
-fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
+fn block_sums<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
         std::cmp::Ordering::Equal => Some(sums),
@@ -100,8 +100,8 @@ fn add_block_sums(sums: &mut [DVec3], others: &[DVec3]) {
 
 impl Film {
     /// Appends the serialized tile to `bytes` and returns whether the tile has samples.
-    pub fn store(&self, tile: usize, bytes: &mut Vec<u8>) -> bool {
-        let tile = self.tile(tile);
+    pub fn serialize_tile(&self, tile: usize, bytes: &mut Vec<u8>) -> bool {
+        let tile = self.lock_tile(tile);
         if tile.counts.is_empty() {
             return false;
         }
@@ -124,16 +124,16 @@ impl Film {
     ///
     /// # Errors
     /// [`Malformed`] if the tile does not fit this film.
-    pub fn restore(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
+    pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
         let area = self.tile_rect(tile).ok_or(Malformed)?.area();
         let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
         if sums.len() != area || earlier.len() != self.sum_order().kept_block_count() {
             return Err(Malformed);
         }
-        let mut own = self.tile(tile);
+        let mut own = self.lock_tile(tile);
         let revision = own.revision + 1;
         *own = Tile { sums, earlier, counts, negative, steps, revision };
-        own.fill(area);
+        own.resize(area);
         Ok(())
     }
 
@@ -145,7 +145,7 @@ impl Film {
         }
         let index = PixelSubset::Half(half).index(0, rect);
         let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
-        self.tile(cell / CELLS).count((y * tile.width + x) as usize)
+        self.lock_tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
 
     /// Adds the number of non-finite samples in restored tiles to [`Film::non_finite_samples`].
@@ -221,7 +221,7 @@ mod tests {
     use super::*;
     use crate::film::{BLOCK_SIZE, NegativeLobes, Rect, SumOrder, TileSamples};
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     /// Adds samples `range` from a fixed random sequence to each pixel of a 40 × 33 film.
     fn add(film: &Film, range: std::ops::Range<u32>, is_signed: bool) {
@@ -229,7 +229,7 @@ mod tests {
             let rect = film.tile_rect(tile).expect("a tile");
             let (mut radiance, mut is_negative) = (Vec::new(), Vec::new());
             for i in 0..rect.area() as u64 {
-                let mut next = unit(1 + i + 5000 * tile as u64);
+                let mut next = unit_generator(1 + i + 5000 * tile as u64);
                 for sample in 0..range.end {
                     let value = Vec3::new(next(), next(), next() * 1e4);
                     if range.contains(&sample) {
@@ -240,7 +240,7 @@ mod tests {
             }
             let negative = is_signed.then_some(NegativeLobes { weight: 0.1, is_negative });
             let samples = range.end - range.start;
-            film.add(tile, &TileSamples { pixels: rect.into(), samples, radiance, negative });
+            film.add_samples(tile, &TileSamples { pixels: rect.into(), samples, radiance, negative });
         }
     }
 
@@ -251,7 +251,7 @@ mod tests {
 
     fn stored(film: &Film, tile: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        assert!(film.store(tile, &mut bytes));
+        assert!(film.serialize_tile(tile, &mut bytes));
         bytes
     }
 
@@ -269,12 +269,12 @@ mod tests {
             for tile in 0..first.tile_count() {
                 let area = first.tile_rect(tile).expect("a tile").area();
                 let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
-                second.restore(tile, read).expect("the tile should fit the film");
+                second.restore_tile(tile, read).expect("the tile should fit the film");
             }
             assert_eq!((second.cell_half_samples(0, 1), second.cell_half_samples(1, 0)), (21, 21));
             add(&second, 21..37, is_signed);
             assert_eq!(second.radiance().pixels, whole.radiance().pixels);
-            assert_eq!(second.noise(), whole.noise());
+            assert_eq!(second.image_noise(), whole.image_noise());
             for tile in 0..whole.tile_count() {
                 assert_eq!(stored(&second, tile), stored(&whole, tile), "{blocks:?}");
             }
@@ -301,10 +301,10 @@ mod tests {
                     sum.add_block(of, block).expect("a block");
                 }
                 [&outer, &inner].into_iter().for_each(|of| sum.add_counts(of));
-                merged.restore(tile, sum).expect("a tile");
+                merged.restore_tile(tile, sum).expect("a tile");
             }
             assert_eq!(merged.radiance().pixels, whole.radiance().pixels);
-            assert_eq!(merged.samples(), whole.samples());
+            assert_eq!(merged.sample_stats(), whole.sample_stats());
         }
     }
 

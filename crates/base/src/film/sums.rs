@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::convergence::{Convergence, SquaredSteps, luminance};
+use super::convergence::{Convergence, SquaredMeanChanges, luminance};
 use super::pixel_subset::PixelSubset;
 use super::sum_order::{SumOrder, sum_with_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
@@ -92,7 +92,7 @@ pub(super) struct Tile {
     pub(super) earlier: Vec<Vec<DVec3>>,
     /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
     pub(super) negative: Option<NegativeLobeSums>,
-    pub(super) steps: SquaredSteps,
+    pub(super) steps: SquaredMeanChanges,
     /// Incremented whenever the tile changes.
     pub(super) revision: u64,
 }
@@ -150,16 +150,16 @@ impl Tile {
     }
 
     /// Resizes the sums to `area` pixels. Cannot fail because the film reserved the memory.
-    pub(super) fn fill(&mut self, area: usize) {
+    pub(super) fn resize(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
         self.counts.resize(area, 0);
-        self.steps.fill(area);
+        self.steps.resize(area);
     }
 
     /// Adds consecutive samples to a pixel in the specified cell and half. Returns the number of non-finite
     /// samples. `lobes` contains the weight of the negative lobes and one flag per sample.
-    fn add(
+    fn add_samples(
         &mut self,
         (index, cell, half): (usize, usize, usize),
         radiances: &[Vec3],
@@ -170,7 +170,7 @@ impl Tile {
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
             // Stop at the next count where the mean is recorded or a block ends.
-            let to_note = SquaredSteps::samples_to_next_step(self.counts[index]);
+            let to_note = SquaredMeanChanges::samples_to_next_record(self.counts[index]);
             let left = match blocks {
                 SumOrder::Sequential => to_note,
                 SumOrder::Blocked | SumOrder::SeparateBlocks(_) => {
@@ -326,15 +326,15 @@ impl Film {
 
     /// Adds samples to a tile one by one, in order. A sample with a NaN or an infinity is treated as black
     /// and counted in [`Film::non_finite_samples`]. Pixels outside the tile are ignored.
-    pub fn add(&self, tile: usize, samples: &TileSamples) {
+    pub fn add_samples(&self, tile: usize, samples: &TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
         if samples.samples == 0 || samples.pixels.rect.width == 0 {
             return;
         }
         let mut non_finite = 0;
-        let mut guard = self.tile(tile);
+        let mut guard = self.lock_tile(tile);
         let tile = &mut *guard;
-        tile.fill(rect.area());
+        tile.resize(rect.area());
         let count = samples.samples as usize;
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = samples.pixels.position(i as u32);
@@ -344,7 +344,7 @@ impl Film {
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
             let half =
                 index_in(inside, x, y).map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
-            non_finite += tile.add((index, cell, half), pixel, lobes, self.blocks);
+            non_finite += tile.add_samples((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;
         drop(guard);
@@ -352,7 +352,7 @@ impl Film {
     }
 
     /// Minimum, mean and maximum number of samples per pixel in the crop.
-    pub fn samples(&self) -> SampleStats {
+    pub fn sample_stats(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {
             let tile = lock(tile);
@@ -379,7 +379,7 @@ impl Film {
     }
 
     /// Locks a tile. Ignores poisoning because a panicking thread leaves the sums in a consistent state.
-    pub(super) fn tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
+    pub(super) fn lock_tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
         lock(&self.tiles[tile])
     }
 }
@@ -459,7 +459,7 @@ fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
         let mut sums = Vec::new();
         let mut counts = Vec::new();
         try_reserve_exact(&mut sums, area).ok()?;
-        let steps = SquaredSteps::reserved(area)?;
+        let steps = SquaredMeanChanges::try_with_capacity(area)?;
         try_reserve_exact(&mut counts, area).ok()?;
         tiles.push(Mutex::new(Tile { sums, counts, steps, ..Tile::default() }));
     }

@@ -6,7 +6,7 @@ use super::*;
 
 /// Samples `first..first + count` for every pixel. Their magnitudes vary widely so that summation order
 /// matters.
-fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
+fn varied_samples(rect: Rect, first: u32, count: u32) -> TileSamples {
     let value = |x: u32, y: u32, sample: u32| {
         let mixed = (x.wrapping_mul(73) ^ y.wrapping_mul(19) ^ sample.wrapping_mul(2_654_435_761)) % 1000;
         Vec3::new(mixed as f32 * 0.1, 1.0 / (mixed + 1) as f32, 10_f32.powi(mixed as i32 % 30 - 10))
@@ -23,7 +23,7 @@ fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
     }
 }
 
-fn bits(image: &RadianceImage) -> Vec<[u32; 3]> {
+fn image_bits(image: &RadianceImage) -> Vec<[u32; 3]> {
     image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
@@ -31,15 +31,15 @@ fn bits(image: &RadianceImage) -> Vec<[u32; 3]> {
 fn pixel_samples(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
-    index_in(rect, x, y).map_or(0, |index| film.tile(tile).count(index))
+    index_in(rect, x, y).map_or(0, |index| film.lock_tile(tile).count(index))
 }
 
-fn filled(passes: &[u32]) -> Film {
+fn film_after_passes(passes: &[u32]) -> Film {
     let film = Film::new(50, 41, None).expect("a film");
     for &tile in film.tile_order() {
         let mut first = 0;
         for &count in passes {
-            film.add(tile, &samples(film.tile_rect(tile).expect("a tile"), first, count));
+            film.add_samples(tile, &varied_samples(film.tile_rect(tile).expect("a tile"), first, count));
             first += count;
         }
     }
@@ -47,18 +47,18 @@ fn filled(passes: &[u32]) -> Film {
 }
 
 fn sum_bits(film: &Film) -> Vec<[u64; 3]> {
-    let tile_sums = |tile| film.tile(tile).sums.clone();
+    let tile_sums = |tile| film.lock_tile(tile).sums.clone();
     (0..film.tile_count()).flat_map(tile_sums).map(|sum| sum.to_array().map(f64::to_bits)).collect()
 }
 
 #[test]
 fn sample_grouping_does_not_change_bits() {
-    let at_once = filled(&[24]);
+    let at_once = film_after_passes(&[24]);
     for passes in [&[1; 24][..], &[1, 2, 4, 8, 9], &[23, 1]] {
-        let film = filled(passes);
+        let film = film_after_passes(passes);
         assert_eq!(sum_bits(&film), sum_bits(&at_once), "{passes:?}");
-        assert_eq!(bits(&film.radiance()), bits(&at_once.radiance()), "{passes:?}");
-        assert_eq!(film.samples(), SampleStats { min: 24, mean: 24.0, max: 24 });
+        assert_eq!(image_bits(&film.radiance()), image_bits(&at_once.radiance()), "{passes:?}");
+        assert_eq!(film.sample_stats(), SampleStats { min: 24, mean: 24.0, max: 24 });
     }
 }
 
@@ -102,7 +102,7 @@ fn pixel_means_and_counts_are_correct() {
     let add = |x: u32, values: &[f32]| {
         let radiance = values.iter().map(|&v| Vec3::splat(v)).collect();
         let rect = Rect { x, y: 1, width: 1, height: 1 };
-        film.add(
+        film.add_samples(
             (x / 32) as usize,
             &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
         );
@@ -115,7 +115,7 @@ fn pixel_means_and_counts_are_correct() {
     assert_eq!(image.pixels.iter().filter(|p| **p != Vec3::ZERO).count(), 2);
     assert_eq!((pixel_samples(&film, 3, 1), pixel_samples(&film, 39, 1)), (3, 1));
     assert_eq!((pixel_samples(&film, 3, 0), pixel_samples(&film, 39, 0)), (0, 0));
-    assert_eq!(film.samples(), SampleStats { min: 0, mean: 4.0 / 80.0, max: 3 });
+    assert_eq!(film.sample_stats(), SampleStats { min: 0, mean: 4.0 / 80.0, max: 3 });
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn non_finite_samples_are_black_and_counted() {
         Vec3::new(-f32::NAN, 1.0, 1.0),
         Vec3::new(1.0, 1.0, f32::INFINITY),
     ];
-    film.add(0, &TileSamples { pixels: film.crop().into(), samples: 4, radiance, negative: None });
+    film.add_samples(0, &TileSamples { pixels: film.crop().into(), samples: 4, radiance, negative: None });
     assert_eq!(film.non_finite_samples(), 3);
     assert_eq!(film.radiance().pixels, [Vec3::ONE]);
     assert_eq!(pixel_samples(&film, 0, 0), 4);
@@ -137,36 +137,39 @@ fn non_finite_samples_are_black_and_counted() {
 fn samples_outside_the_tile_are_ignored() {
     let film = Film::new(33, 1, None).expect("a film");
     let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
-    film.add(
+    film.add_samples(
         1,
         &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 20], negative: None },
     );
-    film.add(
+    film.add_samples(
         0,
         &TileSamples { pixels: wide.into(), samples: 2, radiance: vec![Vec3::ONE; 3], negative: None },
     );
-    film.add(
+    film.add_samples(
         7,
         &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 27], negative: None },
     );
-    film.add(0, &TileSamples { pixels: wide.into(), samples: 0, radiance: Vec::new(), negative: None });
+    film.add_samples(
+        0,
+        &TileSamples { pixels: wide.into(), samples: 0, radiance: Vec::new(), negative: None },
+    );
     assert_eq!([29, 30, 31, 32].map(|x| pixel_samples(&film, x, 0)), [0, 2, 0, 1]);
 }
 
 #[test]
 fn panics_while_holding_a_tile_are_harmless() {
-    let film = filled(&[3]);
-    let before = bits(&film.radiance());
+    let film = film_after_passes(&[3]);
+    let before = image_bits(&film.radiance());
     std::thread::scope(|scope| {
         let holder = scope.spawn(|| {
-            let _guard = film.tile(0);
+            let _guard = film.lock_tile(0);
             panic!("while holding a tile");
         });
         assert!(holder.join().is_err());
     });
     assert!(film.tiles[0].is_poisoned());
-    assert_eq!(bits(&film.radiance()), before);
-    film.add(0, &samples(film.tile_rect(0).expect("a tile"), 3, 1));
+    assert_eq!(image_bits(&film.radiance()), before);
+    film.add_samples(0, &varied_samples(film.tile_rect(0).expect("a tile"), 3, 1));
     assert_eq!(pixel_samples(&film, 0, 0), 4);
 }
 
@@ -183,11 +186,11 @@ fn snapshots_are_consistent_during_rendering() {
                         for tile in (worker..film.tile_count()).step_by(3) {
                             let rect = film.tile_rect(tile).expect("a tile");
                             let radiance = vec![Vec3::splat(2.0); rect.area()];
-                            film.add(
+                            film.add_samples(
                                 tile,
                                 &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
                             );
-                            assert!(film.samples().max <= pass + 9);
+                            assert!(film.sample_stats().max <= pass + 9);
                         }
                     }
                 })
@@ -199,7 +202,7 @@ fn snapshots_are_consistent_during_rendering() {
                 let whole = film.radiance();
                 assert!(whole.pixels.iter().all(|p| *p == Vec3::ZERO || *p == Vec3::splat(2.0)));
                 previewer.update(&film, None);
-                let small = previewer.picture(None);
+                let small = previewer.build_image(None);
                 assert!(small.pixels.iter().all(|p| *p == Vec3::ZERO || (p.x - 2.0).abs() < 1e-5));
             }
         });
@@ -208,7 +211,7 @@ fn snapshots_are_consistent_during_rendering() {
         }
         done.store(true, Ordering::Release);
     });
-    assert_eq!(film.samples(), SampleStats { min: 8, mean: 8.0, max: 8 });
+    assert_eq!(film.sample_stats(), SampleStats { min: 8, mean: 8.0, max: 8 });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::range_map::RangeMap;
-use super::{Picture, RadianceImage, Srgb16Image, curves, is_in_pool, linear_to_srgb8};
+use super::{RadianceImage, Srgb8Image, Srgb16Image, curves, is_in_thread_pool, linear_to_srgb8};
 use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
@@ -68,16 +68,16 @@ impl ToneMapping {
     };
 
     /// Resolves the range mapping using the values in this image.
-    pub fn resolved_for(self, image: &RadianceImage) -> Self {
-        Self { range_map: self.range_map.resolved_for(image), ..self }
+    pub fn with_image_range(self, image: &RadianceImage) -> Self {
+        Self { range_map: self.range_map.with_image_range(image), ..self }
     }
 
     /// Linear display light in [0, 1] for any input color. NaN and negative components are treated as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
-        self.exposed(radiance, exp2(self.exposure_stops))
+        self.apply_with_exposure(radiance, exp2(self.exposure_stops))
     }
 
-    fn exposed(&self, radiance: Vec3, factor: f32) -> Vec3 {
+    fn apply_with_exposure(&self, radiance: Vec3, factor: f32) -> Vec3 {
         let radiance = self.range_map.apply(radiance);
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
@@ -91,18 +91,18 @@ impl ToneMapping {
 }
 
 /// Converts an image to 8 bits per channel.
-pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
+pub fn tone_map_to_8_bits(image: &RadianceImage, tone: &ToneMapping) -> Srgb8Image {
     let pixels = match tone.transfer {
         Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8)),
         Transfer::Identity => {
             map_pixels(image, tone, |color| color.to_array().map(|x| (x * 255.0 + 0.5) as u8))
         }
     };
-    Picture { width: image.width, height: image.height, pixels }
+    Srgb8Image { width: image.width, height: image.height, pixels }
 }
 
 /// Converts an image to 16 bits per channel.
-pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Srgb16Image {
+pub fn tone_map_to_16_bits(image: &RadianceImage, tone: &ToneMapping) -> Srgb16Image {
     let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
     let pixels = match tone.transfer {
         Transfer::Srgb => {
@@ -119,8 +119,8 @@ fn map_pixels<T: Send>(
     encode: impl Fn(Vec3) -> T + Sync,
 ) -> Vec<T> {
     let factor = exp2(tone.exposure_stops);
-    let pixel = |&radiance: &Vec3| encode(tone.exposed(radiance, factor));
-    if image.pixels.len() < PARALLEL_PIXELS || !is_in_pool() {
+    let pixel = |&radiance: &Vec3| encode(tone.apply_with_exposure(radiance, factor));
+    if image.pixels.len() < PARALLEL_PIXELS || !is_in_thread_pool() {
         image.pixels.iter().map(pixel).collect()
     } else {
         image.pixels.par_iter().with_min_len(1 << 14).map(pixel).collect()
@@ -179,7 +179,11 @@ mod tests {
         let brighter = RadianceImage { pixels: vec![Vec3::new(0.2, 0.4, 0.8)], width: 1, height: 1 };
         for &curve in Tonemap::ALL {
             let exposed = ToneMapping { exposure_stops: 2.0, ..tone(curve) };
-            assert_eq!(develop(&image, &exposed), develop(&brighter, &tone(curve)), "{curve:?}");
+            assert_eq!(
+                tone_map_to_8_bits(&image, &exposed),
+                tone_map_to_8_bits(&brighter, &tone(curve)),
+                "{curve:?}"
+            );
         }
     }
 
@@ -198,8 +202,8 @@ mod tests {
             }
             let dark = Vec3::new(f32::NAN, -1.0, f32::NEG_INFINITY);
             let image = RadianceImage { width: 2, height: 1, pixels: vec![dark, Vec3::splat(1e30)] };
-            assert_eq!(develop(&image, &tone(curve)).pixels, [[0; 3], [255; 3]], "{curve:?}");
-            assert_eq!(develop16(&image, &tone(curve)).pixels, [[0; 3], [65535; 3]], "{curve:?}");
+            assert_eq!(tone_map_to_8_bits(&image, &tone(curve)).pixels, [[0; 3], [255; 3]], "{curve:?}");
+            assert_eq!(tone_map_to_16_bits(&image, &tone(curve)).pixels, [[0; 3], [65535; 3]], "{curve:?}");
         }
     }
 
@@ -211,9 +215,9 @@ mod tests {
             Vec3::new(0.25, 0.1, f32::INFINITY),
         ];
         let image = RadianceImage { width: 3, height: 1, pixels };
-        let eight = develop(&image, &ToneMapping::DATA).pixels;
+        let eight = tone_map_to_8_bits(&image, &ToneMapping::DATA).pixels;
         assert_eq!(eight, [[128, 0, 255], [0, 0, 255], [64, 26, 255]]);
-        let sixteen = develop16(&image, &ToneMapping::DATA).pixels;
+        let sixteen = tone_map_to_16_bits(&image, &ToneMapping::DATA).pixels;
         assert_eq!(sixteen, [[32768, 0, 65535], [0, 0, 65535], [16384, 6554, 65535]]);
     }
 
@@ -221,8 +225,8 @@ mod tests {
     fn sixteen_bit_output_matches_eight_bit_output() {
         let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
         let image = RadianceImage { width: 1001, height: 1, pixels };
-        let coarse = develop(&image, &tone(Tonemap::None)).pixels;
-        let fine = develop16(&image, &tone(Tonemap::None)).pixels;
+        let coarse = tone_map_to_8_bits(&image, &tone(Tonemap::None)).pixels;
+        let fine = tone_map_to_16_bits(&image, &tone(Tonemap::None)).pixels;
         for (eight, sixteen) in coarse.iter().zip(&fine) {
             assert!(
                 (f64::from(sixteen[0]) / 257.0 - f64::from(eight[0])).abs() <= 0.502,
@@ -255,7 +259,7 @@ mod tests {
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let mapping = tone(Tonemap::Aces);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-        let developed = pool.install(|| develop(&image, &mapping)).pixels;
+        let developed = pool.install(|| tone_map_to_8_bits(&image, &mapping)).pixels;
         for (pixel, &radiance) in developed.iter().zip(&image.pixels) {
             assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8));
         }

@@ -1,7 +1,7 @@
 //! Rounds numbers to a few decimals for display.
 
 /// Rounds to a multiple of `step` (a power of ten) and returns the `f64` nearest to the result.
-pub fn rounded(number: f64, step: f64) -> f64 {
+pub fn round_to_step(number: f64, step: f64) -> f64 {
     let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
     let whole = libm::round(number / step) * step;
     format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
@@ -25,7 +25,7 @@ mod tests {
             (0.1 + 0.2, 1e-4, "0.3"),
             (1234.5, 10.0, "1230"),
         ] {
-            assert_eq!(rounded(number, step).to_string(), text);
+            assert_eq!(round_to_step(number, step).to_string(), text);
         }
         for distance in [0.003, 1.0, 4.0, 9.99, 12_345.0] {
             let error = decimal_step(distance) / 2.0 / distance;

@@ -9,7 +9,7 @@ pub const LARGEST: f64 = 1e18;
 pub const SHORTEST: f64 = 1e-18;
 
 /// Length of a vector, correct even if the squared length underflows or overflows.
-pub fn length(vector: DVec3) -> f64 {
+pub fn robust_length(vector: DVec3) -> f64 {
     let largest = vector.abs().max_element();
     if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
@@ -25,9 +25,11 @@ mod tests {
 
     #[test]
     fn length_is_correct_if_its_square_overflows() {
-        assert_eq!(length(DVec3::ZERO), 0.0);
+        assert_eq!(robust_length(DVec3::ZERO), 0.0);
         for scale in [1e-300, 1e-200, 1.0, 1e200] {
-            assert!((length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15);
+            assert!(
+                (robust_length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15
+            );
         }
         assert!(is_too_short(1e-200) && is_too_short(-1e-19) && !is_too_short(0.0) && !is_too_short(1e-18));
     }

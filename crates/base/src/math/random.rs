@@ -8,7 +8,7 @@ pub fn hash(number: u64) -> u64 {
 }
 
 /// Uniform numbers in [0, 1) from the upper 24 bits of a linear congruential generator (Knuth's MMIX).
-pub fn unit(seed: u64) -> impl FnMut() -> f32 {
+pub fn unit_generator(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed;
     move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -16,8 +16,8 @@ pub fn unit(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// Uniform numbers in [−1, 1), from [`unit()`].
-pub fn signed(seed: u64) -> impl FnMut() -> f32 {
-    let mut unit = unit(seed);
+/// Uniform numbers in [−1, 1), from [`unit_generator()`].
+pub fn signed_generator(seed: u64) -> impl FnMut() -> f32 {
+    let mut unit = unit_generator(seed);
     move || unit() * 2.0 - 1.0
 }

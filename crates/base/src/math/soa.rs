@@ -159,7 +159,7 @@ impl Soa for bool {
 /// Generates a struct and its packet form, in which each field is a packet. Fields may be numbers, vectors,
 /// arrays, and other structs with a packet form. Each field has a default value, which is stored in unused
 /// lanes. The packet may have further fields, listed after `with`, that apply to all lanes. They are set to
-/// their defaults by [`Soa::splat`](crate::math::soa::Soa::splat).
+/// their defaults by [`Soa::splat`].
 ///
 /// ```
 /// use glimt_base::math::Vec3;

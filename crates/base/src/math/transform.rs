@@ -36,7 +36,7 @@ impl Transform {
     /// Rewrites the map for input coordinates relative to `inside` and output coordinates relative to
     /// `outside`.
     #[inline]
-    pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
+    pub fn relative_to_origins(self, inside: DVec3, outside: DVec3) -> Self {
         Self { translation: self.translation + self.linear * inside - outside, ..self }
     }
 

@@ -47,7 +47,7 @@ impl PixelFilter {
     /// Replaces points in the unit square with filter offsets. For filters sampled from a table, which may
     /// have negative lobes, also passes each sample and its index to `each`.
     #[inline(always)]
-    pub fn sample_row<const N: usize>(
+    pub fn sample_packet<const N: usize>(
         self,
         u: &mut [[f32; N]; 2],
         mut each: impl FnMut(usize, FilterSample),

@@ -35,10 +35,10 @@ impl PiecewiseConstant2D {
     pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
         let (mut in_row, mut totals) = (Vec::new(), Vec::new());
         for weights in rows {
-            totals.push(add_sums(&weights, &mut in_row));
+            totals.push(append_cumulative_sums(&weights, &mut in_row));
         }
         let mut rows = Vec::new();
-        let total = add_sums(&totals, &mut rows);
+        let total = append_cumulative_sums(&totals, &mut rows);
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
@@ -52,7 +52,7 @@ impl PiecewiseConstant2D {
     pub fn sample(&self, u: [f32; 2]) -> GridSample {
         let (row, across) = find_interval(&self.rows, &self.row_guide, u[1]);
         let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
-        let (column, along) = find_interval(self.column_sums_in(row), guide, u[0]);
+        let (column, along) = find_interval(self.row_cumulative_sums(row), guide, u[0]);
         GridSample { column, row, rest: [along, across] }
     }
 
@@ -65,12 +65,12 @@ impl PiecewiseConstant2D {
     /// Probability of sampling `column` within its row.
     #[inline(always)]
     pub fn column_probability(&self, row: usize, column: usize) -> f32 {
-        let sums = self.column_sums_in(row);
+        let sums = self.row_cumulative_sums(row);
         sums[column + 1] - sums[column]
     }
 
     #[inline(always)]
-    fn column_sums_in(&self, row: usize) -> &[f32] {
+    fn row_cumulative_sums(&self, row: usize) -> &[f32] {
         let start = row * (self.columns + 1);
         &self.in_row[start..=start + self.columns]
     }
@@ -78,7 +78,7 @@ impl PiecewiseConstant2D {
 
 /// Appends the normalized exclusive cumulative sums of the weights, followed by 1, and returns the total
 /// weight.
-fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
+fn append_cumulative_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
     let least = total / weights.len().max(1) as f64 * LEAST;
     let weight = |weight: f64| if weight > 0.0 { weight.max(least) } else { 0.0 };
@@ -179,7 +179,7 @@ mod tests {
                 _ => 1e-3 * (i * i) as f64,
             };
             let mut sums = Vec::new();
-            add_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
+            append_cumulative_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
             let guide: Vec<u32> = guide_table(&sums).collect();
             let borders =
                 sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);

@@ -149,11 +149,13 @@ fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> 
     }
     let mut points = [[0.0; N]; 2];
     for i in 0..N {
-        points[0][i] = unit(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
+        points[0][i] = bits_to_unit_float(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
     }
     for i in 0..N {
-        points[1][i] =
-            unit(owen_scramble(second_sobol_coordinate(places[i]), mix_bits(seeds[i] ^ 0x02e5_be93)));
+        points[1][i] = bits_to_unit_float(owen_scramble(
+            second_sobol_coordinate(places[i]),
+            mix_bits(seeds[i] ^ 0x02e5_be93),
+        ));
     }
     points
 }
@@ -161,7 +163,7 @@ fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> 
 /// Converts the upper 24 bits, in reversed order, to a fraction in [0, 1). 24 bits allow signed conversion,
 /// which vector units support.
 #[inline(always)]
-fn unit(bits: u32) -> f32 {
+fn bits_to_unit_float(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 

@@ -27,7 +27,7 @@ const FAILED: i32 = 1;
 /// The system allocator, extended to end the process with a message if an allocation fails. Otherwise, the
 /// standard library would print its own message and a backtrace. Allocations with
 /// [`try_reserve_exact`](super::memory::try_reserve_exact) are exempt.
-pub struct Allocator;
+pub struct AbortingAllocator;
 
 /// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
@@ -55,7 +55,7 @@ fn end_without_memory(bytes: usize) -> ! {
 
 // SAFETY: every call is forwarded to the system allocator with the caller's arguments, and its result is
 // returned.
-unsafe impl GlobalAlloc for Allocator {
+unsafe impl GlobalAlloc for AbortingAllocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller upholds the contract of `GlobalAlloc`.

@@ -24,7 +24,7 @@ pub enum FileKind {
 
 impl FileKind {
     /// Description that completes "it is …".
-    pub fn words(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Regular => "a regular file",
             Self::Folder => "a folder",
@@ -33,7 +33,7 @@ impl FileKind {
         }
     }
 
-    fn of(path: &Path, metadata: &Metadata) -> Self {
+    fn from_metadata(path: &Path, metadata: &Metadata) -> Self {
         match () {
             () if metadata.is_dir() => Self::Folder,
             () if !metadata.is_file() => Self::Special,
@@ -47,9 +47,9 @@ impl FileKind {
 ///
 /// # Errors
 /// Returns an error if the file does not exist or its metadata cannot be read.
-pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
+pub fn file_kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     let metadata = fs::metadata(path)?;
-    Ok((FileKind::of(path, &metadata), metadata))
+    Ok((FileKind::from_metadata(path, &metadata), metadata))
 }
 
 /// File metadata for detecting changes. It changes when the file is replaced and with every write, except if
@@ -80,7 +80,7 @@ impl FileStamp {
 
     /// Returns the stamp for the file at `path`, following symbolic links. `None` if it does not exist or its
     /// metadata cannot be read.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| Self::new(&metadata))
     }
 }
@@ -110,8 +110,8 @@ pub fn reason_not_to_replace(metadata: &Metadata) -> Option<&'static str> {
 ///
 /// # Errors
 /// Returns an error if the file does not exist or cannot be read.
-pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
-    let (kind, _) = kind(path)?;
+pub fn open_regular_file(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
+    let (kind, _) = file_kind(path)?;
     if kind != FileKind::Regular {
         return Ok(Err(kind));
     }
@@ -121,7 +121,7 @@ pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::libc::O_NONBLOCK);
     let file = options.open(path)?;
     let metadata = file.metadata()?;
-    Ok(match FileKind::of(path, &metadata) {
+    Ok(match FileKind::from_metadata(path, &metadata) {
         FileKind::Regular => Ok((file, metadata)),
         other => Err(other),
     })
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn only_regular_files_are_opened() {
         let folder = tempfile::tempdir().expect("a folder");
-        let said = |path: &Path| open(path).expect("the file should exist").err();
+        let said = |path: &Path| open_regular_file(path).expect("the file should exist").err();
         assert_eq!(said(folder.path()), Some(FileKind::Folder));
         assert_eq!(said(Path::new("/dev/zero")), Some(FileKind::Special));
         let pipe = folder.path().join("pipe");
@@ -166,7 +166,10 @@ mod tests {
         let file = folder.path().join("file");
         fs::write(&file, "text").expect("written");
         assert_eq!(said(&file), None);
-        assert_eq!(open(&folder.path().join("none")).expect_err("nothing").kind(), io::ErrorKind::NotFound);
+        assert_eq!(
+            open_regular_file(&folder.path().join("none")).expect_err("nothing").kind(),
+            io::ErrorKind::NotFound
+        );
     }
 
     #[cfg(target_os = "linux")]
@@ -176,12 +179,17 @@ mod tests {
         let link = folder.path().join("link");
         std::os::unix::fs::symlink("/proc/kmsg", &link).expect("a link");
         for path in [Path::new("/proc/kmsg"), Path::new("/proc/self/status"), &link] {
-            assert_eq!(open(path).expect("a file").err(), Some(FileKind::Kernel), "{}", path.display());
+            assert_eq!(
+                open_regular_file(path).expect("a file").err(),
+                Some(FileKind::Kernel),
+                "{}",
+                path.display()
+            );
         }
         // An open file's path in /proc is a link to the file.
         let file = File::create(folder.path().join("file")).expect("a file");
         let number = std::os::fd::AsRawFd::as_raw_fd(&file);
         let same = format!("/proc/self/fd/{number}");
-        assert!(open(Path::new(&same)).expect("a file").is_ok());
+        assert!(open_regular_file(Path::new(&same)).expect("a file").is_ok());
     }
 }

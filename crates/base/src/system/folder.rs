@@ -15,7 +15,7 @@ use rustix::fs::{AtFlags, Dir, Mode, OFlags, openat, unlinkat};
 ///
 /// # Errors
 /// Returns an error if the folder cannot be opened.
-pub fn names(folder: &Path) -> io::Result<impl Iterator<Item = OsString> + use<>> {
+pub fn entry_names(folder: &Path) -> io::Result<impl Iterator<Item = OsString> + use<>> {
     entry_names_in(File::open(folder)?.as_fd())
 }
 
@@ -66,13 +66,13 @@ mod tests {
             fs::write(at(name), "").expect("written");
         }
         std::os::unix::fs::symlink(at("kept"), at("tree/a/link")).expect("a link");
-        let mut listed: Vec<_> = names(&at("tree/a")).expect("listed").collect();
+        let mut listed: Vec<_> = entry_names(&at("tree/a")).expect("listed").collect();
         listed.sort();
         assert_eq!(listed, ["2", "b", "link"]);
         remove_all(&at("tree")).expect("removed");
-        assert_eq!(names(folder.path()).expect("listed").collect::<Vec<_>>(), ["kept"]);
+        assert_eq!(entry_names(folder.path()).expect("listed").collect::<Vec<_>>(), ["kept"]);
         assert!(at("kept/4").exists());
         assert!(remove_all(&at("tree")).is_err() && remove_all(&at("kept/4")).is_err());
-        assert!(names(&at("none")).is_err());
+        assert!(entry_names(&at("none")).is_err());
     }
 }

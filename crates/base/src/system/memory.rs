@@ -17,7 +17,7 @@ pub(super) fn allocation_may_fail() -> bool {
 }
 
 /// Reserves memory for exactly `additional` more elements. If any other allocation fails,
-/// [`Allocator`](super::abort::Allocator) ends the process.
+/// [`AbortingAllocator`](super::abort::AbortingAllocator) ends the process.
 ///
 /// # Errors
 /// Returns an error if there is not enough memory.
@@ -62,7 +62,7 @@ pub struct MemoryLimit {
 }
 
 /// Lowest memory limit set by `ulimit -v` or a control group. `None` if memory is unlimited.
-pub fn limit() -> Option<MemoryLimit> {
+pub fn memory_limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
     let of_space = of_space.map(|bytes| MemoryLimit { bytes, setting: "`ulimit -v`".to_owned() });

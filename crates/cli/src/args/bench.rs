@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use super::{
-    CLAMP, Progress, Switch, any_whole, candidates, listed, nice, number_of, one_of, seconds, threads, whole,
-    whole_of,
+    CLAMP, ProgressMode, Switch, candidates, choice_long_help, choice_parser, parse_integer_in_range,
+    parse_niceness, parse_positive_seconds, parse_thread_count, parse_u32, render_integer_parser,
+    render_number_parser,
 };
-use crate::scene::description::{Accel, Integrator, Shadows};
+use crate::scene::description::{Accel, Integrator, ShadowMode};
 use crate::tui::ColorChoice;
 
 pub(super) const HELP: &str = "\
@@ -45,25 +46,25 @@ pub struct BenchArgs {
     pub baseline: Option<PathBuf>,
 
     /// Sample counts per pixel to measure, such as 1,4,16
-    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Measurement")]
     pub samples: Vec<u32>,
     /// Render times to measure instead, such as 0.1,0.5,2
-    #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = seconds, conflicts_with = "samples", help_heading = "Measurement")]
+    #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = parse_positive_seconds, conflicts_with = "samples", help_heading = "Measurement")]
     pub time: Vec<f64>,
     /// Images per point, each with a different seed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seed_count, default_value = "6", help_heading = "Measurement")]
     pub seeds: u32,
     /// The first seed
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, default_value = "1", help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_u32, default_value = "1", help_heading = "Measurement")]
     pub seed: u32,
     /// Width in pixels [default: 96 on the longer side]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("width"), help_heading = "Measurement")]
     pub width: Option<u32>,
     /// Height in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
     /// Time limit if neither --samples nor --time is used
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, default_value = "240", help_heading = "Measurement")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive_seconds, default_value = "240", help_heading = "Measurement")]
     pub within: f64,
     /// Floating-point image to use as a reference
     ///
@@ -73,7 +74,7 @@ pub struct BenchArgs {
     /// Samples per pixel of each reference
     ///
     /// By default, as many as fit in the available time, up to 100 times the largest --samples.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
     /// Folder for cached references
     #[arg(long, value_name = "FOLDER", help_heading = "Measurement")]
@@ -83,45 +84,45 @@ pub struct BenchArgs {
     pub no_cache: bool,
 
     /// Integrators: whitted, path
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Integrator>(), hide_possible_values = true, long_help = listed::<Integrator>("Integrators"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
+    #[arg(long, value_delimiter = ',', value_parser = choice_parser::<Integrator>(), hide_possible_values = true, long_help = choice_long_help::<Integrator>("Integrators"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub integrator: Vec<Integrator>,
     /// Photon mapping in whitted: on, off
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
+    #[arg(long, value_delimiter = ',', value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub photons: Vec<Switch>,
     /// Shadows in whitted: off, hard, soft
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Shadows>(), hide_possible_values = true, long_help = listed::<Shadows>("Shadows, in whitted"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
-    pub shadows: Vec<Shadows>,
+    #[arg(long, value_delimiter = ',', value_parser = choice_parser::<ShadowMode>(), hide_possible_values = true, long_help = choice_long_help::<ShadowMode>("Shadows, in whitted"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
+    pub shadows: Vec<ShadowMode>,
     /// Limits on indirect radiance per bounce; 0 disables the limit
-    #[arg(long, value_delimiter = ',', value_parser = number_of("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
+    #[arg(long, value_delimiter = ',', value_parser = render_number_parser("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
     pub clamp: Vec<f32>,
     /// Acceleration structures: bvh, bvh-high, kdtree
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Accel>(), hide_possible_values = true, long_help = listed::<Accel>("Acceleration structures"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
+    #[arg(long, value_delimiter = ',', value_parser = choice_parser::<Accel>(), hide_possible_values = true, long_help = choice_long_help::<Accel>("Acceleration structures"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub accel: Vec<Accel>,
 
     /// Override a scene key
-    #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
+    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
     /// Maximum bounces per path
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All images and references")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("max_depth"), help_heading = "All images and references")]
     pub max_depth: Option<u32>,
     /// Depth of field, if the camera has an aperture
-    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "All images and references")]
+    #[arg(long, value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "All images and references")]
     pub dof: Option<Switch>,
     /// Rendering threads; 0 is one per core
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All images and references")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_thread_count, help_heading = "All images and references")]
     pub threads: Option<usize>,
     /// Scheduling niceness, 0–19
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All images and references")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_niceness, default_value = "0", help_heading = "All images and references")]
     pub nice: u8,
 
     /// Progress on stderr: auto, plain, json, none
-    #[arg(long, value_parser = one_of::<Progress>(), hide_possible_values = true, long_help = listed::<Progress>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub progress: Progress,
+    #[arg(long, value_parser = choice_parser::<ProgressMode>(), hide_possible_values = true, long_help = choice_long_help::<ProgressMode>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
 }
 
 fn parse_seed_count(text: &str) -> Result<u32, String> {
-    whole(text, 1..=1000)
+    parse_integer_in_range(text, 1..=1000)
 }

@@ -7,9 +7,9 @@ use std::sync::OnceLock;
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
-use crate::scene::keys::{color_names, paths, tables};
+use crate::scene::keys::{all_tables, color_names, documented_paths};
 use crate::scene::outline::{OutlineTable, outline};
-use crate::scene::{is_mesh, text_now};
+use crate::scene::{is_mesh, read_current_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -46,12 +46,12 @@ fn is_scene(path: &Path) -> bool {
 
 /// Completes `TABLE.KEY=VALUE` with keys from the scene on the command line. Without a scene, completes keys
 /// from the tables that every scene has.
-pub(crate) fn set_completer() -> ArgValueCompleter {
+pub(crate) fn set_arg_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
         let scene = command_line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
-        let text = scene.and_then(|scene| text_now(&scene).ok());
-        candidates(text.as_deref().unwrap_or_default(), current)
+        let text = scene.and_then(|scene| read_current_text(&scene).ok());
+        set_arg_candidates(text.as_deref().unwrap_or_default(), current)
     })
 }
 
@@ -59,35 +59,38 @@ pub(crate) fn set_completer() -> ArgValueCompleter {
 pub(crate) fn key_path_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let all = paths().into_iter().filter(|(path, _)| path.starts_with(current));
+        let all = documented_paths().into_iter().filter(|(path, _)| path.starts_with(current));
         all.map(|(path, doc)| CompletionCandidate::new(path).help(Some(doc.replace('`', "").into())))
             .collect()
     })
 }
 
 /// Returns candidates that start with `typed`, for a scene whose source is `text`.
-fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
+fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
     let outline = outline(text);
-    let singles = tables().iter().filter(|table| table.form == TableSyntax::Single);
+    let singles = all_tables().iter().filter(|table| table.form == TableSyntax::Single);
     let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
     let of_absent = absent.flat_map(|info| info.keys.iter().map(|key| (info.name.to_owned(), key)));
     let of = |table: &OutlineTable| {
-        let paths = table.set_prefixes();
+        let paths = table.set_arg_prefixes();
         let known = table.known_keys();
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
     let keys = outline.iter().flat_map(of).chain(of_absent);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
-        path_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || named_values(key.kind, &outline))
+        key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
+            named_values(key.kind, &outline)
+        })
     };
     let of_type = |table: &OutlineTable| {
         let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
         let types: Vec<DescribedValue> = types.collect();
-        let paths = if types.is_empty() { Vec::new() } else { table.set_prefixes() };
-        let of_path =
-            |path: String| path_candidates(&format!("{path}.type="), "The type", typed, || types.clone());
+        let paths = if types.is_empty() { Vec::new() } else { table.set_arg_prefixes() };
+        let of_path = |path: String| {
+            key_or_value_candidates(&format!("{path}.type="), "The type", typed, || types.clone())
+        };
         paths.into_iter().flat_map(of_path).collect::<Vec<_>>()
     };
     keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MAX_CANDIDATES).collect()
@@ -98,7 +101,7 @@ type DescribedValue = (String, &'static str);
 
 /// Returns candidates for `path`, which ends with `=`: the path itself or, once it is fully typed, its
 /// values.
-fn path_candidates(
+fn key_or_value_candidates(
     path: &str,
     doc: &str,
     typed: &str,
@@ -123,7 +126,7 @@ fn named_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue
             color_names().map(plain).collect()
         }
         ValueKind::Texture | ValueKind::Heights | ValueKind::Material => {
-            let named = outline.iter().filter(|table| Some(table.info.name) == kind.named_in());
+            let named = outline.iter().filter(|table| Some(table.info.name) == kind.defining_table());
             named.filter_map(|table| table.name.as_ref()).map(|name| plain(&name.text)).collect()
         }
         ValueKind::Whole(..)
@@ -141,7 +144,7 @@ mod tests {
     use super::*;
 
     fn offered(text: &str, typed: &str) -> Vec<String> {
-        let all = candidates(text, typed);
+        let all = set_arg_candidates(text, typed);
         all.iter().map(|one| one.get_value().to_string_lossy().into_owned()).collect()
     }
 

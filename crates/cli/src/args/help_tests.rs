@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use super::Args;
 
 /// The program's short help and each command's short and long help, wrapped to `columns`.
-fn helps(columns: usize) -> Vec<(String, String)> {
+fn help_texts(columns: usize) -> Vec<(String, String)> {
     let mut all = Args::command().term_width(columns);
     all.build();
     let mut helps = vec![("glimt".to_owned(), all.render_help().to_string())];
@@ -20,7 +20,7 @@ fn helps(columns: usize) -> Vec<(String, String)> {
 #[test]
 fn help_fits_the_requested_width() {
     for columns in [80, 100, 140] {
-        for (name, help) in helps(columns) {
+        for (name, help) in help_texts(columns) {
             // The usage line is not wrapped.
             for line in help.lines().filter(|line| !line.starts_with("Usage:")) {
                 assert!(line.chars().count() <= columns, "{name} at {columns}: {line}");
@@ -33,7 +33,7 @@ fn help_fits_the_requested_width() {
 #[test]
 fn help_lines_break_only_when_full() {
     for columns in [80, 100, 140] {
-        for (name, help) in helps(columns) {
+        for (name, help) in help_texts(columns) {
             let lines: Vec<&str> = help.lines().collect();
             for pair in lines.windows(2) {
                 let [line, next] = [pair[0], pair[1]];

@@ -30,7 +30,7 @@ pub struct Bias {
 
 impl Bias {
     /// Whether the bias is significant.
-    pub fn is_found(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.by_chance < FALSE_POSITIVE_RATE
     }
 }
@@ -66,7 +66,8 @@ impl PairwiseErrorProducts {
     fn from_images(references: &TwoReferences, pictures: &[RadianceImage]) -> Self {
         let count = pictures.len();
         let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-        let products = pairs.map(|(i, j)| (i, j, references.cross(&pictures[i], &pictures[j]))).collect();
+        let products =
+            pairs.map(|(i, j)| (i, j, references.cross_error(&pictures[i], &pictures[j]))).collect();
         Self { count, products }
     }
 
@@ -156,7 +157,7 @@ mod tests {
     fn false_positive_rate_is_as_specified() {
         for (seeds, block) in [(3, 1), (6, 1), (6, 4), (6, 16)] {
             let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
-            let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_found()).count();
+            let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_significant()).count();
             // The expected count is 1. A Poisson variable with this mean exceeds 6 with probability 1e-4.
             assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms in 1000 trials");
         }
@@ -169,10 +170,10 @@ mod tests {
         let mut sizes = Vec::new();
         for _ in 0..50 {
             let found = noise.found(6, 0.06, 1);
-            assert!(found.is_found() && found.bound > truth, "{found:?}");
+            assert!(found.is_significant() && found.bound > truth, "{found:?}");
             sizes.push(found.size);
         }
-        let (mean, error) = super::super::statistics::mean_and_error(&sizes);
+        let (mean, error) = super::super::statistics::mean_and_standard_error(&sizes);
         assert!(
             (mean - truth).abs() < 4.0 * error && error < 0.02 * truth,
             "got {mean} ± {error}, expected {truth}"
@@ -185,7 +186,7 @@ mod tests {
         for offset in [0.0, 0.04] {
             let tries: Vec<Bias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
             let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
-            let (_, error) = super::super::statistics::mean_and_error(&sizes);
+            let (_, error) = super::super::statistics::mean_and_standard_error(&sizes);
             let actual = error * (sizes.len() as f64).sqrt();
             let estimated = tries.iter().map(|found| found.error).sum::<f64>() / tries.len() as f64;
             assert!(
@@ -206,8 +207,8 @@ mod tests {
         let references = TwoReferences::new(pair.expect("a pair"));
         let of =
             |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough seeds");
-        assert!(!of(noise.picture(0.0, 0.0, 1)).is_found());
-        assert!(of(noise.picture(0.0, 0.1, 1)).is_found());
+        assert!(!of(noise.picture(0.0, 0.0, 1)).is_significant());
+        assert!(of(noise.picture(0.0, 0.1, 1)).is_significant());
         assert_eq!(estimate_bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
     }
 }

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bias::{FALSE_POSITIVE_RATE, MIN_SEEDS};
-use super::statistics::{mean_and_error, student_t_tail};
+use super::statistics::{mean_and_standard_error, student_t_tail};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::math::DVec3;
@@ -12,7 +12,7 @@ use crate::math::color::LUMINANCE_WEIGHTS;
 
 /// Relative difference in brightness between images and references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Brightness {
+pub struct BrightnessDifference {
     /// The difference, relative to the mean luminance of the references.
     pub value: f64,
     /// Standard error of `value`.
@@ -21,7 +21,7 @@ pub struct Brightness {
     pub by_chance: f64,
 }
 
-impl Brightness {
+impl BrightnessDifference {
     /// Whether the bias is significant.
     pub fn is_biased(&self) -> bool {
         self.by_chance < FALSE_POSITIVE_RATE
@@ -35,12 +35,12 @@ pub fn compare_brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
     are_pixels_independent: bool,
-) -> Option<Brightness> {
+) -> Option<BrightnessDifference> {
     if pictures.len() < MIN_SEEDS || !(references.mean_luminance() > 0.0) {
         return None;
     }
-    let values: Vec<f64> = pictures.iter().map(|picture| references.brightness(picture)).collect();
-    let (value, by_seeds) = mean_and_error(&values);
+    let values: Vec<f64> = pictures.iter().map(|picture| references.relative_bias(picture)).collect();
+    let (value, by_seeds) = mean_and_standard_error(&values);
     let seeds = pictures.len() as f64 - 1.0;
     let (of_pictures, freedom) = if are_pixels_independent {
         // Estimate the noise from all pixels, not just from a few seeds.
@@ -57,7 +57,7 @@ pub fn compare_brightness(
         true => 2.0 * student_t_tail(value.abs() / error, freedom),
         false => f64::from(u8::from(value == 0.0)),
     };
-    Some(Brightness { value, error, by_chance })
+    Some(BrightnessDifference { value, error, by_chance })
 }
 
 /// Standard error of the images' mean luminance, from the variance of each pixel.
@@ -81,7 +81,7 @@ mod tests {
     use crate::bench::bias::estimate_bias;
     use crate::compare::Pair;
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     const SIDE: u32 = 64;
 
@@ -105,14 +105,14 @@ mod tests {
         const SEEDS: u32 = 40;
         let (mut off, mut missed) = (Vec::new(), 0);
         for seed in 1..=SEEDS {
-            let mut next = unit(seed.into());
+            let mut next = unit_generator(seed.into());
             let references = references(&mut next);
             let pictures: Vec<_> = (0..3).map(|_| picture(&mut next, -0.01, 0.2, 0.0)).collect();
             let found = compare_brightness(&references, &pictures, true).expect("enough seeds");
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
             let by_relmse = estimate_bias(&references, &pictures).expect("enough seeds");
-            assert!(!by_relmse.is_found(), "seed {seed}: the bias should be undetectable in relMSE");
+            assert!(!by_relmse.is_significant(), "seed {seed}: the bias should be undetectable in relMSE");
         }
         // One percent is 4.7 standard errors, and the threshold is 3.3. The test therefore misses 8 % of the
         // seeds, or 3.3 out of 40 on average. Allow 8.
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn noise_is_not_mistaken_for_bias() {
         for (noise, shared) in [(0.2, 0.0), (0.02, 0.02)] {
-            let mut next = unit(5);
+            let mut next = unit_generator(5);
             let alarms = (0..200).filter(|_| {
                 let references = references(&mut next);
                 let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn too_few_images_or_black_references_give_none() {
-        let mut next = unit(7);
+        let mut next = unit_generator(7);
         let references = references(&mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
         assert_eq!(compare_brightness(&references, &pictures, true), None);

@@ -15,7 +15,7 @@ use crate::film::RadianceImage;
 use crate::math::Vec3;
 use crate::output::write::WritePolicy;
 use crate::output::{AttributeLossPolicy, OutputError, staged, write};
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Returns the cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither
 /// `XDG_CACHE_HOME` nor `HOME` is set.
@@ -30,12 +30,12 @@ pub fn cache_folder() -> Option<PathBuf> {
 /// # Errors
 /// The folder or the file cannot be created, or a different file with this name exists.
 pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
-    let text = crate::scene::starter().as_bytes();
+    let text = crate::scene::starter_scene().as_bytes();
     // Use one subfolder per version of the starter scene, because a scene file directly in the cache folder
     // may belong to the user.
     let folder = folder.join(format!(
         "starter-{}",
-        &FingerprintHasher::new("starter").bytes(text).finish().to_string()[..16]
+        &FingerprintHasher::new("starter").add_bytes(text).finish().to_string()[..16]
     ));
     create_folder(&folder)?;
     let path = folder.join("starter.toml");
@@ -91,7 +91,7 @@ struct CacheHeader {
 const KEY_BYTES: usize = 64;
 
 /// Loads the references stored under a key. `None` if the file is missing or damaged.
-pub(super) fn load(folder: &Path, key: &Key) -> Option<CachedReferences> {
+pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<CachedReferences> {
     let bytes = fs::read(cache_file_path(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
     if content_checksum(content).as_bytes() != seal {
@@ -116,7 +116,7 @@ pub(super) fn load(folder: &Path, key: &Key) -> Option<CachedReferences> {
 ///
 /// # Errors
 /// The folder cannot be created or the file cannot be written.
-pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Result<(), OutputError> {
+pub(super) fn store(folder: &Path, key: &Fingerprint, stored: &CachedReferences) -> Result<(), OutputError> {
     let path = cache_file_path(folder, key);
     create_folder(folder)?;
     let (a, b) = (stored.pair.a(), stored.pair.b());
@@ -152,10 +152,10 @@ fn is_replaceable(path: &Path) -> bool {
 }
 
 fn content_checksum(content: &[u8]) -> String {
-    FingerprintHasher::new("references").bytes(content).finish().to_string()
+    FingerprintHasher::new("references").add_bytes(content).finish().to_string()
 }
 
-fn cache_file_path(folder: &Path, key: &Key) -> PathBuf {
+fn cache_file_path(folder: &Path, key: &Fingerprint) -> PathBuf {
     folder.join(format!("{key}.pair"))
 }
 
@@ -177,7 +177,7 @@ mod tests {
         fs::write(&own, "the user's scene").expect("written");
         let scene = write_starter_scene(folder.path()).expect("a scene");
         assert_eq!(fs::read_to_string(&own).expect("a scene"), "the user's scene");
-        assert_eq!(fs::read_to_string(&scene).expect("a scene"), crate::scene::starter());
+        assert_eq!(fs::read_to_string(&scene).expect("a scene"), crate::scene::starter_scene());
         assert_eq!(write_starter_scene(folder.path()).expect("it exists"), scene);
         fs::write(&scene, "edited").expect("written");
         let why = write_starter_scene(folder.path()).expect_err("edited").to_string();

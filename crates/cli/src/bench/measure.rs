@@ -3,7 +3,7 @@
 use super::bias::estimate_bias;
 use super::brightness::compare_brightness;
 use super::methods::Method;
-use super::reference::{ReferenceKeys, SEEDS};
+use super::reference::{ReferenceFingerprints, SEEDS};
 use super::request::{BenchError, StepSchedule};
 use super::results::{ImageResult, MethodResult, StepResult};
 use super::run::SceneRun;
@@ -13,7 +13,7 @@ use super::time_budget::TimeBudget;
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
-use crate::pipeline::session::{Rendered, Session};
+use crate::pipeline::session::{RenderedImage, Session};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
@@ -35,7 +35,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
     /// Fingerprints of the references.
-    pub(super) keys: &'a ReferenceKeys,
+    pub(super) keys: &'a ReferenceFingerprints,
     pub(super) two: &'a TwoReferences,
     /// Default maximum number of samples per step.
     pub(super) most_samples: f64,
@@ -55,13 +55,14 @@ impl MethodRun<'_> {
         *threads = first.report.settings.threads;
         let mut steps: Vec<StepResult> = Vec::new();
         let mut took = Vec::new();
-        while let Some(aim) = self.next(&steps, &took, budget) {
-            let before = budget.method_seconds();
+        while let Some(aim) = self.next_step(&steps, &took, budget) {
+            let before = budget.method_elapsed_seconds();
             steps.push(self.measure_step(&mut session, aim, budget, &took)?);
-            took.push(budget.method_seconds() - before);
+            took.push(budget.method_elapsed_seconds() - before);
         }
         let last = self.render(&mut session, SEEDS[0], begin)?;
-        if last.key != first.key || self.run.reference_renderer(self.common).keys(&mut session)? != *self.keys
+        if last.key != first.key
+            || self.run.reference_renderer(self.common).compute_fingerprints(&mut session)? != *self.keys
         {
             return Err(self.run.scene_changed_error());
         }
@@ -69,7 +70,7 @@ impl MethodRun<'_> {
     }
 
     /// Chooses the next step from the previous steps and their durations in seconds.
-    fn next(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
+    fn next_step(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
             StepSchedule::Samples(list) => {
@@ -84,7 +85,7 @@ impl MethodRun<'_> {
                     .checked_pow(index)
                     .filter(|samples| f64::from(*samples) <= self.most_samples)?;
                 let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(SAMPLE_RATIO));
-                let has_time = budget.method_seconds() + expected <= budget.method_allowance();
+                let has_time = budget.method_elapsed_seconds() + expected <= budget.method_allowance();
                 (index == 0 || has_time).then_some(StepTarget { index, samples, budget: None })
             }
         }
@@ -103,7 +104,7 @@ impl MethodRun<'_> {
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.report_image(aim, number, budget, took, &pictures);
-            let Rendered { image, report, .. } = self.render(session, seed, aim)?;
+            let RenderedImage { image, report, .. } = self.render(session, seed, aim)?;
             let relmse = self.two.error(&image);
             are_pixels_independent &= report.photons.is_none();
             if !relmse.is_finite() {
@@ -122,7 +123,7 @@ impl MethodRun<'_> {
         }
         let brightness = compare_brightness(self.two, &images, are_pixels_independent);
         let step = StepResult { brightness, ..summarize_step(aim, pictures, &images, self.two) };
-        let (name, seconds) = (&self.method.name, words::seconds(step.seconds));
+        let (name, seconds) = (&self.method.name, words::format_seconds(step.seconds));
         self.run.report_done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
             format_samples(step.samples),
@@ -142,7 +143,7 @@ impl MethodRun<'_> {
     ) {
         let order = self.run.order;
         let amount = match aim.budget {
-            Some(seconds) => words::seconds(seconds),
+            Some(seconds) => words::format_seconds(seconds),
             None => format_samples(aim.samples.into()),
         };
         let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
@@ -183,7 +184,7 @@ impl MethodRun<'_> {
         }
     }
 
-    fn render(&self, session: &mut Session, seed: u32, aim: StepTarget) -> Result<Rendered, BenchError> {
+    fn render(&self, session: &mut Session, seed: u32, aim: StepTarget) -> Result<RenderedImage, BenchError> {
         let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
         let overrides = Overrides {
             integrator,

@@ -2,7 +2,7 @@
 
 use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
-use crate::scene::description::{Accel, Integrator, Scene, Shadows};
+use crate::scene::description::{Accel, Integrator, Scene, ShadowMode};
 
 /// Values to measure for each setting, in all combinations. An empty list keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,7 +12,7 @@ pub struct MethodSweep {
     /// Whether to use photon mapping in whitted.
     pub photons: Vec<bool>,
     /// Shadow types in whitted.
-    pub shadows: Vec<Shadows>,
+    pub shadows: Vec<ShadowMode>,
     /// Limits on the radiance per bounce.
     pub clamps: Vec<f32>,
     /// Acceleration structures.
@@ -33,7 +33,7 @@ pub struct Method {
 struct MethodSettings {
     integrator: Integrator,
     /// Photons and shadows. `None` for path tracing, which ignores both.
-    of_whitted: Option<(bool, Shadows)>,
+    of_whitted: Option<(bool, ShadowMode)>,
     clamp: f32,
     accel: Accel,
 }
@@ -87,11 +87,11 @@ fn or_scene_value<T: Copy>(asked: &[T], own: T) -> Vec<T> {
 fn method_settings(
     integrator: Integrator,
     photons: bool,
-    shadows: Shadows,
+    shadows: ShadowMode,
     clamp: f32,
     accel: Accel,
 ) -> MethodSettings {
-    let method = integrator.method();
+    let method = integrator.properties();
     let of_whitted = (method.gathers && method.honors_shadows).then_some((photons, shadows));
     MethodSettings { integrator, of_whitted, clamp, accel }
 }
@@ -153,7 +153,7 @@ mod tests {
         let toggles = MethodSweep {
             integrators: vec![Integrator::Path, Integrator::Whitted],
             photons: vec![true, false],
-            shadows: vec![Shadows::Soft, Shadows::Hard],
+            shadows: vec![ShadowMode::Soft, ShadowMode::Hard],
             ..MethodSweep::default()
         };
         let names = names("", &toggles);
@@ -183,7 +183,7 @@ mod tests {
         let overrides = &method.overrides;
         assert_eq!(
             (overrides.photons, overrides.shadows, overrides.clamp),
-            (Some(true), Some(Shadows::Soft), Some(3.0))
+            (Some(true), Some(ShadowMode::Soft), Some(3.0))
         );
     }
 }

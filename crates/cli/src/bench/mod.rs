@@ -22,7 +22,7 @@ pub mod table;
 mod time_budget;
 
 pub use bias::{Bias, MIN_SEEDS};
-pub use brightness::Brightness;
+pub use brightness::BrightnessDifference;
 pub use methods::{Method, MethodSweep, methods_to_measure};
 pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark};
 pub use results::{

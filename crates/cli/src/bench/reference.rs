@@ -8,11 +8,11 @@ use super::results::ReferenceResult;
 use crate::compare::{Pair, TwoReferences};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
-use crate::pipeline::session::{Rendered, Session};
+use crate::pipeline::session::{RenderedImage, Session};
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Seeds of the references, never used for measured images.
 pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
@@ -45,7 +45,7 @@ pub(super) struct ReferenceQuality {
 
 impl ReferenceQuality {
     /// Requests the best quality possible in this time, but no better than needed to measure `most` samples.
-    pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
+    pub(super) fn from_time_limit(seconds: f64, most: Option<u32>) -> Self {
         let samples = most
             .map_or(UNLIMITED_SAMPLES, |most| most.saturating_mul(REFERENCE_RATIO).min(UNLIMITED_SAMPLES));
         Self { samples, seconds: Some(seconds) }
@@ -70,11 +70,11 @@ pub(super) struct SceneReferences {
 
 /// Fingerprints of the two references.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct ReferenceKeys([Key; 2]);
+pub(super) struct ReferenceFingerprints([Fingerprint; 2]);
 
 /// Rendered references that are not cached yet.
 pub(super) struct RenderedReferences {
-    pub(super) keys: ReferenceKeys,
+    pub(super) keys: ReferenceFingerprints,
     stored: CachedReferences,
     warnings: Vec<Diagnostic>,
 }
@@ -87,7 +87,7 @@ pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferenc
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
     names.dedup();
     let two = TwoReferences::new(pair);
-    let noise = two.noise();
+    let noise = two.reference_noise();
     let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
     Ok(SceneReferences { two, result, warnings: Vec::new(), cache_error: None })
 }
@@ -104,31 +104,35 @@ pub(super) struct ReferenceRenderer<'a> {
 }
 
 impl ReferenceRenderer<'_> {
-    fn key(&self, keys: &ReferenceKeys) -> Key {
+    fn reference_cache_key(&self, keys: &ReferenceFingerprints) -> Fingerprint {
         cache_key(BUILD, self.asked, keys)
     }
 
     /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can
     /// be read.
-    pub(super) fn keys(&self, session: &mut Session) -> Result<ReferenceKeys, BenchError> {
+    pub(super) fn compute_fingerprints(
+        &self,
+        session: &mut Session,
+    ) -> Result<ReferenceFingerprints, BenchError> {
         let [one, two] = SEEDS.map(|seed| {
             self.render(session, seed, ReferenceQuality { samples: 1, seconds: None }).map(|it| it.key)
         });
-        Ok(ReferenceKeys([one?, two?]))
+        Ok(ReferenceFingerprints([one?, two?]))
     }
 
     /// Loads cached references, if they are good enough.
     pub(super) fn load_cached(
         &self,
-        keys: &ReferenceKeys,
+        keys: &ReferenceFingerprints,
         amount: ReferenceQuality,
     ) -> Option<SceneReferences> {
-        let stored = cache::load(self.cache?, &self.key(keys)).filter(|stored| amount.is_met(stored.cost))?;
-        Some(reference(stored, true, Vec::new(), None))
+        let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
+            .filter(|stored| amount.is_met(stored.cost))?;
+        Some(scene_references(stored, true, Vec::new(), None))
     }
 
     /// Renders both references. Calls `begin` before each one and passes it the number of references left.
-    pub(super) fn render_both(
+    pub(super) fn render_references(
         &self,
         session: &mut Session,
         amount: ReferenceQuality,
@@ -147,15 +151,17 @@ impl ReferenceRenderer<'_> {
         let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
-        let keys = ReferenceKeys([first.key, second.key]);
+        let keys = ReferenceFingerprints([first.key, second.key]);
         Ok(RenderedReferences { keys, stored: CachedReferences { pair, cost }, warnings: first.warnings })
     }
 
     /// Stores rendered references in the cache, if it is enabled.
     pub(super) fn store_in_cache(&self, made: RenderedReferences) -> SceneReferences {
         let RenderedReferences { keys, stored, warnings } = made;
-        let cache_error = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());
-        reference(stored, false, warnings, cache_error.map(|error| error.to_string()))
+        let cache_error = self
+            .cache
+            .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());
+        scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
     fn render(
@@ -163,7 +169,7 @@ impl ReferenceRenderer<'_> {
         session: &mut Session,
         seed: u32,
         amount: ReferenceQuality,
-    ) -> Result<Rendered, BenchError> {
+    ) -> Result<RenderedImage, BenchError> {
         let overrides = Overrides {
             integrator: Some(Integrator::Path),
             photons: Some(false),
@@ -179,16 +185,20 @@ impl ReferenceRenderer<'_> {
 
 /// The cache key of the references. It depends on the build, because builds may render differently, and on
 /// whether samples or time limit the references.
-fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
+fn cache_key(
+    build: &str,
+    asked: Option<u32>,
+    ReferenceFingerprints(keys): &ReferenceFingerprints,
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("references");
-    key.text(build).u64(asked.unwrap_or(0).into());
+    key.add_str(build).add_u64(asked.unwrap_or(0).into());
     keys.iter().for_each(|one| {
-        key.key(one);
+        key.add_fingerprint(one);
     });
     key.finish()
 }
 
-fn reference(
+fn scene_references(
     stored: CachedReferences,
     is_cached: bool,
     warnings: Vec<Diagnostic>,
@@ -198,7 +208,7 @@ fn reference(
     let two = TwoReferences::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
-        noise: two.noise(),
+        noise: two.reference_noise(),
         seconds: Some(cost.seconds),
         is_cached,
         files: Vec::new(),
@@ -212,7 +222,7 @@ mod tests {
 
     #[test]
     fn builds_do_not_share_references() {
-        let keys = || ReferenceKeys(["a", "b"].map(|name| FingerprintHasher::new(name).finish()));
+        let keys = || ReferenceFingerprints(["a", "b"].map(|name| FingerprintHasher::new(name).finish()));
         let (common, token) = (Overrides::default(), CancelToken::new());
         let renderer = ReferenceRenderer {
             scene: Path::new("a.toml"),
@@ -222,9 +232,12 @@ mod tests {
             asked: Some(2),
         };
         let other = BUILD.replace("(build ", "(build 0");
-        assert_ne!(renderer.key(&keys()), cache_key(&other, renderer.asked, &keys()));
-        assert_ne!(renderer.key(&keys()), cache_key(env!("CARGO_PKG_VERSION"), renderer.asked, &keys()));
-        assert_eq!(renderer.key(&keys()), cache_key(BUILD, renderer.asked, &keys()));
+        assert_ne!(renderer.reference_cache_key(&keys()), cache_key(&other, renderer.asked, &keys()));
+        assert_ne!(
+            renderer.reference_cache_key(&keys()),
+            cache_key(env!("CARGO_PKG_VERSION"), renderer.asked, &keys())
+        );
+        assert_eq!(renderer.reference_cache_key(&keys()), cache_key(BUILD, renderer.asked, &keys()));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::methods::MethodSweep;
 use super::results::Results;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::session::Unrendered;
+use crate::pipeline::session::RenderFailure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 
@@ -110,11 +110,11 @@ pub enum BenchError {
     Cancelled,
 }
 
-impl From<Unrendered> for BenchError {
-    fn from(why: Unrendered) -> Self {
+impl From<RenderFailure> for BenchError {
+    fn from(why: RenderFailure) -> Self {
         match why {
-            Unrendered::Failed(failure) => Self::Failed(failure),
-            Unrendered::Cancelled => Self::Cancelled,
+            RenderFailure::Failed(failure) => Self::Failed(failure),
+            RenderFailure::Cancelled => Self::Cancelled,
         }
     }
 }

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::bias::Bias;
-use super::brightness::Brightness;
+use super::brightness::BrightnessDifference;
 use super::slope::{Slope, TimeToError, mean_loglog_slope, time_to_error};
-use super::statistics::mean_and_error;
+use super::statistics::mean_and_standard_error;
 
 /// Target errors. The results include the time needed to reach each of them.
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
@@ -92,7 +92,7 @@ pub struct StepResult {
     pub bias: Option<Bias>,
     /// Difference in brightness between the images and the references. `None` if there are too few images.
     #[serde(default)]
-    pub brightness: Option<Brightness>,
+    pub brightness: Option<BrightnessDifference>,
     /// The individual images.
     pub pictures: Vec<ImageResult>,
 }
@@ -142,11 +142,11 @@ impl BiasVerdict {
     pub(super) fn from_steps(steps: &[StepResult]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
-        if !bias.is_found() {
+        if !bias.is_significant() {
             return Self::NoneFound { bound: bias.bound };
         }
         let errors: Vec<f64> = last.pictures.iter().map(|picture| picture.relmse).collect();
-        let (size, share) = (bias.size, (bias.size / mean_and_error(&errors).0).clamp(0.0, 1.0));
+        let (size, share) = (bias.size, (bias.size / mean_and_standard_error(&errors).0).clamp(0.0, 1.0));
         let before = steps.len().checked_sub(2).and_then(|index| steps[index].bias);
         if before.is_some_and(|before| is_bias_decreasing(before, bias)) {
             Self::Falls { size, share }
@@ -213,7 +213,7 @@ pub(super) mod tests {
             spread: [relmse * 0.9, relmse * 1.1],
             uncertainty: 1e-9,
             bias: Some(Bias { size: bias, error: bias * 0.01 + 1e-9, by_chance, bound: bias + 1e-8 }),
-            brightness: Some(Brightness {
+            brightness: Some(BrightnessDifference {
                 value: -0.01,
                 error: 0.001,
                 by_chance: if bias > 0.0 { 1e-9 } else { 0.4 },

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::measure::MethodRun;
 use super::methods::methods_to_measure;
 use super::reference::{
-    ReferenceKeys, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
+    ReferenceFingerprints, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
     max_measured_samples,
 };
 use super::request::{
@@ -42,7 +42,7 @@ pub fn run(
         order.scenes.iter().map(|path| SceneRun { order, path, token, tell }).collect();
     let mut measure = || {
         check_seeds(order)?;
-        check_all(&runs)?;
+        check_scenes(&runs)?;
         for run in &runs {
             results.scenes.push(run.measure(&mut budget, &mut results.threads)?);
             budget.end_scene();
@@ -50,7 +50,7 @@ pub fn run(
         Ok(())
     };
     let measured = measure();
-    results.seconds = budget.seconds();
+    results.seconds = budget.elapsed_seconds();
     match measured {
         Ok(()) => Ok(results),
         Err(error) => Err(Box::new(UnfinishedBenchmark { error, done: results })),
@@ -58,7 +58,7 @@ pub fn run(
 }
 
 /// Checks all scenes and collects their errors.
-fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
+fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     let mut wrong = Vec::new();
     for run in runs {
         match run.prepare(&mut Session::default()) {
@@ -116,7 +116,7 @@ pub(super) struct SceneRun<'a> {
 }
 
 /// Error message for a scene that was saved while it was being measured.
-fn changed_during_measurement(scene: &Path) -> String {
+fn scene_changed_message(scene: &Path) -> String {
     format!("{} or one of its files changed during the measurement; run the benchmark again", scene.display())
 }
 
@@ -127,7 +127,7 @@ struct PreparedScene {
     given: Option<SceneReferences>,
     /// Overrides shared by all images and the references.
     common: Overrides,
-    keys: ReferenceKeys,
+    keys: ReferenceFingerprints,
 }
 
 impl SceneRun<'_> {
@@ -147,8 +147,8 @@ impl SceneRun<'_> {
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let keys = self.reference_renderer(&common).keys(session)?;
-        self.check_targets(session)?;
+        let keys = self.reference_renderer(&common).compute_fingerprints(session)?;
+        self.check_output_targets(session)?;
         Ok(PreparedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
@@ -174,7 +174,7 @@ impl SceneRun<'_> {
         budget.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
-            None => self.reference(&mut session, &common, &keys, budget)?,
+            None => self.load_or_render_references(&mut session, &common, &keys, budget)?,
         };
         drop(session);
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
@@ -199,18 +199,19 @@ impl SceneRun<'_> {
     }
 
     /// Loads cached references if they are good enough. Otherwise, renders new references.
-    fn reference(
+    fn load_or_render_references(
         &self,
         session: &mut Session,
         common: &Overrides,
-        keys: &ReferenceKeys,
+        keys: &ReferenceFingerprints,
         budget: &TimeBudget,
     ) -> Result<SceneReferences, BenchError> {
         let amount = match &self.order.reference {
             ReferenceSource::Samples(samples) => ReferenceQuality { samples: *samples, seconds: None },
-            ReferenceSource::InTime | ReferenceSource::Files(_) => {
-                ReferenceQuality::in_time(budget.reference_seconds(), self.order.steps.most_samples())
-            }
+            ReferenceSource::InTime | ReferenceSource::Files(_) => ReferenceQuality::from_time_limit(
+                budget.reference_allowance(),
+                self.order.steps.max_samples(),
+            ),
         };
         let maker = self.reference_renderer(common);
         if let Some(kept) = maker.load_cached(keys, amount) {
@@ -221,18 +222,18 @@ impl SceneRun<'_> {
                 amount.seconds.map(|seconds| budget.seconds_left(seconds * left as f64 / 2.0, true));
             self.report_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
-        let made = maker.render_both(session, amount, begin)?;
+        let made = maker.render_references(session, amount, begin)?;
         if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
     }
 
     /// Returns the error for a scene that was saved while it was being measured.
     pub(super) fn scene_changed_error(&self) -> BenchError {
-        BenchError::Failed(Failure::Work(changed_during_measurement(self.path)))
+        BenchError::Failed(Failure::Work(scene_changed_message(self.path)))
     }
 
     /// Checks that no output file is an input of the scene.
-    fn check_targets(&self, session: &Session) -> Result<(), BenchError> {
-        match self.order.targets.iter().find(|target| session.has_read(target)) {
+    fn check_output_targets(&self, session: &Session) -> Result<(), BenchError> {
+        match self.order.targets.iter().find(|target| session.depends_on_file(target)) {
             Some(target) => Err(BenchError::Call(format!(
                 "cannot write {}: {} depends on it; choose another file",
                 target.display(),
@@ -252,7 +253,7 @@ impl SceneRun<'_> {
         let result = &reference.result;
         let made = match (result.is_cached, result.seconds) {
             (true, _) => "from the cache".to_owned(),
-            (false, Some(seconds)) => format!("rendered in {}", words::seconds(seconds)),
+            (false, Some(seconds)) => format!("rendered in {}", words::format_seconds(seconds)),
             (false, None) => "from files".to_owned(),
         };
         self.report_done(&format!(
@@ -278,7 +279,7 @@ impl SceneRun<'_> {
 
 impl StepSchedule {
     /// Returns the largest sample count, if known.
-    fn most_samples(&self) -> Option<u32> {
+    fn max_samples(&self) -> Option<u32> {
         match self {
             Self::Samples(list) => list.iter().max().copied(),
             Self::Climb | Self::Seconds(_) => None,
@@ -394,7 +395,7 @@ mod tests {
                 panic!("expected an error: saved at {moment}")
             };
             let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
-            assert_eq!(*message, changed_during_measurement(&order.scenes[1]));
+            assert_eq!(*message, scene_changed_message(&order.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
             // References rendered from different versions are not cached.
             write(&order.scenes[1], "3");
@@ -425,7 +426,7 @@ mod tests {
         let BenchError::Failed(Failure::Work(message)) = &unfinished.error else {
             panic!("expected a work error")
         };
-        assert_eq!(*message, changed_during_measurement(&order.scenes[0]));
+        assert_eq!(*message, scene_changed_message(&order.scenes[0]));
     }
 
     #[test]

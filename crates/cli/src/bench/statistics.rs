@@ -13,7 +13,7 @@ pub fn median(values: &[f64]) -> f64 {
 }
 
 /// Returns the mean and its standard error. The error is infinite for a single value.
-pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+pub fn mean_and_standard_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
@@ -44,7 +44,7 @@ pub fn student_t_quantile(probability: f64, freedom: f64) -> f64 {
 /// Returns the difference between the means, b − a, with its standard error and degrees of freedom
 /// (Welch–Satterthwaite).
 pub fn welch_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
-    let ((mean_a, error_a), (mean_b, error_b)) = (mean_and_error(a), mean_and_error(b));
+    let ((mean_a, error_a), (mean_b, error_b)) = (mean_and_standard_error(a), mean_and_standard_error(b));
     let (square_a, square_b) = (error_a * error_a, error_b * error_b);
     let square = square_a + square_b;
     let of = |square: f64, count: usize| square * square / (count as f64 - 1.0).max(1.0);
@@ -89,9 +89,9 @@ mod tests {
     fn medians_and_means_are_correct() {
         assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
         assert!(median(&[]).is_nan());
-        let (value, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
+        let (value, error) = mean_and_standard_error(&[1.0, 2.0, 3.0, 4.0]);
         assert!((value - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
-        assert_eq!(mean_and_error(&[1.0]), (1.0, f64::INFINITY));
+        assert_eq!(mean_and_standard_error(&[1.0]), (1.0, f64::INFINITY));
     }
 
     /// Compares with tables of one-sided quantiles.

@@ -30,7 +30,7 @@ fn format_scene(scene: &SceneResult) -> Vec<String> {
     }
     lines.push(String::new());
     for method in &scene.methods {
-        lines.push(format!("{}: {}", method.name, format_speed(method)));
+        lines.push(format!("{}: {}", method.name, format_setup_and_slope(method)));
         lines.extend(
             format_target_times(method)
                 .into_iter()
@@ -63,7 +63,7 @@ fn format_step(name: &str, step: &StepResult, width: usize) -> String {
     format!(
         "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
         format_count(step.samples),
-        words::seconds(step.seconds),
+        words::format_seconds(step.seconds),
         format_error(step.relmse),
         format_error(least),
         format_error(most),
@@ -81,9 +81,9 @@ pub(super) fn format_error(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
-fn format_speed(method: &MethodResult) -> String {
+fn format_setup_and_slope(method: &MethodResult) -> String {
     let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", format_slope(slope)));
-    format!("setup {}{slope}", words::seconds(method.setup_seconds))
+    format!("setup {}{slope}", words::format_seconds(method.setup_seconds))
 }
 
 /// Describes how long it takes to reach each target error.
@@ -91,7 +91,7 @@ fn format_target_times(method: &MethodResult) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
     let parts = times.map(|(target, TimeToError { seconds, is_measured })| {
         let about = if is_measured { "" } else { "about " };
-        format!("{target:.0e} in {about}{}", words::seconds(seconds))
+        format!("{target:.0e} in {about}{}", words::format_seconds(seconds))
     });
     let parts: Vec<String> = parts.collect();
     (!parts.is_empty()).then(|| format!("relMSE {}", parts.join(", ")))

@@ -38,12 +38,12 @@ impl TimeBudget {
         }
     }
 
-    pub(super) fn seconds(&self) -> f64 {
+    pub(super) fn elapsed_seconds(&self) -> f64 {
         self.begin.elapsed().as_secs_f64()
     }
 
     pub(super) fn begin_scene(&mut self, methods: usize) {
-        let now = self.seconds();
+        let now = self.elapsed_seconds();
         let left = (self.within - now).max(0.0);
         (self.methods, self.scene_begin) = (methods, now);
         self.scene_end = now + left / self.scenes.max(1) as f64;
@@ -51,22 +51,22 @@ impl TimeBudget {
     }
 
     pub(super) fn end_scene(&mut self) {
-        self.last_scene = Some(self.seconds() - self.scene_begin);
+        self.last_scene = Some(self.elapsed_seconds() - self.scene_begin);
         self.scenes -= 1;
     }
 
     /// Time available for both references, in seconds.
-    pub(super) fn reference_seconds(&self) -> f64 {
-        (self.scene_end - self.seconds()).max(0.0) * REFERENCE_SHARE
+    pub(super) fn reference_allowance(&self) -> f64 {
+        (self.scene_end - self.elapsed_seconds()).max(0.0) * REFERENCE_SHARE
     }
 
     pub(super) fn begin_method(&mut self) {
-        self.method_begin = self.seconds();
+        self.method_begin = self.elapsed_seconds();
     }
 
     /// Time spent on the current method so far, in seconds.
-    pub(super) fn method_seconds(&self) -> f64 {
-        self.seconds() - self.method_begin
+    pub(super) fn method_elapsed_seconds(&self) -> f64 {
+        self.elapsed_seconds() - self.method_begin
     }
 
     /// Time available for the current method, in seconds.
@@ -75,7 +75,7 @@ impl TimeBudget {
     }
 
     pub(super) fn end_method(&mut self) {
-        self.done.push(self.method_seconds());
+        self.done.push(self.method_elapsed_seconds());
         self.methods -= 1;
     }
 
@@ -85,7 +85,7 @@ impl TimeBudget {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let remaining = if is_reference { self.methods } else { self.methods.saturating_sub(1) };
         let of_each = if self.done.is_empty() {
-            (self.scene_end - self.seconds() - of_this).max(0.0) / remaining.max(1) as f64
+            (self.scene_end - self.elapsed_seconds() - of_this).max(0.0) / remaining.max(1) as f64
         } else {
             mean(&self.done)
         };
@@ -104,7 +104,7 @@ mod tests {
             |value: f64, expected: f64| assert!((value - expected).abs() < 1.0, "{value}, not {expected}");
         let mut budget = TimeBudget::new(1000.0, 2);
         budget.begin_scene(4);
-        near(budget.reference_seconds(), 375.0);
+        near(budget.reference_allowance(), 375.0);
         near(budget.seconds_left(375.0, true), 1000.0);
         budget.begin_method();
         near(budget.method_allowance(), 125.0);
@@ -116,6 +116,6 @@ mod tests {
         budget.end_method();
         budget.end_scene();
         budget.begin_scene(1);
-        near(budget.reference_seconds(), 750.0);
+        near(budget.reference_allowance(), 750.0);
     }
 }

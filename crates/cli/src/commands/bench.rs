@@ -46,10 +46,10 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
-        .map_err(|message| console.fail(Exit::FAILED, &message))?;
+        .map_err(|message| console.print_error(Exit::FAILED, &message))?;
     let mut progress = BenchProgress::new(args.progress, console);
     let (news, work) = spawn_benchmark(order, token.clone())
-        .map_err(|error| console.fail(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
+        .map_err(|error| console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
     report_events(&news, &mut progress);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(panic_result())));
     progress.clear();
@@ -63,7 +63,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
                 if token.is_cancelled() { &writing } else { &token },
             )?;
             progress.report_done(&results);
-            Ok(ended.signal_number().map_or(Exit::DONE, Exit::signal))
+            Ok(ended.signal_number().map_or(Exit::DONE, Exit::from_signal))
         }
         Err(unfinished) => {
             let UnfinishedBenchmark { error, done } = *unfinished;
@@ -88,13 +88,13 @@ fn print_results(results: &Results, baseline: Option<&(String, Results)>, consol
 }
 
 /// The measurement thread.
-type Worker = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
+type BenchThread = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
 
 /// Starts the benchmark on a thread. Returns the thread and a receiver for its events.
 fn spawn_benchmark(
     order: BenchRequest,
     token: CancelToken,
-) -> std::io::Result<(Receiver<BenchEvent>, Worker)> {
+) -> std::io::Result<(Receiver<BenchEvent>, BenchThread)> {
     let (sender, news) = mpsc::channel();
     let tell = move |one: BenchEvent| {
         // Ignore a front end that has exited.
@@ -108,7 +108,7 @@ fn spawn_benchmark(
 fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     loop {
         match news.recv_timeout(TICK) {
-            Ok(one) => progress.handle(one),
+            Ok(one) => progress.handle_event(one),
             Err(RecvTimeoutError::Timeout) => progress.tick(),
             Err(RecvTimeoutError::Disconnected) => return,
         }
@@ -137,7 +137,7 @@ fn report_unfinished(
                 "terminated by {signal} after {done} of {all} scenes; finished references are cached"
             ));
         }
-        return Exit::signal(number);
+        return Exit::from_signal(number);
     }
     match error {
         BenchError::Failed(Failure::Scene(diagnostics)) => {
@@ -174,7 +174,7 @@ fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Ex
         args.scenes.clone()
     };
     if let Some((_, twice)) = (0..).zip(&scenes).find(|(index, scene)| scenes[..*index].contains(scene)) {
-        return Err(console.fail(Exit::WRONG, &format!("{} is specified twice", twice.display())));
+        return Err(console.print_error(Exit::WRONG, &format!("{} is specified twice", twice.display())));
     }
     let outputs = [&args.csv, &args.json, &args.plot];
     Ok(BenchRequest {
@@ -223,17 +223,19 @@ fn reference_source(args: &BenchArgs, scenes: usize, console: &Console) -> Resul
     match (args.reference.as_slice(), args.reference_samples) {
         ([], Some(samples)) => Ok(ReferenceSource::Samples(samples)),
         ([], None) => Ok(ReferenceSource::InTime),
-        (_, _) if scenes != 1 => Err(console.fail(Exit::WRONG, "--reference works with a single scene")),
+        (_, _) if scenes != 1 => {
+            Err(console.print_error(Exit::WRONG, "--reference works with a single scene"))
+        }
         ([one], _) => Ok(ReferenceSource::Files([one.clone(), one.clone()])),
         ([one, two], _) => Ok(ReferenceSource::Files([one.clone(), two.clone()])),
-        (_, _) => Err(console.fail(Exit::WRONG, "--reference is given more than twice")),
+        (_, _) => Err(console.print_error(Exit::WRONG, "--reference is given more than twice")),
     }
 }
 
 /// Writes the `glimt new` starter scene to the reference cache and returns its path.
 fn write_starter(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
     match folder.map(cache::write_starter_scene) {
-        Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),
-        None => Err(console.fail(Exit::WRONG, "no scene given; see glimt bench --help")),
+        Some(made) => made.map_err(|error| console.print_error(Exit::FAILED, &error.to_string())),
+        None => Err(console.print_error(Exit::WRONG, "no scene given; see glimt bench --help")),
     }
 }

@@ -10,8 +10,8 @@ use crate::diagnostic_json::diagnostic_to_json;
 use crate::exit::Exit;
 use crate::output::json::to_line;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::{SceneSummary, check};
-use crate::scene::report::Locator;
+use crate::pipeline::{SceneSummary, check_scene};
+use crate::scene::report::LineColumnLocator;
 
 pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
@@ -20,7 +20,7 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
     if let Some(exit) = report_image_instead_of_scene(scene, false, console) {
         return exit;
     }
-    match check(scene, sets) {
+    match check_scene(scene, sets) {
         Ok(checked) => {
             console.print_diagnostics(&checked.warnings);
             console.print_line(&format_summary(scene, &checked));
@@ -30,24 +30,24 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
             console.print_diagnostics(&diagnostics);
             Exit::WRONG
         }
-        Err(Failure::Work(message)) => console.fail(Exit::FAILED, &message),
+        Err(Failure::Work(message)) => console.print_error(Exit::FAILED, &message),
     }
 }
 
 /// Reports the result as one JSON object on stdout.
 fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
-    let (exit, diagnostics) = match check(scene, sets) {
+    let (exit, diagnostics) = match check_scene(scene, sets) {
         Ok(checked) => (Exit::DONE, checked.warnings),
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
-        Err(Failure::Work(message)) => return console.fail(Exit::FAILED, &message),
+        Err(Failure::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
-    let mut places = Locator::default();
+    let mut places = LineColumnLocator::default();
     let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic_to_json(one, &mut places)).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
     match to_line(&report) {
         Ok(line) => console.print_trusted_text(&format!("{line}\n")),
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
+        Err(error) => return console.print_error(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }
     exit
 }

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use serde::Serialize;
 
 use crate::args::CompareArgs;
-use crate::compare::{self, Bias, Errors, PIXELS_PER_DEGREE, Pair, PairMeasurements};
+use crate::compare::{self, Bias, ErrorMetrics, PIXELS_PER_DEGREE, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
@@ -20,17 +20,17 @@ use crate::output::{
     self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, is_same_file,
 };
 use crate::system::threads::core_pool;
-use crate::tui::wrapped;
+use crate::tui::wrap_text;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match core_pool() {
-        Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
-        Err(message) => console.fail(Exit::FAILED, &message),
+        Ok(pool) => run_in_pool(&pool, args, console).unwrap_or_else(|exit| exit),
+        Err(message) => console.print_error(Exit::FAILED, &message),
     }
 }
 
 /// Runs the comparison and reports errors. `Err` contains the exit code.
-fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
+fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff = args.diff.as_deref().map(|path| ErrorImage::check(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
         errors.iter().for_each(|error| console.print_message(&format!("error: {error}")));
@@ -50,7 +50,7 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
-        let lost = written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        let lost = written.map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
         lost.iter().for_each(|what| console.print_message(&format!("warning: {what}")));
         console.print_message(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
@@ -61,15 +61,15 @@ fn compare_to_thresholds(summary: &Summary<'_>, console: &Console) -> Exit {
     match summary.max_relmse {
         Some(most) if !summary.is_within => {
             let relmse = format_significant_digits(summary.relmse);
-            console.fail(Exit::FAILED, &format!("relMSE {relmse} is above --max-relmse {most}"))
+            console.print_error(Exit::FAILED, &format!("relMSE {relmse} is above --max-relmse {most}"))
         }
         Some(_) | None => Exit::DONE,
     }
 }
 
 fn warn_about_same_file(args: &CompareArgs, console: &Console) {
-    let identity = FileIdentity::of(&args.a);
-    if identity.is_some() && identity == FileIdentity::of(&args.b) {
+    let identity = FileIdentity::from_path(&args.a);
+    if identity.is_some() && identity == FileIdentity::from_path(&args.b) {
         let (a, b) = (args.a.display(), args.b.display());
         let which = if args.a == args.b {
             format!("{a} is specified twice")
@@ -90,9 +90,10 @@ impl<'a> ErrorImage<'a> {
     /// Reports errors that can be detected before the measurement.
     fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format =
-            Format::from_path(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
-        check_not_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
-        output::check_target(path).map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+            Format::from_path(path).map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
+        check_not_input(path, path, args)
+            .map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
+        output::check_target(path).map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
     }
 
@@ -186,8 +187,9 @@ struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    fn new(args: &CompareArgs, pair: &Pair, errors: &'a Errors, bias: Bias) -> Self {
-        let &Errors { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } = errors;
+    fn new(args: &CompareArgs, pair: &Pair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
+        let &ErrorMetrics { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } =
+            errors;
         Self {
             a: args.a.display().to_string(),
             b: args.b.display().to_string(),
@@ -220,7 +222,7 @@ fn print_json(summary: &Summary<'_>, console: &Console) {
 }
 
 fn print_table(summary: &Summary<'_>, console: &Console) {
-    format_table(summary, console.answer_columns()).iter().for_each(|line| console.print_line(line));
+    format_table(summary, console.stdout_columns()).iter().for_each(|line| console.print_line(line));
 }
 
 /// Formats the table as lines, wrapped to `columns`.
@@ -248,7 +250,7 @@ fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> 
     let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
     let is_beside = columns >= start + MIN_NOTE_COLUMNS;
     let indent = if is_beside { start } else { INDENT };
-    let mut note = wrapped(note, columns.saturating_sub(indent).max(1));
+    let mut note = wrap_text(note, columns.saturating_sub(indent).max(1));
     let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
     let first = format!("{figures}{first}").trim_end().to_owned();
     let rest = note.into_iter().map(|line| format!("{:indent$}{line}", ""));
@@ -256,7 +258,7 @@ fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> 
 }
 
 fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
-    columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
+    columns.map_or_else(|| vec![text.to_owned()], |columns| wrap_text(text, columns))
 }
 
 /// Minimum z-score for a significant bias. If there is no bias, noise exceeds it about once in two million

@@ -68,7 +68,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
             console.print_trusted_text(&String::from_utf8_lossy(&script));
             Exit::DONE
         }
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot create the script: {error}")),
+        Err(error) => console.print_error(Exit::FAILED, &format!("cannot create the script: {error}")),
     }
 }
 

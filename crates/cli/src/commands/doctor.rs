@@ -8,18 +8,18 @@ use crate::bench::cache;
 use crate::commands::check::format_count;
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::system::folder::names;
-use crate::tui::{self, ColorDepth, Probe, ProbeReplies, probe};
+use crate::system::folder::entry_names;
+use crate::tui::{self, ColorDepth, ProbeReplies, TerminalProbe, probe_terminal};
 
 /// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
     let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
     lines.extend([("processor", describe_processor()), ("threads", describe_threads())]);
-    match probe() {
+    match probe_terminal() {
         Some(probe) => lines.extend(describe_terminal(&probe)),
         None => lines.push(("terminal", "none (not a tty); use --once".to_owned())),
     }
-    lines.extend([("editor", describe_editor()), ("cache", cache_folder())]);
+    lines.extend([("editor", describe_editor()), ("cache", describe_cache_folder())]);
     for (name, finding) in lines {
         console.print_line(&format!("{name:<12}{finding}"));
     }
@@ -36,7 +36,7 @@ fn describe_processor() -> String {
         InstructionSet::Avx2 => "AVX2",
         InstructionSet::Avx512 => "AVX-512",
     };
-    let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.available());
+    let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.or_best_supported());
     match environment_variable("GLIMT_SIMD") {
         Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),
@@ -51,7 +51,7 @@ fn describe_threads() -> String {
 }
 
 /// Describes the terminal as a list of property names and values.
-fn describe_terminal(probe: &Probe) -> Vec<(&'static str, String)> {
+fn describe_terminal(probe: &TerminalProbe) -> Vec<(&'static str, String)> {
     let term = environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
@@ -75,7 +75,7 @@ fn describe_terminal(probe: &Probe) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn describe_colors(probe: &Probe) -> String {
+fn describe_colors(probe: &TerminalProbe) -> String {
     let depth = match probe.depth {
         ColorDepth::TrueColor => "24 bits",
         ColorDepth::Indexed256 => "256",
@@ -91,7 +91,7 @@ fn describe_colors(probe: &Probe) -> String {
     format!("{depth} according to the environment{asked}{background}")
 }
 
-fn describe_preview(probe: &Probe) -> String {
+fn describe_preview(probe: &TerminalProbe) -> String {
     let protocol = |name, is_there| if is_there { Some(name) } else { None };
     let answers = probe.answers.clone().unwrap_or_default();
     let pixels = [
@@ -104,7 +104,7 @@ fn describe_preview(probe: &Probe) -> String {
         [] => "no pixel protocol".to_owned(),
         some => format!("pixels with --preview {}", some.join(" or ")),
     };
-    format!("{}; {more}", probe.preview())
+    format!("{}; {more}", probe.auto_preview_name())
 }
 
 fn describe_round_trip(answers: Option<&ProbeReplies>) -> String {
@@ -114,18 +114,18 @@ fn describe_round_trip(answers: Option<&ProbeReplies>) -> String {
 }
 
 fn describe_editor() -> String {
-    match tui::editor(|name| std::env::var(name).ok()) {
+    match tui::editor_and_variable(|name| std::env::var(name).ok()) {
         (editor, Some(variable)) => format!("{editor} (from {variable})"),
         (editor, None) => format!("{editor} (neither VISUAL nor EDITOR is set)"),
     }
 }
 
-fn cache_folder() -> String {
+fn describe_cache_folder() -> String {
     let Some(folder) = cache::cache_folder() else {
         return "none (neither XDG_CACHE_HOME nor HOME is set)".to_owned();
     };
     let name = folder.display();
-    match names(&folder) {
+    match entry_names(&folder) {
         Ok(names) => {
             let sizes: Vec<u64> =
                 names.filter_map(|name| Some(folder.join(name).symlink_metadata().ok()?.len())).collect();

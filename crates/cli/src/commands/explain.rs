@@ -1,12 +1,12 @@
 //! `glimt explain`: describes scene keys.
 
-use crate::console::{Console, answer_columns};
+use crate::console::{Console, stdout_columns};
 use crate::exit::Exit;
-use crate::scene::keys::key::{Default, KeyInfo, TableInfo, TypeInfo, ValueKind};
-use crate::scene::keys::{paths, table, tables};
-use crate::scene::nearest::{nearest, translate_foreign_name};
+use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TypeInfo, ValueKind};
+use crate::scene::keys::{all_tables, documented_paths, find_table};
+use crate::scene::nearest::{nearest_name, translate_foreign_name};
 use crate::scene::sanitize::shortened;
-use crate::tui::wrapped;
+use crate::tui::wrap_text;
 
 /// Prints the description of a key, a type or a table, or a list of all tables.
 pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
@@ -16,10 +16,10 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.print_trusted_text(&wrap_indented(&text, answer_columns()));
+            console.print_trusted_text(&wrap_indented(&text, stdout_columns()));
             Exit::DONE
         }
-        None => console.fail(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),
+        None => console.print_error(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),
     }
 }
 
@@ -33,7 +33,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
         let begin = gap.map_or(indent, |gap| line.len() - gap.trim_start().len());
         let (name, rest) = line.split_at(begin);
         let room = columns.saturating_sub(name.chars().count());
-        let lines = if room < MIN_COLUMNS { vec![rest.to_owned()] } else { wrapped(rest, room) };
+        let lines = if room < MIN_COLUMNS { vec![rest.to_owned()] } else { wrap_text(rest, room) };
         let between = format!("\n{}", " ".repeat(name.chars().count()));
         fitted.push_str(&format!("{name}{}\n", lines.join(&between)));
     }
@@ -49,8 +49,8 @@ fn has_type(table: &TableInfo, name: &str) -> bool {
 }
 
 fn overview() -> String {
-    let line = |table: &TableInfo| format!("{:<20}{}\n", table.head(), without_backticks(table.doc));
-    tables().iter().map(line).collect()
+    let line = |table: &TableInfo| format!("{:<20}{}\n", table.header(), without_backticks(table.doc));
+    all_tables().iter().map(line).collect()
 }
 
 /// Describes the key, type or table at this path. `None` if the path is unknown.
@@ -65,18 +65,18 @@ fn explain_path(path: &str) -> Option<String> {
         }
     };
     match parts.as_slice() {
-        [name] => match table(name) {
+        [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
-            None if tables().iter().any(|table| has_type(table, name)) => {
-                let types = tables().iter().filter(|table| has_type(table, name));
-                let texts = types.filter_map(|table| Some(type_details(table, table.type_of(Some(name))?)));
+            None if all_tables().iter().any(|table| has_type(table, name)) => {
+                let types = all_tables().iter().filter(|table| has_type(table, name));
+                let texts = types.filter_map(|table| Some(type_details(table, table.find_type(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
             None => found(all_keys().filter(|(_, key)| key.name == *name).collect()),
         },
         [name, second] => {
-            let table = table(name)?;
-            if let Some(kind) = table.type_of(Some(second)) {
+            let table = find_table(name)?;
+            if let Some(kind) = table.find_type(Some(second)) {
                 return Some(type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
@@ -85,15 +85,15 @@ fn explain_path(path: &str) -> Option<String> {
             found(keys_of_table(table).filter(|(_, key)| key.name == *second).collect())
         }
         [name, second, third] => {
-            let table = table(name)?;
-            let kind = table.type_of(Some(second))?;
+            let table = find_table(name)?;
+            let kind = table.find_type(Some(second))?;
             if *third == "type" {
                 return Some(format_type_list(table));
             }
             let path = format!("{}.{}", table.name, kind.name);
             found(
                 table
-                    .keys_of(Some(kind))
+                    .keys_for_type(Some(kind))
                     .filter(|key| key.name == *third)
                     .map(|key| (format!("{path}.{}", key.name), key))
                     .collect(),
@@ -105,7 +105,7 @@ fn explain_path(path: &str) -> Option<String> {
 
 /// Returns all keys with their full paths, such as `TABLE.TYPE.KEY`.
 fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
-    tables().iter().flat_map(keys_of_table)
+    all_tables().iter().flat_map(keys_of_table)
 }
 
 fn keys_of_table(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
@@ -117,20 +117,22 @@ fn keys_of_table(table: &'static TableInfo) -> impl Iterator<Item = (String, &'s
 
 /// Describes a key: description, type, unit, range, default and an example.
 fn key_details(path: &str, key: &KeyInfo) -> String {
-    let mut text = format!("{path}\n    {}\n\n", sentence(key.doc));
+    let mut text = format!("{path}\n    {}\n\n", format_sentence(key.doc));
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
             text.push_str(&format!("    {name:<9}{value}\n"));
         }
     };
-    row("type", without_backticks(&key.kind()));
+    row("type", without_backticks(&key.kind_text()));
     row("unit", key.unit.to_owned());
-    row("range", key.range());
+    row("range", key.range_text());
     row(
         "default",
         match key.default {
-            Default::Required(_) => "required".to_owned(),
-            Default::Is(_) | Default::By(_) | Default::Absent => without_backticks(&key.default_words()),
+            DefaultValue::Required(_) => "required".to_owned(),
+            DefaultValue::Is(_) | DefaultValue::By(_) | DefaultValue::Absent => {
+                without_backticks(&key.default_text())
+            }
         },
     );
     row("example", format!("{} = {}", key.name, key.example()));
@@ -146,18 +148,20 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
 /// Summarizes one of several keys in two lines: type, unit, range and default, followed by the description.
 fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
-        Default::Required(_) => "required".to_owned(),
-        Default::Is(_) | Default::By(_) => format!("default {}", without_backticks(&key.default_words())),
-        Default::Absent => String::new(),
+        DefaultValue::Required(_) => "required".to_owned(),
+        DefaultValue::Is(_) | DefaultValue::By(_) => {
+            format!("default {}", without_backticks(&key.default_text()))
+        }
+        DefaultValue::Absent => String::new(),
     };
-    let facts = [without_backticks(&key.kind()), key.unit.to_owned(), key.range(), default];
+    let facts = [without_backticks(&key.kind_text()), key.unit.to_owned(), key.range_text(), default];
     let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
-    format!("{path}: {}\n    {}\n", facts.join("; "), sentence(key.doc))
+    format!("{path}: {}\n    {}\n", facts.join("; "), format_sentence(key.doc))
 }
 
 /// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
-    let head = format!("{}\n    {}\n\n", table.head(), sentence(table.doc));
+    let head = format!("{}\n    {}\n\n", table.header(), format_sentence(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
     format!("{head}{types}{}", format_key_list(table.keys.iter()))
 }
@@ -173,8 +177,8 @@ fn format_type_list(table: &TableInfo) -> String {
 
 /// Describes a type, with one line for each of its keys and each common key.
 fn type_details(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
-    let head = format!("{}, type = \"{}\"\n    {}\n\n", table.head(), kind.name, sentence(kind.doc));
-    format!("{head}{}", format_key_list(table.keys_of(Some(kind))))
+    let head = format!("{}, type = \"{}\"\n    {}\n\n", table.header(), kind.name, format_sentence(kind.doc));
+    format!("{head}{}", format_key_list(table.keys_for_type(Some(kind))))
 }
 
 fn format_key_list(keys: impl Iterator<Item = &'static KeyInfo>) -> String {
@@ -186,14 +190,14 @@ fn without_backticks(text: &str) -> String {
     text.replace('`', "")
 }
 
-fn sentence(text: &str) -> String {
+fn format_sentence(text: &str) -> String {
     format!("{}.", without_backticks(text))
 }
 
 /// Error message for an unknown path, with a suggestion.
 fn unknown_path_message(path: &str) -> String {
     let shown = shortened(path, 60);
-    let all = paths();
+    let all = documented_paths();
     let names: Vec<&str> = all.iter().map(|(path, _)| path.as_str()).collect();
     let parts: Vec<&str> = path.split('.').collect();
     let (first, last) =
@@ -207,7 +211,7 @@ fn unknown_path_message(path: &str) -> String {
             .and_then(|end| in_table.iter().copied().find(|name| name.ends_with(&format!(".{end}"))))
     };
     let keys: Vec<&str> = names.iter().filter_map(|name| name.rsplit('.').next()).collect();
-    let near = nearest(path, names.iter().copied())
+    let near = nearest_name(path, names.iter().copied())
         .or_else(near_end)
         .or_else(|| translate_foreign_name(last, &keys));
     match near {
@@ -253,7 +257,7 @@ mod tests {
             "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
         assert_eq!(wrap_indented(text, 34), expected);
         assert_eq!(wrap_indented(text, 10), text, "too narrow to wrap");
-        for (path, _) in paths() {
+        for (path, _) in documented_paths() {
             let text = wrap_indented(&explain_path(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
@@ -262,7 +266,7 @@ mod tests {
 
     #[test]
     fn every_path_is_explained() {
-        for (path, doc) in paths() {
+        for (path, doc) in documented_paths() {
             let text = explain_path(&path).unwrap_or_default();
             assert!(text.contains(&without_backticks(doc)), "{path}: {text}");
         }

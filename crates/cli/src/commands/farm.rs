@@ -10,25 +10,25 @@ use crate::exit::Exit;
 use crate::output::Format;
 use crate::pipeline::estimate_memory;
 use crate::pipeline::protocol::Failure;
-use crate::system::text::is_plain;
+use crate::system::text::is_terminal_safe;
 
 pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     if let Err(error) = Format::from_path(&args.output) {
-        return console.fail(Exit::WRONG, &error.to_string());
+        return console.print_error(Exit::WRONG, &error.to_string());
     }
     let paths = [args.scene.to_str(), args.output.to_str()];
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
     // A line break in a name could end a here-document. Other control characters are unsafe on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
     if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
-        return console.fail(Exit::WRONG, "names cannot contain control characters");
+        return console.print_error(Exit::WRONG, "names cannot contain control characters");
     }
     if !args.scene.is_file() {
-        return console.fail(Exit::WRONG, &format!("file not found: {}", args.scene.display()));
+        return console.print_error(Exit::WRONG, &format!("file not found: {}", args.scene.display()));
     }
-    let options = match check_options(args) {
+    let options = match parse_render_options(args) {
         Ok(options) => options,
-        Err(message) => return console.fail(Exit::WRONG, &format!("after `--`: {message}")),
+        Err(message) => return console.print_error(Exit::WRONG, &format!("after `--`: {message}")),
     };
     console.print_trusted_text(&match args.engine {
         Scheduler::Slurm => slurm_script(args),
@@ -40,14 +40,14 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
 
 /// Whether a word is safe in scripts and on terminals: it has no control characters or invisible characters.
 fn is_plain_word(word: &str) -> bool {
-    word.chars().all(is_plain)
+    word.chars().all(is_terminal_safe)
 }
 
 /// Parses the render options.
 ///
 /// # Errors
 /// An option is invalid or cannot be shared by all parts.
-fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
+fn parse_render_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let (program, scene) = ("glimt".to_owned(), format_path_argument(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
     let render = match Args::try_parse_from(words) {
@@ -300,7 +300,7 @@ mod tests {
     fn only_options_valid_for_all_parts_are_accepted() {
         let said = |options: &str| {
             let args = args(&format!("a.toml -o a.exr --shards 2 --engine slurm -- {options}"));
-            check_options(&args).err().unwrap_or_default()
+            parse_render_options(&args).err().unwrap_or_default()
         };
         for (options, words) in [
             ("-o x.png", "-o "),
@@ -384,7 +384,7 @@ mod tests {
         let stated = |threads: &str| {
             let line = format!("{} -o a.png --shards 8 --engine kubernetes", scene.display());
             let args = args(&format!("{line} -- {threads}"));
-            let options = check_options(&args).expect("valid options");
+            let options = parse_render_options(&args).expect("valid options");
             memory_request(&args, &options, &Console::new(crate::tui::ColorChoice::None))
         };
         assert_eq!(stated("--threads 0"), stated("--threads 64"));

@@ -9,7 +9,7 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::output::OutputError;
 use crate::output::staged::create_files_atomically;
-use crate::pipeline::{ImportError, Imported, import};
+use crate::pipeline::{ImportError, ImportedScene, import_gltf};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
 
@@ -18,14 +18,14 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let cancel = token.clone();
     let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(message) => return console.fail(Exit::FAILED, &message),
+        Err(message) => return console.print_error(Exit::FAILED, &message),
     };
     let exit = convert(args, console, &token);
     let Some(number) = ended.signal_number() else { return exit };
     if let Some(signal) = signals::signal_name(number).filter(|_| exit != Exit::DONE) {
         console.print_message(&format!("terminated by {signal}: nothing was written"));
     }
-    Exit::signal(number)
+    Exit::from_signal(number)
 }
 
 /// Converts the file. Does not report an error if the token is cancelled.
@@ -36,25 +36,28 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     };
     let Some(name) = scene.file_stem().filter(|_| has_scene_extension(&scene)) else {
         let shown = scene.display();
-        return console.fail(Exit::WRONG, &format!("{shown} is not a scene file name: it must end in .toml"));
+        return console
+            .print_error(Exit::WRONG, &format!("{shown} is not a scene file name: it must end in .toml"));
     };
     // Never overwrite files, so check before converting.
     let folder = format!("{}_files", name.to_string_lossy());
     let beside = scene.with_file_name(&folder);
     if let Some(there) = [&scene, &beside].into_iter().find(|path| path.symlink_metadata().is_ok()) {
-        return console
-            .fail(Exit::WRONG, &format!("{} already exists; choose another scene with -o", there.display()));
+        return console.print_error(
+            Exit::WRONG,
+            &format!("{} already exists; choose another scene with -o", there.display()),
+        );
     }
-    let imported = match import(&args.file, &folder, token) {
+    let imported = match import_gltf(&args.file, &folder, token) {
         Ok(imported) => imported,
         Err(_) if token.is_cancelled() => return Exit::FAILED,
-        Err(ImportError::File(message)) => return console.fail(Exit::WRONG, &message),
-        Err(ImportError::Work(message)) => return console.fail(Exit::FAILED, &message),
+        Err(ImportError::File(message)) => return console.print_error(Exit::WRONG, &message),
+        Err(ImportError::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
     report_approximations(&args.file, &imported.notes, console);
     if args.strict && !imported.notes.is_empty() {
         let what = format_count(imported.notes.len() as u64, "approximation");
-        return console.fail(Exit::FAILED, &format!("{what} with --strict: nothing was written"));
+        return console.print_error(Exit::FAILED, &format!("{what} with --strict: nothing was written"));
     }
     match write_all(&scene, &imported, token) {
         Ok(()) => {
@@ -63,7 +66,7 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
             Exit::DONE
         }
         Err(OutputError::Cancelled(_)) => Exit::FAILED,
-        Err(error) => console.fail(Exit::FAILED, &error.to_string()),
+        Err(error) => console.print_error(Exit::FAILED, &error.to_string()),
     }
 }
 
@@ -88,7 +91,7 @@ fn report_approximations(file: &Path, notes: &[String], console: &Console) {
 }
 
 /// Writes all files or none. The scene is written last.
-fn write_all(scene: &Path, imported: &Imported, token: &CancelToken) -> Result<(), OutputError> {
+fn write_all(scene: &Path, imported: &ImportedScene, token: &CancelToken) -> Result<(), OutputError> {
     let name = PathBuf::from(scene.file_name().unwrap_or_default());
     let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));
     let files: Vec<_> = others.chain([(name, imported.text.as_bytes())]).collect();

@@ -7,27 +7,27 @@ use serde_json::{Map, Value, json};
 use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::output::json::file;
+use crate::output::json::to_pretty_text;
 use crate::output::settings::{ImageInfo, ImageInfoError, read_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
-use crate::scene::other_content;
-use crate::scene::sanitize::visible;
+use crate::scene::detect_non_scene;
+use crate::scene::sanitize::escape_invisible_chars;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     let info = match describe(&args.image) {
         Ok(info) => info,
-        Err(error) => return console.fail(Exit::WRONG, &error.to_string()),
+        Err(error) => return console.print_error(Exit::WRONG, &error.to_string()),
     };
     if args.json {
-        match file(&as_json(&args.image, &info)) {
+        match to_pretty_text(&as_json(&args.image, &info)) {
             Ok(text) => console.print_trusted_text(&text),
-            Err(error) => return console.fail(Exit::FAILED, &error.to_string()),
+            Err(error) => return console.print_error(Exit::FAILED, &error.to_string()),
         }
     } else {
         console.print_trusted_text(&as_text(&args.image, &info));
     }
-    if info.is_own() { Exit::DONE } else { Exit::FAILED }
+    if info.is_written_by_glimt() { Exit::DONE } else { Exit::FAILED }
 }
 
 /// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// # Errors
 /// Returns the same errors as [`read_info`].
 fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
-    read_info(path).or_else(|error| match (&error, other_content(path)) {
+    read_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
         (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
@@ -46,7 +46,7 @@ fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
 /// If the file is an image, part or checkpoint instead of a scene, reports this along with how the file was
 /// rendered, as one JSON line or as text. Returns `None` for other files.
 pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
-    let (_, problem) = other_content(path)?;
+    let (_, problem) = detect_non_scene(path)?;
     let info = describe(path);
     if is_json {
         let mut value = failure_to_json(&Failure::Scene(vec![*problem]));
@@ -71,7 +71,7 @@ fn as_json(path: &Path, info: &ImageInfo) -> Value {
         "height": info.size.map(|(_, height)| height),
         "frames": info.frames,
         "program": info.program,
-        "is_by_glimt": info.is_own(),
+        "is_by_glimt": info.is_written_by_glimt(),
         "settings": settings,
         "channels": info.channels,
     })
@@ -85,7 +85,7 @@ fn as_text(path: &Path, info: &ImageInfo) -> String {
     let name = path.to_string_lossy();
     let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
     let frames = info.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
-    let mut text = format!("{}: {}{size}{frames}\n", visible(&name), info.format);
+    let mut text = format!("{}: {}{size}{frames}\n", escape_invisible_chars(&name), info.format);
     let program = info.program.as_deref().unwrap_or("unknown (not stored in the file)");
     let mut lines = vec![("program", program)];
     lines.extend(info.settings.iter().map(|(name, value)| (name.as_str(), value.as_str())));
@@ -96,7 +96,7 @@ fn as_text(path: &Path, info: &ImageInfo) -> String {
     // Limit the width: names may be as long as the file, but format widths are limited to 65,535.
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MAX_NAME_COLUMNS);
     for (name, value) in lines {
-        text += &format!("  {:width$}  {}\n", visible(name), visible(value));
+        text += &format!("  {:width$}  {}\n", escape_invisible_chars(name), escape_invisible_chars(value));
     }
     text
 }

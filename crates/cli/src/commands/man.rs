@@ -8,7 +8,7 @@ use crate::args::{Args, EXAMPLES, EXIT_CODES};
 use crate::console::Console;
 use crate::environment::VARIABLES;
 use crate::exit::Exit;
-use crate::scene::nearest::nearest;
+use crate::scene::nearest::nearest_name;
 
 /// Prints the manual page for a command or for the whole program.
 pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
@@ -21,18 +21,18 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
     let Some(found) = found else {
         let name = command.unwrap_or_default();
         let names: Vec<&str> = all.get_subcommands().map(clap::Command::get_name).collect();
-        let help = match nearest(name, names.iter().copied()) {
+        let help = match nearest_name(name, names.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("expected one of {}", names.join(", ")),
         };
-        return console.fail(Exit::WRONG, &format!("unknown command {name:?}: {help}"));
+        return console.print_error(Exit::WRONG, &format!("unknown command {name:?}: {help}"));
     };
     match render_page(found, command.is_none()) {
         Ok(text) => {
             console.print_trusted_text(&text);
             Exit::DONE
         }
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot create the manual page: {error}")),
+        Err(error) => console.print_error(Exit::FAILED, &format!("cannot create the manual page: {error}")),
     }
 }
 
@@ -46,22 +46,22 @@ fn render_page(command: &clap::Command, is_whole: bool) -> std::io::Result<Strin
     man.render_title(&mut bytes)?;
     man.render_name_section(&mut bytes)?;
     // clap_mangen's synopsis lists every option and takes half a page.
-    section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
+    preformatted_section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
     man.render_description_section(&mut bytes)?;
     man.render_options_section(&mut bytes)?;
     if is_whole {
         man.render_subcommands_section(&mut bytes)?;
-        section("EXAMPLES", EXAMPLES).to_writer(&mut bytes)?;
-        section("EXIT STATUS", EXIT_CODES).to_writer(&mut bytes)?;
-        environment().to_writer(&mut bytes)?;
+        preformatted_section("EXAMPLES", EXAMPLES).to_writer(&mut bytes)?;
+        preformatted_section("EXIT STATUS", EXIT_CODES).to_writer(&mut bytes)?;
+        environment_section().to_writer(&mut bytes)?;
     } else if let Some(notes) = notes {
-        section("NOTES", &notes).to_writer(&mut bytes)?;
+        preformatted_section("NOTES", &notes).to_writer(&mut bytes)?;
     }
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// A section with preformatted lines.
-fn section(heading: &str, lines: &str) -> Roff {
+fn preformatted_section(heading: &str, lines: &str) -> Roff {
     let mut roff = Roff::default();
     roff.control("SH", [heading]);
     roff.control("nf", []);
@@ -72,7 +72,7 @@ fn section(heading: &str, lines: &str) -> Roff {
     roff
 }
 
-fn environment() -> Roff {
+fn environment_section() -> Roff {
     let mut roff = Roff::default();
     roff.control("SH", ["ENVIRONMENT"]);
     for (names, effect) in VARIABLES {

@@ -11,12 +11,12 @@ use rayon::ThreadPool;
 use serde_json::json;
 
 use self::inputs::{MergeInputs, scene_paths};
-use crate::args::{MergeArgs, Progress};
-use crate::console::{Console, answer_columns};
+use crate::args::{MergeArgs, ProgressMode};
+use crate::console::{Console, stdout_columns};
 use crate::control::{CancelToken, Cancelled};
 use crate::exit::Exit;
 use crate::film::Film;
-use crate::film::tone::develop;
+use crate::film::tone::tone_map_to_8_bits;
 use crate::merge_block::TerminalBlock;
 use crate::output::part::{self, MergedParts, PartError, PartFile};
 use crate::output::write::{WritePolicy, atomic_guarded};
@@ -24,7 +24,7 @@ use crate::output::{
     self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
 };
 use crate::progress::{bar_style, json_line};
-use crate::scene::sanitize::{shortened, visible};
+use crate::scene::sanitize::{escape_invisible_chars, shortened};
 use crate::signals;
 use crate::system::threads::core_pool;
 use crate::tui::{NamedImage, images_as_text};
@@ -35,13 +35,13 @@ const POLL_INTERVAL: Duration = Duration::from_millis(500);
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
     let pool = match core_pool() {
         Ok(pool) => pool,
-        Err(message) => return console.fail(Exit::FAILED, &message),
+        Err(message) => return console.print_error(Exit::FAILED, &message),
     };
     let token = CancelToken::new();
     let cancel = token.clone();
     let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(message) => return console.fail(Exit::FAILED, &message),
+        Err(message) => return console.print_error(Exit::FAILED, &message),
     };
     let exit = MergeCommand { args, console, token: &token, pool: &pool }.run();
     ended.signal_number().map_or(exit, |number| report_signal(number, console))
@@ -51,7 +51,7 @@ fn report_signal(number: i32, console: &Console) -> Exit {
     if let Some(signal) = signals::signal_name(number) {
         console.print_message(&format!("terminated by {signal}: nothing was written"));
     }
-    Exit::signal(number)
+    Exit::from_signal(number)
 }
 
 /// A `merge` command.
@@ -73,10 +73,10 @@ impl MergeCommand<'_> {
         let inputs = MergeInputs::new(&parts, &self.args.out, self.token);
         self.check_inputs(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
-        let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
-            return Err(self.console.fail(Exit::WRONG, "the parts contain no output settings"));
+        let Some(finish) = parts.first().and_then(|part| part.head.picture.develop_settings()) else {
+            return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
         };
-        self.write(format, finish, &merged, (&parts, &inputs))?;
+        self.write_image(format, finish, &merged, (&parts, &inputs))?;
         self.report_missing_parts(&merged);
         Ok(Exit::DONE)
     }
@@ -87,29 +87,34 @@ impl MergeCommand<'_> {
         let name = out.display();
         if part::is_part(out) {
             let message = format!("cannot write {name}: it is a part; put the output before the parts");
-            return Err(self.console.fail(Exit::WRONG, &message));
+            return Err(self.console.print_error(Exit::WRONG, &message));
         }
         if self.args.parts.iter().any(|part| is_same_file(part, out)) {
             let message = format!("{name} is both the output and a part");
-            return Err(self.console.fail(Exit::WRONG, &message));
+            return Err(self.console.print_error(Exit::WRONG, &message));
         }
-        let format =
-            Format::from_path(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
-        output::check_target(out).map_err(|error| self.console.fail(Exit::FAILED, &error.to_string()))?;
+        let format = Format::from_path(out)
+            .map_err(|error| self.console.print_error(Exit::WRONG, &error.to_string()))?;
+        output::check_target(out)
+            .map_err(|error| self.console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(format)
     }
 
     /// Checks that the output does not replace an input file of the render.
     fn check_inputs(&self, inputs: &MergeInputs<'_>) -> Result<(), Exit> {
-        match self.refused_input(inputs, &self.args.out) {
+        match self.input_conflict_message(inputs, &self.args.out) {
             Ok(None) => Ok(()),
-            Ok(Some(message)) => Err(self.console.fail(Exit::WRONG, &message)),
+            Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
             Err(Cancelled) => Err(Exit::FAILED),
         }
     }
 
     /// Returns an error message if the file at `path` is an input file of the parts or their scene.
-    fn refused_input(&self, inputs: &MergeInputs<'_>, path: &Path) -> Result<Option<String>, Cancelled> {
+    fn input_conflict_message(
+        &self,
+        inputs: &MergeInputs<'_>,
+        path: &Path,
+    ) -> Result<Option<String>, Cancelled> {
         let why = inputs.reason_to_keep(path)?;
         Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
     }
@@ -121,9 +126,9 @@ impl MergeCommand<'_> {
         for (index, path) in self.args.parts.iter().enumerate() {
             match PartFile::open(path, self.token) {
                 Ok(part) => parts.push(part),
-                Err(error) if error.is_out_of_files() => {
+                Err(error) if error.is_too_many_open_files() => {
                     bar.end();
-                    return Err(self.too_many_files(parts.len()));
+                    return Err(self.report_too_many_files(parts.len()));
                 }
                 Err(PartError::Unreadable { source, .. })
                     if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
@@ -136,18 +141,18 @@ impl MergeCommand<'_> {
         wrong.iter().for_each(|error| self.console.print_message(&format!("error: {error}")));
         match (wrong.is_empty(), parts.is_empty()) {
             (false, _) => Err(Exit::WRONG),
-            (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts exist")),
+            (true, true) => Err(self.console.print_error(Exit::WRONG, "none of the parts exist")),
             (true, false) => Ok(parts),
         }
     }
 
     /// Reports that no more parts can be opened because the limit on open files has been reached.
-    fn too_many_files(&self, opened: usize) -> Exit {
+    fn report_too_many_files(&self, opened: usize) -> Exit {
         let all = self.args.parts.len();
         let message = format!(
             "too many open files: only {opened} of {all} parts could be opened; raise the limit (ulimit -n)"
         );
-        self.console.fail(Exit::FAILED, &message)
+        self.console.print_error(Exit::FAILED, &message)
     }
 
     /// Waits until all parts are complete, showing the image so far.
@@ -159,10 +164,11 @@ impl MergeCommand<'_> {
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
-                let looked = awaited.try_open(self.token).map_err(|error| match error.is_out_of_files() {
-                    true => self.too_many_files(parts.len()),
-                    false => self.report_part_error(&error),
-                });
+                let looked =
+                    awaited.try_open(self.token).map_err(|error| match error.is_too_many_open_files() {
+                        true => self.report_too_many_files(parts.len()),
+                        false => self.report_part_error(&error),
+                    });
                 match looked? {
                     Some(part) => parts.push(part),
                     None => rest.push(awaited),
@@ -215,14 +221,14 @@ impl MergeCommand<'_> {
     /// Reports the parts on stderr, unless the same terminal shows the same text above the image.
     fn report_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
-            Progress::None => {}
-            Progress::Json => {
+            ProgressMode::None => {}
+            ProgressMode::Json => {
                 let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
                 let total = self.args.parts.len();
                 json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
             }
-            Progress::Auto if self.redraws_in_place() && self.console.is_terminal => {}
-            Progress::Auto | Progress::Plain => self.console.print_message(words),
+            ProgressMode::Auto if self.redraws_in_place() && self.console.is_terminal => {}
+            ProgressMode::Auto | ProgressMode::Plain => self.console.print_message(words),
         }
     }
 
@@ -230,17 +236,17 @@ impl MergeCommand<'_> {
     /// between redraws.
     fn redraws_in_place(&self) -> bool {
         let has_lines = match self.args.progress {
-            Progress::Plain | Progress::Json => self.console.is_terminal,
-            Progress::Auto | Progress::None => false,
+            ProgressMode::Plain | ProgressMode::Json => self.console.is_terminal,
+            ProgressMode::Auto | ProgressMode::None => false,
         };
         std::io::stdout().is_terminal() && !has_lines
     }
 
     /// Redraws the image merged from these parts, with a title.
     fn redraw_image(&self, parts: &[PartFile], words: &str, block: &mut TerminalBlock) -> Result<(), Exit> {
-        let words = visible(words);
-        let columns = answer_columns();
-        let finish = parts.first().and_then(|part| part.head.picture.finish());
+        let words = escape_invisible_chars(words);
+        let columns = stdout_columns();
+        let finish = parts.first().and_then(|part| part.head.picture.develop_settings());
         let lines = match finish {
             None => {
                 part::check(parts).map_err(|error| self.report_part_error(&error))?;
@@ -250,7 +256,7 @@ impl MergeCommand<'_> {
                 let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
                     let image = finish.image(&merged.film);
-                    let picture = develop(&image, &finish.tone.resolved_for(&image));
+                    let picture = tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image));
                     images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
             }
@@ -277,7 +283,7 @@ impl MergeCommand<'_> {
     fn report_part_error(&self, error: &PartError) -> Exit {
         match error {
             PartError::Cancelled(_) => Exit::FAILED,
-            PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
+            PartError::Film(_) => self.console.print_error(Exit::FAILED, &error.to_string()),
             PartError::Unreadable { .. }
             | PartError::NotRegular { .. }
             | PartError::Foreign { .. }
@@ -287,11 +293,11 @@ impl MergeCommand<'_> {
             | PartError::Kind { .. }
             | PartError::Other { .. }
             | PartError::Doubled { .. }
-            | PartError::Missing { .. } => self.console.fail(Exit::WRONG, &error.to_string()),
+            | PartError::Missing { .. } => self.console.print_error(Exit::WRONG, &error.to_string()),
         }
     }
 
-    fn write(
+    fn write_image(
         &self,
         format: Format,
         mut finish: DevelopSettings,
@@ -305,7 +311,7 @@ impl MergeCommand<'_> {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
             let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
-            let why = why.map_or_else(|| self.refused_input(inputs, real), |why| Ok(Some(why)))?;
+            let why = why.map_or_else(|| self.input_conflict_message(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
@@ -320,9 +326,9 @@ impl MergeCommand<'_> {
         let written = bytes.and_then(|bytes| atomic_guarded(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,
-            other => self.console.fail(Exit::FAILED, &other.to_string()),
+            other => self.console.print_error(Exit::FAILED, &other.to_string()),
         })?;
-        if self.args.progress != Progress::None {
+        if self.args.progress != ProgressMode::None {
             let (width, height) = (film.width(), film.height());
             self.console.print_message(&format!("wrote {} ({width}×{height})", out.display()));
         }
@@ -331,7 +337,7 @@ impl MergeCommand<'_> {
 
     fn report_missing_parts(&self, merged: &MergedParts) {
         if !merged.missing.is_empty() {
-            let missing = part::missing_parts(&merged.missing, merged.count);
+            let missing = part::missing_parts_message(&merged.missing, merged.count);
             self.console.print_message(&format!("warning: {missing}; merged the others"));
         }
     }
@@ -341,7 +347,7 @@ impl MergeCommand<'_> {
 fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     if let Some(path) = scene_paths(parts, out).find(|path| path.is_file()) {
-        *scene = scene_path::relative(&path, out);
+        *scene = scene_path::relative_to_image(&path, out);
     }
 }
 
@@ -397,11 +403,11 @@ struct StepProgress {
 }
 
 impl StepProgress {
-    fn new(progress: Progress, console: &Console, what: &'static str) -> Self {
+    fn new(progress: ProgressMode, console: &Console, what: &'static str) -> Self {
         let template = "  {wide_bar} {percent:>3}% {msg}";
-        let has_bar = progress == Progress::Auto && console.is_terminal;
+        let has_bar = progress == ProgressMode::Auto && console.is_terminal;
         let bar = has_bar.then(|| ProgressBar::new(1).with_style(bar_style(template)).with_message(what));
-        Self { what, bar, is_json: progress == Progress::Json, said: 0 }
+        Self { what, bar, is_json: progress == ProgressMode::Json, said: 0 }
     }
 
     fn update(&mut self, done: usize, total: usize) {

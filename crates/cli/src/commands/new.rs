@@ -4,16 +4,17 @@ use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use crate::args::Draft;
+use crate::args::SchemaDraft;
 use crate::commands::schema;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::{self, Format, OutputError, write};
-use crate::scene::sanitize::visible;
-use crate::scene::{is_mesh, starter};
+use crate::scene::sanitize::escape_invisible_chars;
+use crate::scene::{is_mesh, starter_scene};
 
 pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
-    let text = if with_schema { format!("{}{}", schema::LINE, starter()) } else { starter().to_owned() };
+    let text =
+        if with_schema { format!("{}{}", schema::LINE, starter_scene()) } else { starter_scene().to_owned() };
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
@@ -25,7 +26,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         return Exit::DONE;
     }
     if let Some(message) = wrong_extension_error(file) {
-        return console.fail(Exit::WRONG, &message);
+        return console.print_error(Exit::WRONG, &message);
     }
     // Do not write the schema if the scene cannot be written.
     let is_free = file.symlink_metadata().is_err();
@@ -34,11 +35,11 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         match write_schema(&schema) {
             Ok(true) => console.print_message(&format!("wrote {}", schema.display())),
             Ok(false) => {}
-            Err((exit, message)) => return console.fail(exit, &message),
+            Err((exit, message)) => return console.print_error(exit, &message),
         }
     }
     let name = file.display();
-    match write::new_file(file, text.as_bytes()) {
+    match write::create_new(file, text.as_bytes()) {
         Ok(()) => {
             console.print_message(&format!("wrote {name}"));
             if let Some(file) = quote_file_name(file) {
@@ -52,13 +53,13 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
             let dangles = !file.exists();
             let what =
                 if dangles { "is a symbolic link to a file that does not exist" } else { "already exists" };
-            console.fail(Exit::WRONG, &format!("{name} {what}"))
+            console.print_error(Exit::WRONG, &format!("{name} {what}"))
         }
         Err(source) => {
             // Prefer the more specific error about the folder.
             let of_place = output::check_path(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
-            console.fail(Exit::FAILED, &error.to_string())
+            console.print_error(Exit::FAILED, &error.to_string())
         }
     }
 }
@@ -68,8 +69,8 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
 /// # Errors
 /// A different file with this name exists, or the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
-    let text = schema::schema_text(Draft::Four);
-    match write::new_file(path, text.as_bytes()) {
+    let text = schema::schema_text(SchemaDraft::Four);
+    match write::create_new(path, text.as_bytes()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => match std::fs::read(path) {
             Ok(there) if there == text.as_bytes() => Ok(false),
@@ -105,7 +106,7 @@ fn wrong_extension_error(file: &Path) -> Option<String> {
 /// Quotes a file name for a shell and ensures that glimt does not mistake it for an option or a command.
 /// `None` if the name is not safe to print.
 fn quote_file_name(file: &Path) -> Option<String> {
-    let name = file.to_str().filter(|name| visible(name) == *name)?;
+    let name = file.to_str().filter(|name| escape_invisible_chars(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
     let name = if is_bare { format!("./{name}") } else { name.to_owned() };
     shlex::try_quote(&name).ok().map(Cow::into_owned)

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::{Reporter, describe_samples, seconds};
+use super::{Reporter, describe_samples, format_seconds};
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::words::Eta;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Minimum width of the bar.
 const MIN_BAR_COLUMNS: usize = 10;
@@ -32,7 +32,7 @@ impl ProgressBars {
         Self { all, stage, assets: HashMap::new(), render: None, time }
     }
 
-    fn stage(&mut self, stage: &StageReport) {
+    fn show_stage(&mut self, stage: &StageReport) {
         if stage.status == Status::Running {
             self.stage.set_message(stage.name.name());
             self.stage.tick();
@@ -41,13 +41,13 @@ impl ProgressBars {
         }
     }
 
-    fn asset(&mut self, progress: &AssetProgress) {
+    fn show_asset(&mut self, progress: &AssetProgress) {
         let (all, stage) = (&self.all, &self.stage);
         let bar = self.assets.entry(progress.name.clone()).or_insert_with(|| {
             let bar =
                 ProgressBar::new(progress.total).with_style(bar_style("  {bar:24} {percent:>3}% {msg}"));
             let bar = all.insert_after(stage, bar);
-            bar.set_message(visible(&progress.name).into_owned());
+            bar.set_message(escape_invisible_chars(&progress.name).into_owned());
             bar
         });
         bar.set_position(progress.done);
@@ -56,7 +56,7 @@ impl ProgressBars {
         }
     }
 
-    fn progress(&mut self, progress: &RenderProgress) {
+    fn show_progress(&mut self, progress: &RenderProgress) {
         let all = &self.all;
         let bar = self.render.get_or_insert_with(|| {
             all.add(ProgressBar::new(STEPS).with_style(bar_style("  {wide_bar} {percent:>3}% {msg}")))
@@ -70,17 +70,17 @@ impl ProgressBars {
 }
 
 impl Reporter for ProgressBars {
-    fn event(&mut self, event: &Event) {
+    fn handle_event(&mut self, event: &Event) {
         if let Event::Stage { stage, .. } = event {
-            self.stage(stage);
+            self.show_stage(stage);
         } else if let Event::Asset { progress, .. } = event {
-            self.asset(progress);
+            self.show_asset(progress);
         } else if let Event::Progress { progress, .. } = event {
-            self.progress(progress);
+            self.show_progress(progress);
         }
     }
 
-    fn end(&mut self) {
+    fn clear_output(&mut self) {
         self.assets.drain().for_each(|(_, bar)| bar.finish_and_clear());
         if let Some(bar) = self.render.take() {
             bar.finish_and_clear();
@@ -95,10 +95,12 @@ impl Reporter for ProgressBars {
 /// there is a time limit.
 fn format_bar_text(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
-        Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),
+        Some(limit) => {
+            format!("{} of {}", format_seconds(progress.elapsed_seconds.min(limit)), format_seconds(limit))
+        }
         None => describe_samples(progress),
     };
-    let left = Eta::of(progress).map(|eta| format!("{} left", eta.words()));
+    let left = Eta::from_progress(progress).map(|eta| format!("{} left", eta.format()));
     let whole = match (&left, time) {
         (Some(left), None) => format!("{done}, {left}"),
         (_, _) => done.clone(),

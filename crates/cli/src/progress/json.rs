@@ -24,22 +24,22 @@ use crate::diagnostic_json::diagnostic_to_json;
 use crate::output::json::to_line;
 use crate::pipeline::protocol::{CheckpointUpdate, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::report::Locator;
+use crate::scene::report::LineColumnLocator;
 
 pub(super) struct JsonReporter;
 
 impl Reporter for JsonReporter {
-    fn event(&mut self, event: &Event) {
+    fn handle_event(&mut self, event: &Event) {
         if let Some(value) = event_to_json(event) {
             print_json_line(&value);
         }
     }
 
-    fn says_results(&self) -> bool {
+    fn allows_text_results(&self) -> bool {
         false
     }
 
-    fn says_diagnostics(&self) -> bool {
+    fn reports_diagnostics(&self) -> bool {
         true
     }
 }
@@ -140,7 +140,7 @@ pub(crate) fn failure_to_json(failure: &Failure) -> Value {
 /// Converts diagnostics as in `check --json`, and adds the key `path`: the same as `file`, or null if `file`
 /// is empty.
 fn diagnostics_to_json(all: &[Diagnostic]) -> Vec<Value> {
-    let mut places = Locator::default();
+    let mut places = LineColumnLocator::default();
     let with_path = |one: &Diagnostic| {
         let mut value = diagnostic_to_json(one, &mut places);
         value["path"] = json!(diagnostic_path(one));

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use super::{Reporter, describe_samples, seconds};
+use super::{Reporter, describe_samples, format_seconds};
 use crate::console::Console;
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
 use crate::pipeline::words::Eta;
@@ -39,14 +39,14 @@ impl PlainReporter {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
-    fn progress(&mut self, progress: &RenderProgress) {
-        if let Some(line) = self.next_line(progress) {
+    fn print_progress(&mut self, progress: &RenderProgress) {
+        if let Some(line) = self.due_progress_line(progress) {
             self.console.print_message(&line);
         }
     }
 
     /// Returns the line to print now, if one is due. Never repeats the last line.
-    fn next_line(&mut self, progress: &RenderProgress) -> Option<String> {
+    fn due_progress_line(&mut self, progress: &RenderProgress) -> Option<String> {
         let step = (progress.fraction * STEPS).floor();
         if progress.fraction >= 1.0 || (step <= self.reported && self.last.elapsed() < INTERVAL) {
             return None;
@@ -62,7 +62,7 @@ impl PlainReporter {
 }
 
 impl Reporter for PlainReporter {
-    fn event(&mut self, event: &Event) {
+    fn handle_event(&mut self, event: &Event) {
         if let Event::Stage { stage, .. } = event
             && stage.status != Status::Running
         {
@@ -72,13 +72,13 @@ impl Reporter for PlainReporter {
         {
             self.console.print_message(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
-            self.progress(progress);
+            self.print_progress(progress);
         }
     }
 }
 
 fn format_progress(progress: &RenderProgress) -> String {
-    let eta = Eta::of(progress).map_or(String::new(), |eta| format!(", {} left", eta.words()));
+    let eta = Eta::from_progress(progress).map_or(String::new(), |eta| format!(", {} left", eta.format()));
     format!(
         "{:<8} {:3.0}% ({}{eta})",
         "render",
@@ -95,7 +95,7 @@ pub(super) fn stage_line(stage: &StageReport) -> String {
         Status::Reused => "reused",
         Status::Skipped => "skipped",
     };
-    let time = if stage.status == Status::Skipped { String::new() } else { seconds(stage.seconds) };
+    let time = if stage.status == Status::Skipped { String::new() } else { format_seconds(stage.seconds) };
     format!("{:<8} {status:<7} {time:>9}  {}", stage.name.name(), stage.why).trim_end().to_owned()
 }
 
@@ -121,8 +121,8 @@ mod tests {
         for samples in 0..100 {
             // Report each value twice, as the renderer does: at the end of a pass and at the start of the
             // next pass.
-            said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
-            said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
+            said.extend(plain.due_progress_line(&progress(f64::from(samples) / 100.0, samples)));
+            said.extend(plain.due_progress_line(&progress(f64::from(samples) / 100.0, samples)));
         }
         let tens: Vec<_> =
             (1..10).map(|ten| format_progress(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
@@ -130,10 +130,10 @@ mod tests {
         // The interval has passed, but nothing has changed.
         plain.last =
             Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
-        assert_eq!(plain.next_line(&progress(0.9, 90)), None);
+        assert_eq!(plain.due_progress_line(&progress(0.9, 90)), None);
         plain.last =
             Instant::now().checked_sub(INTERVAL).expect("expected an uptime longer than the interval");
-        assert!(plain.next_line(&progress(0.91, 91)).is_some());
+        assert!(plain.due_progress_line(&progress(0.91, 91)).is_some());
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let outer = IS_CATCHING.replace(true);
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     IS_CATCHING.set(outer);
-    result.map_err(|payload| message(payload.as_ref()))
+    result.map_err(|payload| panic_message(payload.as_ref()))
 }
 
 fn silence_caught_panics() {
@@ -37,7 +37,7 @@ fn silence_caught_panics() {
     });
 }
 
-fn message(payload: &(dyn Any + Send)) -> String {
+fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned()
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::materials::PixelValue;
+use crate::materials::ChannelSelector;
 use crate::math::{DVec2, Vec2, Vec3};
 
 /// A material from an MTL file.
@@ -166,7 +166,7 @@ pub struct FileTexture {
     /// Offset and scale applied to the values, `-mm`.
     pub range: (f32, f32),
     /// Channel to read as a scalar, `-imfchan`.
-    pub number: Option<PixelValue>,
+    pub number: Option<ChannelSelector>,
     /// The MTL statement.
     pub statement: FileLine,
 }

@@ -93,7 +93,7 @@ pub struct LoadedMesh {
     /// Materials from the file, indexed by [`TriangleMesh::materials`].
     pub materials: Vec<FileMaterial>,
     /// Number of skipped faces, by reason.
-    pub dropped: Dropped,
+    pub dropped: DroppedFaces,
     /// Other warnings, one line each.
     pub warnings: Vec<String>,
     /// Warnings about the file's materials, one line each. Irrelevant if the scene overrides the materials.
@@ -118,7 +118,7 @@ impl LoadedMesh {
 
 /// Number of unusable faces, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
+pub struct DroppedFaces {
     /// Faces with a NaN or an infinite coordinate.
     pub non_finite: u64,
     /// Faces with coincident or collinear corners.

@@ -36,7 +36,7 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// of values is wrong, or a value is not finite or out of range.
 pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
-    let bytes = read::text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
+    let bytes = read::read_text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
     Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 
@@ -48,18 +48,18 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
         match words.next() {
             None => {}
             Some(comment) if comment.starts_with('#') => {}
-            Some("c") => center = Some(numbers("c", words).map_err(wrong)?),
-            Some("p") => position = Some(numbers("p", words).map_err(wrong)?),
-            Some("r") => rotation = Some(numbers("r", words).map_err(wrong)?),
-            Some("s") => size = Some(check_distance(numbers("s", words)).map_err(wrong)?),
-            Some("f") => field = Some(view_angle(numbers("f", words)).map_err(wrong)?),
+            Some("c") => center = Some(parse_numbers("c", words).map_err(wrong)?),
+            Some("p") => position = Some(parse_numbers("p", words).map_err(wrong)?),
+            Some("r") => rotation = Some(parse_numbers("r", words).map_err(wrong)?),
+            Some("s") => size = Some(check_distance(parse_numbers("s", words)).map_err(wrong)?),
+            Some("f") => field = Some(check_fov(parse_numbers("f", words)).map_err(wrong)?),
             Some(other) => {
                 let shown: String = other.chars().take(20).collect();
-                return Err(wrong(unknown_line(&shown)));
+                return Err(wrong(unknown_line_message(&shown)));
             }
         }
     }
-    let missing = |line| AssetError::malformed(path, None, missing_line(line));
+    let missing = |line| AssetError::malformed(path, None, missing_line_message(line));
     let [size, radius] = size.ok_or_else(|| missing("s size radius"))?;
     let [fov, width, height] = field.unwrap_or(DEFAULT_FIELD);
     Ok(OrbiterCamera {
@@ -74,48 +74,48 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
     })
 }
 
-fn missing_line(line: &str) -> String {
+fn missing_line_message(line: &str) -> String {
     format!("missing line `{line}`")
 }
 
-fn unknown_line(found: &str) -> String {
+fn unknown_line_message(found: &str) -> String {
     format!("expected a line starting with c, p, r, s or f, found {found:?}")
 }
 
-fn wrong_count(letter: &str, count: usize) -> String {
+fn wrong_count_message(letter: &str, count: usize) -> String {
     format!("expected {count} finite numbers after `{letter}`")
 }
 
-fn too_large(letter: &str, number: f64) -> String {
+fn number_too_large_message(letter: &str, number: f64) -> String {
     format!("numbers after `{letter}` must be below {LARGEST:e} in magnitude, not {number:e}")
 }
 
-fn too_short(size: f64) -> String {
+fn distance_too_short_message(size: f64) -> String {
     format!("the distance in `s` must be above {SHORTEST:e}, not {size:e}")
 }
 
-fn not_positive(size: f64) -> String {
+fn distance_not_positive_message(size: f64) -> String {
     format!("the distance in `s` must be positive, not {size}")
 }
 
-fn wrong_angle(fov: f64) -> String {
+fn invalid_fov_message(fov: f64) -> String {
     format!("the angle in `f` must be between 0 and 180 degrees, not {fov}")
 }
 
-fn wrong_size(width: f64, height: f64) -> String {
+fn invalid_size_message(width: f64, height: f64) -> String {
     format!("width and height in `f` must be positive, not {width} × {height}")
 }
 
-fn numbers<'a, const N: usize>(
+fn parse_numbers<'a, const N: usize>(
     letter: &str,
     words: impl Iterator<Item = &'a str>,
 ) -> Result<[f64; N], String> {
     let found: Option<Vec<f64>> =
         words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let exact: Option<[f64; N]> = found.and_then(|found| found.try_into().ok());
-    let numbers = exact.ok_or_else(|| wrong_count(letter, N))?;
+    let numbers = exact.ok_or_else(|| wrong_count_message(letter, N))?;
     match numbers.iter().find(|number| number.abs() > LARGEST) {
-        Some(number) => Err(too_large(letter, *number)),
+        Some(number) => Err(number_too_large_message(letter, *number)),
         None => Ok(numbers),
     }
 }
@@ -124,19 +124,19 @@ fn numbers<'a, const N: usize>(
 fn check_distance(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
     let [size, radius] = numbers?;
     match () {
-        () if !(size > 0.0) => Err(not_positive(size)),
-        () if is_too_short(size) => Err(too_short(size)),
+        () if !(size > 0.0) => Err(distance_not_positive_message(size)),
+        () if is_too_short(size) => Err(distance_too_short_message(size)),
         () => Ok([size, radius]),
     }
 }
 
-fn view_angle(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
+fn check_fov(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
     let [fov, width, height] = numbers?;
     if !(fov > 0.0 && fov < 180.0) {
-        return Err(wrong_angle(fov));
+        return Err(invalid_fov_message(fov));
     }
     if !(width > 0.0 && height > 0.0) {
-        return Err(wrong_size(width, height));
+        return Err(invalid_size_message(width, height));
     }
     Ok([fov, width, height])
 }
@@ -165,26 +165,26 @@ mod tests {
     fn lines_with_a_default_are_optional() {
         let camera = parse(Path::new("cam.txt"), "# old\r\ns 4 5\r\n\r\nc 0 0 0\r\n").expect("whole");
         assert_eq!((camera.rotation, camera.fov), ([0.0, 0.0], 45.0));
-        assert_eq!(error("c 0 0 0"), (None, missing_line("s size radius")));
-        assert_eq!(error("s 1 1"), (None, missing_line("c x y z")));
+        assert_eq!(error("c 0 0 0"), (None, missing_line_message("s size radius")));
+        assert_eq!(error("s 1 1"), (None, missing_line_message("c x y z")));
     }
 
     #[test]
     fn errors_include_line_and_reason() {
         for (text, line, reason) in [
-            ("c 0 0 0\np 1\n", 2, wrong_count("p", 2)),
-            ("c 0 nan 0", 1, wrong_count("c", 3)),
-            ("r 0 1 2", 1, wrong_count("r", 2)),
-            ("\ns 0 1", 2, not_positive(0.0)),
-            ("f 180 4 3", 1, wrong_angle(180.0)),
-            ("f 40 4 0", 1, wrong_size(4.0, 0.0)),
-            ("x 1", 1, unknown_line("x")),
-            ("c 0 1e20 0", 1, too_large("c", 1e20)),
-            ("p 1e308 0", 1, too_large("p", 1e308)),
-            ("r 0 -1e19", 1, too_large("r", -1e19)),
-            ("s 1e20 1", 1, too_large("s", 1e20)),
-            ("s 1e-30 1", 1, too_short(1e-30)),
-            ("f 40 1e19 3", 1, too_large("f", 1e19)),
+            ("c 0 0 0\np 1\n", 2, wrong_count_message("p", 2)),
+            ("c 0 nan 0", 1, wrong_count_message("c", 3)),
+            ("r 0 1 2", 1, wrong_count_message("r", 2)),
+            ("\ns 0 1", 2, distance_not_positive_message(0.0)),
+            ("f 180 4 3", 1, invalid_fov_message(180.0)),
+            ("f 40 4 0", 1, invalid_size_message(4.0, 0.0)),
+            ("x 1", 1, unknown_line_message("x")),
+            ("c 0 1e20 0", 1, number_too_large_message("c", 1e20)),
+            ("p 1e308 0", 1, number_too_large_message("p", 1e308)),
+            ("r 0 -1e19", 1, number_too_large_message("r", -1e19)),
+            ("s 1e20 1", 1, number_too_large_message("s", 1e20)),
+            ("s 1e-30 1", 1, distance_too_short_message(1e-30)),
+            ("f 40 1e19 3", 1, number_too_large_message("f", 1e19)),
         ] {
             assert_eq!(error(text), (Some(line), reason), "{text}");
         }

@@ -21,8 +21,8 @@ pub(crate) const BINARY_FILE: &str = "this is a binary file in another format";
 pub(crate) const UTF16_TEXT: &str = "this is text in UTF-16; save it as UTF-8";
 
 /// Error message for anything other than a regular file.
-fn not_regular(kind: FileKind) -> String {
-    format!("it is {}, not a regular file", kind.words())
+fn not_regular_file_message(kind: FileKind) -> String {
+    format!("it is {}, not a regular file", kind.description())
 }
 
 /// Progress callback and cancel token for loading a file.
@@ -34,7 +34,7 @@ pub(crate) struct Monitor<'a> {
 
 impl Monitor<'_> {
     /// Reports progress, then polls the token.
-    pub(crate) fn tick(&self, done: usize, total: usize) -> Result<(), Cancelled> {
+    pub(crate) fn report_progress(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         (self.progress)(done as u64, total as u64);
         self.token.check()
     }
@@ -49,8 +49,8 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
 /// and folders without opening them, because opening a pipe may block.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
-    let refused = |kind: FileKind| AssetError::unreadable(path, not_regular(kind));
-    let (mut file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
+    let refused = |kind: FileKind| AssetError::unreadable(path, not_regular_file_message(kind));
+    let (mut file, found) = file::open_regular_file(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
         let reason = format!("it has {} bytes; the limit is {} MiB", found.len(), limit >> 20);
         return Err(AssetError::unreadable(path, reason));
@@ -70,7 +70,7 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
 const START: usize = 1 << 12;
 
 /// Reads a text file. Rejects binary files based on their first [`START`] bytes.
-pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         reject_if_binary(path, start.contains(&0))
@@ -78,7 +78,11 @@ pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<
 }
 
 /// Reads a text or binary file whose format starts with three letters.
-pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+pub(crate) fn read_text_or_binary(
+    path: &Path,
+    limit: u64,
+    monitor: Monitor<'_>,
+) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         reject_if_binary(path, start[..start.len().min(3)].contains(&0))
@@ -86,14 +90,18 @@ pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> R
 }
 
 /// Reads a text or binary file. Rejects files that start with [`START`] zeros.
-pub(crate) fn not_all_zero(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+pub(crate) fn read_unless_all_zero(
+    path: &Path,
+    limit: u64,
+    monitor: Monitor<'_>,
+) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |start| {
         reject_if_binary(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
 /// Reads a regular file with any content.
-pub(crate) fn bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+pub(crate) fn read_bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |_| Ok(()))
 }
 
@@ -137,7 +145,7 @@ fn read_accepted(
     read_rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file that has about `length` bytes. Reports progress like [`bytes`].
+/// Reads the rest of an open file that has about `length` read_bytes. Reports progress like [`read_bytes`].
 pub(crate) fn read_rest(
     path: &Path,
     file: File,
@@ -151,7 +159,7 @@ pub(crate) fn read_rest(
     let out_of_memory = |_| AssetError::OutOfMemory { path: path.to_owned(), bytes: length };
     try_reserve_exact(&mut bytes, length + 1).map_err(out_of_memory)?;
     loop {
-        monitor.tick(bytes.len().min(length), 2 * length)?;
+        monitor.report_progress(bytes.len().min(length), 2 * length)?;
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
@@ -175,8 +183,8 @@ mod tests {
     fn unsuitable_files_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let reason = |path: &Path| rejection(bytes(path, 100, monitor(&token))).1;
-        assert_eq!(reason(folder.path()), not_regular(FileKind::Folder));
+        let reason = |path: &Path| rejection(read_bytes(path, 100, monitor(&token))).1;
+        assert_eq!(reason(folder.path()), not_regular_file_message(FileKind::Folder));
         let missing = std::io::Error::from_raw_os_error(nix::libc::ENOENT);
         assert_eq!(reason(&folder.path().join("none.obj")), describe_error(&missing));
         let long = folder.path().join("long");
@@ -191,15 +199,15 @@ mod tests {
         let path = folder.path().join("zeros");
         // A sparse 3 TiB file. Reading it completely would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [text, text_or_binary] {
+        for read in [read_text, read_text_or_binary] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
-        assert!(text(&path, 100, monitor(&token)).is_err());
-        assert_eq!(text_or_binary(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
+        assert!(read_text(&path, 100, monitor(&token)).is_err());
+        assert_eq!(read_text_or_binary(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
-        assert_eq!(text(&path, 100, monitor(&token)).expect("read"), b"");
+        assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
     }
 
     #[test]
@@ -213,7 +221,7 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [text, text_or_binary] {
+                for read in [read_text, read_text_or_binary] {
                     let error = rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
@@ -229,7 +237,7 @@ mod tests {
         for numbers in [[33_u16, 126, 40], [0xfeff, 65, 66]] {
             let content: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
             fs::write(&path, &content).expect("written");
-            for read in [bytes, not_all_zero] {
+            for read in [read_bytes, read_unless_all_zero] {
                 assert_eq!(read(&path, 100, monitor(&token)).expect("numbers"), content);
             }
         }
@@ -242,12 +250,12 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [text, text_or_binary, not_all_zero, bytes] {
+        for read in [read_text, read_text_or_binary, read_unless_all_zero, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }
         fs::write(&path, format!("{pointer}{}", "x".repeat(1024))).expect("written");
-        assert!(bytes(&path, 1 << 20, monitor(&token)).is_ok(), "pointers are short");
+        assert!(read_bytes(&path, 1 << 20, monitor(&token)).is_ok(), "pointers are short");
     }
 
     #[cfg(unix)]
@@ -255,13 +263,13 @@ mod tests {
     fn pipes_and_link_loops_do_not_block() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let reason = |path: &Path| rejection(bytes(path, 100, monitor(&token))).1;
+        let reason = |path: &Path| rejection(read_bytes(path, 100, monitor(&token))).1;
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
-        assert_eq!(reason(&pipe), not_regular(FileKind::Special));
-        assert_eq!(reason(Path::new("/dev/zero")), not_regular(FileKind::Special));
+        assert_eq!(reason(&pipe), not_regular_file_message(FileKind::Special));
+        assert_eq!(reason(Path::new("/dev/zero")), not_regular_file_message(FileKind::Special));
         #[cfg(target_os = "linux")]
-        assert_eq!(reason(Path::new("/proc/kmsg")), not_regular(FileKind::Kernel));
+        assert_eq!(reason(Path::new("/proc/kmsg")), not_regular_file_message(FileKind::Kernel));
         let cycle = folder.path().join("cycle");
         std::os::unix::fs::symlink(&cycle, &cycle).expect("a link");
         let link_loop = std::io::Error::from_raw_os_error(nix::libc::ELOOP);
@@ -281,7 +289,7 @@ mod tests {
                 token.cancel();
             }
         };
-        let result = bytes(&path, u64::MAX, Monitor { progress: &note, token: &token });
+        let result = read_bytes(&path, u64::MAX, Monitor { progress: &note, token: &token });
         assert!(matches!(result, Err(AssetError::Cancelled(_))));
         let total = 6 * CHUNK as u64;
         let expected: Vec<_> = (0..3).map(|chunk| (chunk * CHUNK as u64, total)).collect();

@@ -1,6 +1,6 @@
 //! Bias: the brightness difference between an image and its reference, compared with the noise in both.
 
-use super::Errors;
+use super::ErrorMetrics;
 
 /// Excess brightness of an image, relative to the reference's mean luminance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Bias {
 impl Bias {
     /// Computes the bias. `standard_errors` contains the standard errors of both mean luminances, if known.
     /// The noise of the two images must be independent.
-    pub fn new(errors: &Errors, standard_errors: [Option<f64>; 2]) -> Self {
+    pub fn new(errors: &ErrorMetrics, standard_errors: [Option<f64>; 2]) -> Self {
         let [a, b] = errors.luminances;
         let error = match standard_errors {
             [Some(a), Some(b)] => Some((a * a + b * b).sqrt()),
@@ -41,7 +41,7 @@ mod tests {
     use crate::film::RadianceImage;
     use crate::math::Vec3;
 
-    fn errors(a: f32, b: f32) -> Errors {
+    fn errors(a: f32, b: f32) -> ErrorMetrics {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::ZERO, Vec3::splat(value)] };
         measure(&Pair::new([Path::new("a"), Path::new("b")], image(a), image(b)).expect("a pair")).errors

@@ -20,19 +20,19 @@ const C2: f64 = 0.03 * 0.03;
 /// Luma weights of red, green and blue (ITU-R BT.709).
 const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-pub(super) struct Display {
+pub(super) struct DisplayErrors {
     pub(super) psnr_db: f64,
     pub(super) ssim: f64,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct DisplayErrorSums {
     square: f64,
     ssim: f64,
     windows: u64,
 }
 
-impl Sums {
+impl DisplayErrorSums {
     fn plus(self, other: Self) -> Self {
         Self {
             square: self.square + other.square,
@@ -42,27 +42,27 @@ impl Sums {
     }
 }
 
-pub(super) fn measure(pair: &Pair) -> Display {
+pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
     let window = normalized(&gaussian(SIGMA, RADIUS));
     let band_sums = |band| {
         let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
-        sums.fold(Sums::default(), Sums::plus)
+        sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)
     };
     let bands: Vec<_> = (0..tiles::band_count(height)).into_par_iter().map(band_sums).collect();
-    let sums = bands.into_iter().fold(Sums::default(), Sums::plus);
+    let sums = bands.into_iter().fold(DisplayErrorSums::default(), DisplayErrorSums::plus);
     let mean_square = sums.square / (3 * width * height) as f64;
-    Display { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
+    DisplayErrors { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
 }
 
-fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> Sums {
-    let (square, [a, b]) = lumas(pair, tile);
+fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
+    let (square, [a, b]) = tile_lumas_and_squared_error(pair, tile);
     let mean = |plane: &Plane| plane.filtered(window, window);
     let (mean_a, mean_b) = (mean(&a), mean(&b));
     let (mean_aa, mean_bb, mean_ab) = (mean(&a.times(&a)), mean(&b.times(&b)), mean(&a.times(&b)));
-    let columns = weights_inside(tile.x, tile.width, pair.width(), window);
-    let rows = weights_inside(tile.y, tile.height, pair.height(), window);
-    let mut sums = Sums { square, ..Sums::default() };
+    let columns = window_weights_inside_image(tile.x, tile.width, pair.width(), window);
+    let rows = window_weights_inside_image(tile.y, tile.height, pair.height(), window);
+    let mut sums = DisplayErrorSums { square, ..DisplayErrorSums::default() };
     for (y, row) in rows.iter().enumerate() {
         for (x, column) in columns.iter().enumerate() {
             let (Some(row), Some(column)) = (row, column) else { continue };
@@ -82,7 +82,7 @@ fn ssim([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
 
 /// Returns the sum of squared differences over the tile's channels, and the luma of both images in the tile,
 /// including a margin of [`RADIUS`] pixels. The luma outside the image is 0.
-fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
+fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
         [Plane::zero(side(tile.width), side(tile.height)), Plane::zero(side(tile.width), side(tile.height))];
@@ -92,10 +92,10 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
         let Some(y) = image_position(tile.y, row, pair.height()) else { continue };
         for column in 0..width {
             let Some(x) = image_position(tile.x, column, pair.width()) else { continue };
-            let [a, b] = pair.at(x, y).map(encoded);
+            let [a, b] = pair.pixel_pair(x, y).map(encode_srgb);
             lumas[0].values[row * width + column] = luma(a);
             lumas[1].values[row * width + column] = luma(b);
-            if is_inner(row, tile.height) && is_inner(column, tile.width) {
+            if is_inside_tile(row, tile.height) && is_inside_tile(column, tile.width) {
                 square += a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
             }
         }
@@ -109,13 +109,13 @@ fn image_position(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 
-fn is_inner(offset: usize, length: u32) -> bool {
+fn is_inside_tile(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 
 /// For each position along one side of the tile, the sum of the window's weights inside the image. `None` if
 /// the window is excluded.
-fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
+fn window_weights_inside_image(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
     let weight = |position: usize| {
         let is_complete = position >= RADIUS && position + RADIUS < length;
         let taps = (position..).zip(window).filter(|(tap, _)| (RADIUS..RADIUS + length).contains(tap));
@@ -124,7 +124,7 @@ fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<
     (0..count).map(|offset| weight((start + offset) as usize)).collect()
 }
 
-fn encoded(color: Vec3) -> [f64; 3] {
+fn encode_srgb(color: Vec3) -> [f64; 3] {
     color.to_array().map(|linear| linear_to_srgb_f64(f64::from(linear).clamp(0.0, 1.0)))
 }
 

@@ -9,7 +9,7 @@ use crate::math::{DVec2, Vec3};
 /// The trimmed mean excludes one pixel in this many.
 const DROPPED_ONE_IN: usize = 1000;
 
-pub(super) struct Linear {
+pub(super) struct LinearErrors {
     pub(super) rmse: f64,
     pub(super) relmse: f64,
     pub(super) relmse_trimmed: f64,
@@ -21,7 +21,7 @@ pub(super) struct Linear {
 
 /// Sums over pixels.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct LinearErrorSums {
     square: f64,
     relative: f64,
     max: f64,
@@ -31,13 +31,13 @@ struct Sums {
     luminances: DVec2,
 }
 
-pub(super) fn measure(pair: &Pair) -> Linear {
+pub(super) fn measure(pair: &Pair) -> LinearErrors {
     let pixels = pair.a().pixels.len();
     let rows = map_rows(pair, row_sums);
-    let sums = rows.into_iter().enumerate().fold(Sums::default(), |sums, (y, row)| {
+    let sums = rows.into_iter().enumerate().fold(LinearErrorSums::default(), |sums, (y, row)| {
         let (max, max_at) =
             if row.max > sums.max { (row.max, [row.max_at[0], y as u32]) } else { (sums.max, sums.max_at) };
-        Sums {
+        LinearErrorSums {
             square: sums.square + row.square,
             relative: sums.relative + row.relative,
             max,
@@ -47,7 +47,7 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     });
     let dropped = pixels / DROPPED_ONE_IN;
     let relmse = sums.relative / pixels as f64;
-    Linear {
+    LinearErrors {
         rmse: (sums.square / (3 * pixels) as f64).sqrt(),
         relmse,
         relmse_trimmed: if dropped == 0 { relmse } else { trimmed_mean(pair, dropped) },
@@ -64,8 +64,8 @@ fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) ->
     a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
 
-fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
-    let mut sums = Sums::default();
+fn row_sums(a: &[Vec3], b: &[Vec3]) -> LinearErrorSums {
+    let mut sums = LinearErrorSums::default();
     for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
         let difference = a.as_dvec3() - b.as_dvec3();
         sums.square += difference.length_squared();

@@ -24,7 +24,7 @@ pub use two_references::TwoReferences;
 /// Errors in the first image of a pair. The second image is the reference. Means are over pixels and
 /// channels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Errors {
+pub struct ErrorMetrics {
     /// √mean (a − b)², linear.
     pub rmse: f64,
     /// mean (a − b)²/(b² + 0.01), linear.
@@ -51,7 +51,7 @@ pub struct Errors {
 #[derive(Clone, Debug)]
 pub struct PairMeasurements {
     /// Error metrics.
-    pub errors: Errors,
+    pub errors: ErrorMetrics,
     /// FLIP of each pixel, in [0, 1], row by row from the top.
     pub flip: Vec<f32>,
 }
@@ -61,7 +61,7 @@ pub fn measure(pair: &Pair) -> PairMeasurements {
     let linear = linear::measure(pair);
     let display = display::measure(pair);
     let flip = flip::error_map(pair);
-    let errors = Errors {
+    let errors = ErrorMetrics {
         rmse: linear.rmse,
         relmse: linear.relmse,
         relmse_trimmed: linear.relmse_trimmed,

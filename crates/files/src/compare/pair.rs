@@ -108,7 +108,7 @@ impl Pair {
     }
 
     /// Returns the pixel at a position in each image.
-    pub(super) fn at(&self, x: usize, y: usize) -> [Vec3; 2] {
+    pub(super) fn pixel_pair(&self, x: usize, y: usize) -> [Vec3; 2] {
         let index = y * self.width() + x;
         [self.a.pixels[index], self.b.pixels[index]]
     }

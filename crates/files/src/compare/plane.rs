@@ -22,11 +22,11 @@ impl Plane {
     /// Filters rows and columns. Pixels whose taps are not all inside the plane are dropped, which shrinks
     /// the plane by `taps − 1` in both dimensions.
     pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
-        self.along_rows(along_rows).along_columns(along_columns)
+        self.filter_along_rows(along_rows).filter_along_columns(along_columns)
     }
 
     /// Filters along rows.
-    pub(super) fn along_rows(&self, taps: &[f64]) -> Self {
+    pub(super) fn filter_along_rows(&self, taps: &[f64]) -> Self {
         let mut out = Self::zero(self.width + 1 - taps.len(), self.height);
         for (row, out) in self.values.chunks_exact(self.width).zip(out.values.chunks_exact_mut(out.width)) {
             let shifted: Vec<_> = row.windows(out.len()).collect();
@@ -36,7 +36,7 @@ impl Plane {
     }
 
     /// Filters along columns.
-    pub(super) fn along_columns(&self, taps: &[f64]) -> Self {
+    pub(super) fn filter_along_columns(&self, taps: &[f64]) -> Self {
         let mut out = Self::zero(self.width, self.height + 1 - taps.len());
         let rows: Vec<_> = self.values.chunks_exact(self.width).collect();
         for (out, rows) in out.values.chunks_exact_mut(self.width).zip(rows.windows(taps.len())) {
@@ -87,17 +87,17 @@ mod tests {
     #[test]
     fn filters_weight_neighbors() {
         let plane = Plane { width: 4, height: 3, values: (0..12).map(f64::from).collect() };
-        let rows = plane.along_rows(&[1.0, 10.0, 100.0]);
+        let rows = plane.filter_along_rows(&[1.0, 10.0, 100.0]);
         assert_eq!((rows.width, rows.height), (2, 3));
         assert_eq!(rows.values, [210.0, 321.0, 654.0, 765.0, 1098.0, 1209.0]);
-        let columns = plane.along_columns(&[1.0, 10.0]);
+        let columns = plane.filter_along_columns(&[1.0, 10.0]);
         assert_eq!((columns.width, columns.height), (4, 2));
         assert_eq!(columns.values, [40.0, 51.0, 62.0, 73.0, 84.0, 95.0, 106.0, 117.0]);
         let row = Plane { width: 12, height: 1, ..plane };
         let taps: Vec<_> = (0..6).map(|power| f64::from(8_i32.pow(power))).collect();
         let sum = |start: usize| (0..6).map(|i| (start + i) as f64 * taps[i]).sum::<f64>();
         let sums: Vec<_> = (0..7).map(sum).collect();
-        assert_eq!(row.along_rows(&taps).values, sums);
+        assert_eq!(row.filter_along_rows(&taps).values, sums);
     }
 
     #[test]

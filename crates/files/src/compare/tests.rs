@@ -15,7 +15,7 @@ fn pair(a: RadianceImage, b: RadianceImage) -> Pair {
     Pair::new([Path::new("a"), Path::new("b")], a, b).expect("a pair")
 }
 
-fn errors(a: &RadianceImage, b: &RadianceImage) -> Errors {
+fn errors(a: &RadianceImage, b: &RadianceImage) -> ErrorMetrics {
     measure(&pair(a.clone(), b.clone())).errors
 }
 
@@ -169,7 +169,7 @@ fn single_pixel_flip_matches_numpy() {
 fn equal_images_have_no_error() {
     for (width, height) in [(1, 1), (1, 30), (30, 1), (11, 11), (10, 12), (129, 2), (40, 131)] {
         let [_, b] = noisy(width, height);
-        let Errors { rmse, relmse, relmse_trimmed, max, psnr_db, ssim, flip, .. } = errors(&b, &b);
+        let ErrorMetrics { rmse, relmse, relmse_trimmed, max, psnr_db, ssim, flip, .. } = errors(&b, &b);
         assert_eq!([rmse, relmse, relmse_trimmed, max, flip], [0.0; 5], "{width}×{height}");
         assert_eq!(psnr_db, f64::INFINITY);
         assert!((ssim - 1.0).abs() < 1e-12, "{ssim}");

@@ -39,12 +39,12 @@ impl TwoReferences {
     /// Returns an image's relMSE, without bias from the references' noise. It can be negative. The image must
     /// have the same size as the references.
     pub fn error(&self, x: &RadianceImage) -> f64 {
-        self.cross(x, x)
+        self.cross_error(x, x)
     }
 
     /// Mean of (x − r)(y − r), relative to r². For two images rendered with the same method and independent
     /// noise, the expected value is the squared bias.
-    pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
+    pub fn cross_error(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
         let pixels = self.weighted_pixels().zip(x.pixels.iter().zip(&y.pixels));
         let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
             let (x, y) = (x.as_dvec3(), y.as_dvec3());
@@ -54,7 +54,7 @@ impl TwoReferences {
     }
 
     /// relMSE of one reference: the error that its noise would add if only one reference were used.
-    pub fn noise(&self) -> f64 {
+    pub fn reference_noise(&self) -> f64 {
         let sum =
             self.weighted_pixels().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
         sum.element_sum() / 2.0
@@ -78,7 +78,7 @@ impl TwoReferences {
     }
 
     /// Excess brightness of an image, relative to the references' mean luminance.
-    pub fn brightness(&self, x: &RadianceImage) -> f64 {
+    pub fn relative_bias(&self, x: &RadianceImage) -> f64 {
         let sum: f64 = x.pixels.iter().map(|pixel| luminance(pixel.as_dvec3())).sum();
         sum / x.pixels.len() as f64 / self.mean_luminance() - 1.0
     }
@@ -89,7 +89,7 @@ impl TwoReferences {
         sum / self.weights.len() as f64
     }
 
-    /// Standard error of [`Self::brightness`] due to the references' noise, assuming independent pixels.
+    /// Standard error of [`Self::relative_bias`] due to the references' noise, assuming independent pixels.
     pub fn relative_bias_standard_error(&self) -> f64 {
         let square = |x: f64| x * x;
         let squares = self.weighted_pixels().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn equal_references_yield_the_standard_relmse() {
         let references = references(0.0);
-        assert_eq!(references.noise(), 0.0);
+        assert_eq!(references.reference_noise(), 0.0);
         let error = references.error(&test_image(3, 0.0, 0.1));
         assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
         assert_eq!(references.uncertainty(&test_image(3, 0.0, 0.1)), 0.0);
@@ -148,9 +148,9 @@ mod tests {
         let references = references(0.05);
         let noise = 0.05_f64.powi(2) / 3.0 * WEIGHT;
         assert!(
-            (references.noise() / noise - 1.0).abs() < 0.05,
+            (references.reference_noise() / noise - 1.0).abs() < 0.05,
             "noise is {}, expected {noise}",
-            references.noise()
+            references.reference_noise()
         );
         let tested = test_image(3, 0.01, 0.0);
         let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn cross_error_is_the_squared_bias() {
         let references = references(0.02);
-        let cross = |offset| references.cross(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
+        let cross = |offset| references.cross_error(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
         assert!(cross(0.0).abs() < 0.04 * references.error(&test_image(5, 0.2, 0.0)), "{}", cross(0.0));
     }

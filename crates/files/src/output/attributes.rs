@@ -77,7 +77,7 @@ impl FileAttributes {
             carried.lost.push("its flags (chattr)".to_owned());
         }
         self.carry_owner(new, &mut carried);
-        self.carry_named(new, &mut carried);
+        self.carry_extended_attributes(new, &mut carried);
         carried
     }
 
@@ -103,7 +103,7 @@ impl FileAttributes {
         }
     }
 
-    fn carry_named(&self, new: &File, carried: &mut UncopiedAttributes) {
+    fn carry_extended_attributes(&self, new: &File, carried: &mut UncopiedAttributes) {
         for (name, value) in &self.named {
             let is_kept = value.as_ref().is_ok_and(|value| set_attribute(new, name, value).is_ok());
             if !is_kept {

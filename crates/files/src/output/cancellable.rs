@@ -10,7 +10,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use super::{BitDepth, EncodeOptions, Format, OutputError};
 use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
-use crate::film::tone::{develop, develop16};
+use crate::film::tone::{tone_map_to_8_bits, tone_map_to_16_bits};
 
 /// Number of pixels between polls of the cancel token. Processing them takes a few milliseconds and keeps
 /// all threads busy.
@@ -31,9 +31,9 @@ pub(super) fn tone_map_in_parts(
         token.check().map_err(io::Error::other)?;
         let part = RadianceImage { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() };
         let bytes = match options.bit_depth {
-            BitDepth::Eight => develop(&part, &options.tone).pixels.into_flattened(),
+            BitDepth::Eight => tone_map_to_8_bits(&part, &options.tone).pixels.into_flattened(),
             BitDepth::Sixteen => {
-                let components = develop16(&part, &options.tone).pixels.into_flattened();
+                let components = tone_map_to_16_bits(&part, &options.tone).pixels.into_flattened();
                 components.iter().flat_map(|component| component.to_be_bytes()).collect()
             }
         };
@@ -110,7 +110,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
     const PIPE_BYTES: usize = 4096;
     let mut rest = bytes;
     while !rest.is_empty() {
-        wait_for_room(to, token)?;
+        wait_until_writable(to, token)?;
         match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
@@ -122,7 +122,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
     Ok(())
 }
 
-fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
+fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
     /// Milliseconds between polls of the cancel token.
     const POLL_MS: u8 = 50;
     loop {
@@ -166,7 +166,7 @@ mod tests {
             Ok(())
         };
         tone_map_in_parts(&image, &options, &token, take).expect("not cancelled");
-        let expected = develop16(&image, &options.tone).pixels.into_flattened();
+        let expected = tone_map_to_16_bits(&image, &options.tone).pixels.into_flattened();
         assert!(all.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
         let mut parts = 0;
         let stop = |_: &[u8]| {

@@ -1,6 +1,6 @@
 //! Encodes a film as an image file. Used for both single renders and merged parts.
 
-use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with};
+use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with_layers};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, RadianceImage, SampleStats};
@@ -49,14 +49,14 @@ impl DevelopSettings {
         format: Format,
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
-        let tone = self.tone.resolved_for(image);
+        let tone = self.tone.with_image_range(image);
         // Add the metadata derived from the film: the number of samples and, at the end, the range.
-        let mut metadata = self.metadata_with_samples(film.samples());
+        let mut metadata = self.metadata_with_samples(film.sample_stats());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
         let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };
         let options = EncodeOptions { tone, bit_depth: self.bit_depth, metadata, mean_luminance_error };
-        encode_with((image, layers), &options, format, token)
+        encode_with_layers((image, layers), &options, format, token)
     }
 }

@@ -75,7 +75,7 @@ pub enum OutputError {
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
     /// The operating system reported an error.
-    #[error("cannot write {}: {}; {}", path.display(), describe_error(source), way_out(source))]
+    #[error("cannot write {}: {}; {}", path.display(), describe_error(source), write_error_advice(source))]
     File {
         /// The path as specified by the user.
         path: PathBuf,
@@ -94,7 +94,7 @@ impl OutputError {
     }
 }
 
-fn way_out(error: &io::Error) -> &'static str {
+fn write_error_advice(error: &io::Error) -> &'static str {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space or choose another location",
         ErrorKind::FileTooLarge => {

@@ -51,7 +51,7 @@ pub(super) fn encode(
     let mut bytes = CancellableBuffer::new(token);
     ::exr::block::write(&mut bytes, headers, true, |meta, file| {
         let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
-        compress(&meta, meta.collect_ordered_block_data(block), file)
+        compress_blocks(&meta, meta.collect_ordered_block_data(block), file)
     })
     .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
     Ok(bytes.into_bytes())
@@ -77,7 +77,7 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
 
 /// Compresses blocks in the caller's thread pool, or on the caller's thread if there is no pool. By default,
 /// the encoder would create its own pool with one thread per core.
-fn compress(
+fn compress_blocks(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
     file: &mut impl ChunksWriter,

@@ -26,12 +26,12 @@ pub(super) fn encode(
     let mut bytes = header.into_bytes();
     for line in image.pixels.chunks_exact(image.width as usize) {
         token.check()?;
-        write_line(line, &mut bytes);
+        encode_scanline(line, &mut bytes);
     }
     Ok(bytes)
 }
 
-fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
+fn encode_scanline(line: &[Vec3], bytes: &mut Vec<u8>) {
     let pixels: Vec<[u8; 4]> = line.iter().map(|&color| rgbe(color)).collect();
     if !COMPRESSED_WIDTHS.contains(&line.len()) {
         bytes.extend_from_slice(pixels.as_flattened());
@@ -40,7 +40,7 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
     bytes.extend([2, 2, (line.len() >> 8) as u8, line.len() as u8]);
     for component in 0..4 {
         let plane: Vec<u8> = pixels.iter().map(|pixel| pixel[component]).collect();
-        compress(&plane, bytes);
+        run_length_encode(&plane, bytes);
     }
 }
 
@@ -64,7 +64,7 @@ fn rgbe(color: Vec3) -> [u8; 4] {
 }
 
 /// Encodes runs as (128 + length, byte) and other bytes as (length, bytes).
-fn compress(mut plane: &[u8], bytes: &mut Vec<u8>) {
+fn run_length_encode(mut plane: &[u8], bytes: &mut Vec<u8>) {
     let run_length = |plane: &[u8]| {
         let same = plane.iter().take_while(|&&byte| byte == plane[0]).count();
         same.min(LONGEST_RUN)

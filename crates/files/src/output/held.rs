@@ -6,7 +6,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use super::move_new::move_new;
+use super::move_new::rename_no_replace;
 use super::resolve_path;
 use super::temporary::TemporaryFile;
 
@@ -31,7 +31,7 @@ pub fn recover_backup(path: &Path) -> BackupRecovery {
     let Ok((target, existing)) = resolve_path::follow_links(path) else { return BackupRecovery::None };
     let held = backup_path(&target);
     let Ok(text) = fs::read(&held) else { return BackupRecovery::None };
-    if existing.is_none() && move_new(&held, &target).is_ok() {
+    if existing.is_none() && rename_no_replace(&held, &target).is_ok() {
         return BackupRecovery::Restored;
     }
     if fs::read(&target).is_ok_and(|current| current == text) {
@@ -47,7 +47,7 @@ fn backup_path(target: &Path) -> PathBuf {
     name.into()
 }
 
-/// A replacement in progress. The steps are [`Self::begin`], [`Self::swap`] and [`Self::settle`].
+/// A replacement in progress. The steps are [`Self::begin`], [`Self::swap`] and [`Self::finish_or_restore`].
 pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -62,7 +62,7 @@ impl<'a> Replacement<'a> {
     /// A backup already exists, or a system call fails.
     pub(super) fn begin(mut new: TemporaryFile, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
-        new.move_to_new(&held).map_err(|error| backup_error(&held, error))?;
+        new.rename_no_replace(&held).map_err(|error| backup_error(&held, error))?;
         Ok(Self { target, held, expected, new })
     }
 
@@ -71,10 +71,10 @@ impl<'a> Replacement<'a> {
     /// # Errors
     /// A system error. Also returns the new text if it has been renamed back to its temporary name.
     pub(super) fn swap(mut self) -> Result<Self, (io::Error, Option<TemporaryFile>)> {
-        match exchange(&self.held, self.target) {
+        match exchange_files(&self.held, self.target) {
             Ok(()) => Ok(self),
             Err(error) => {
-                let is_back = self.new.take_back(&self.held).is_ok();
+                let is_back = self.new.rename_back(&self.held).is_ok();
                 Err((error, is_back.then_some(self.new)))
             }
         }
@@ -85,7 +85,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn settle(self) -> io::Result<Option<File>> {
+    pub(super) fn finish_or_restore(self) -> io::Result<Option<File>> {
         let text = fs::read(&self.held)?;
         if text == self.expected {
             // If this fails, the backup is handled at the next start.
@@ -99,25 +99,25 @@ impl<'a> Replacement<'a> {
     /// Restores the old text, unless another program has saved a newer version in the meantime.
     fn restore_old(&self, mut older: Vec<u8>) -> io::Result<()> {
         for _ in 0..ATTEMPTS {
-            exchange(&self.held, self.target)?;
+            exchange_files(&self.held, self.target)?;
             if self.is_new_at_backup_path() {
                 return fs::remove_file(&self.held);
             }
             // The backup is not our new text, so another program saved it after the first exchange. Swap it
             // back in and take out the older text.
             let newer = fs::read(&self.held)?;
-            exchange(&self.held, self.target)?;
+            exchange_files(&self.held, self.target)?;
             if fs::read(&self.held)? == older {
                 return fs::remove_file(&self.held);
             }
             older = newer;
         }
-        Err(io::Error::new(ErrorKind::AlreadyExists, backup_exists(&self.held)))
+        Err(io::Error::new(ErrorKind::AlreadyExists, backup_exists_message(&self.held)))
     }
 
     /// Whether the backup name refers to the new file.
     fn is_new_at_backup_path(&self) -> bool {
-        super::FileIdentity::of(&self.held).is_some_and(|held| held.is_of(&self.new.file))
+        super::FileIdentity::from_path(&self.held).is_some_and(|held| held.matches_open_file(&self.new.file))
     }
 }
 
@@ -136,7 +136,7 @@ impl<'a> StepwiseReplacement<'a> {
     /// A backup already exists, or a system call fails.
     pub(super) fn begin(target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
-        move_new(target, &held).map_err(|error| backup_error(&held, error))?;
+        rename_no_replace(target, &held).map_err(|error| backup_error(&held, error))?;
         Ok(Self { target, held, expected })
     }
 
@@ -145,19 +145,19 @@ impl<'a> StepwiseReplacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn settle(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
+    pub(super) fn finish_or_restore(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
         if fs::read(&self.held)? != self.expected {
-            return move_new(&self.held, self.target).map(|()| None);
+            return rename_no_replace(&self.held, self.target).map(|()| None);
         }
         let file = new.file.try_clone()?;
-        match new.move_to_new(self.target) {
+        match new.rename_no_replace(self.target) {
             // Another program has saved the file in the meantime. Keep that version and remove the older
             // backup.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                 fs::remove_file(&self.held)?;
                 Ok(None)
             }
-            Err(error) => move_new(&self.held, self.target).and(Err(error)),
+            Err(error) => rename_no_replace(&self.held, self.target).and(Err(error)),
             Ok(()) => {
                 // If this fails, the backup is handled at the next start.
                 let _ = fs::remove_file(&self.held);
@@ -172,12 +172,16 @@ impl<'a> StepwiseReplacement<'a> {
 ///
 /// # Errors
 /// A system error.
-pub(super) fn replace(new: TemporaryFile, target: &Path, expected: &[u8]) -> io::Result<Option<File>> {
+pub(super) fn replace_if_unchanged(
+    new: TemporaryFile,
+    target: &Path,
+    expected: &[u8],
+) -> io::Result<Option<File>> {
     match Replacement::begin(new, target, expected)?.swap() {
-        Ok(replacement) => replacement.settle(),
+        Ok(replacement) => replacement.finish_or_restore(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
-            StepwiseReplacement::begin(target, expected)?.settle(new)
+            StepwiseReplacement::begin(target, expected)?.finish_or_restore(new)
         }
         Err((error, _)) => Err(error),
     }
@@ -186,12 +190,12 @@ pub(super) fn replace(new: TemporaryFile, target: &Path, expected: &[u8]) -> io:
 /// Adds an explanation if the backup already exists.
 fn backup_error(held: &Path, error: io::Error) -> io::Error {
     match error.kind() {
-        ErrorKind::AlreadyExists => io::Error::new(ErrorKind::AlreadyExists, backup_exists(held)),
+        ErrorKind::AlreadyExists => io::Error::new(ErrorKind::AlreadyExists, backup_exists_message(held)),
         _ => error,
     }
 }
 
-fn backup_exists(held: &Path) -> String {
+fn backup_exists_message(held: &Path) -> String {
     format!(
         "{} contains text from an interrupted save; compare it with the file, then remove it",
         held.display()
@@ -199,13 +203,13 @@ fn backup_exists(held: &Path) -> String {
 }
 
 #[cfg(target_os = "linux")]
-fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+fn exchange_files(a: &Path, b: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
 }
 
 #[cfg(not(target_os = "linux"))]
-fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+fn exchange_files(_: &Path, _: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
@@ -277,18 +281,26 @@ mod tests {
     #[test]
     fn only_the_expected_text_is_replaced() {
         let folder = SceneDir::new();
-        assert!(replace(folder.new_text(), &folder.scene(), OLD.as_bytes()).expect("replaced").is_some());
+        assert!(
+            replace_if_unchanged(folder.new_text(), &folder.scene(), OLD.as_bytes())
+                .expect("replaced")
+                .is_some()
+        );
         assert!(folder.has(NEW));
         folder.save(NEWER);
-        assert!(replace(folder.new_text(), &folder.scene(), OLD.as_bytes()).expect("no error").is_none());
+        assert!(
+            replace_if_unchanged(folder.new_text(), &folder.scene(), OLD.as_bytes())
+                .expect("no error")
+                .is_none()
+        );
         assert!(folder.has(NEWER));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
         // Repeat with stepwise replacement.
         let scene = folder.scene();
         let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
-        assert!(steps.settle(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
+        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
         let steps = StepwiseReplacement::begin(&scene, NEWER.as_bytes()).expect("taken");
-        assert!(steps.settle(folder.new_text()).expect("no error").is_some() && folder.has(NEW));
+        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_some() && folder.has(NEW));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
     }
 
@@ -331,7 +343,7 @@ mod tests {
                     found.len() == 2,
                     "{steps} {saves:?}: {held:?}"
                 );
-                let again = replace(folder.new_text(), &scene, newest.as_bytes());
+                let again = replace_if_unchanged(folder.new_text(), &scene, newest.as_bytes());
                 assert_eq!(again.is_err(), found.len() == 2, "the backup should be kept: {again:?}");
             }
         }
@@ -346,7 +358,7 @@ mod tests {
         let replacement = Replacement::begin(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
         let replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
         folder.save("second");
-        assert!(replacement.settle().expect("no error").is_none());
+        assert!(replacement.finish_or_restore().expect("no error").is_none());
         assert!(folder.has("second"));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1);
     }
@@ -368,6 +380,6 @@ mod tests {
         // An editor saves while the old text is the backup.
         let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);
-        assert!(steps.settle(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
+        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
     }
 }

@@ -33,21 +33,21 @@ pub enum FileIdentity {
 impl FileIdentity {
     /// Returns the identity of the file at a path. `None` for paths that cannot be a regular file: folders,
     /// devices, pipes, and unresolvable paths.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
-            Err(error) if error.kind() == ErrorKind::NotFound => Self::of_new(path),
+            Err(error) if error.kind() == ErrorKind::NotFound => Self::from_new_path(path),
             Ok(_) | Err(_) => None,
         }
     }
 
     /// Whether an open file has this identity.
-    pub fn is_of(&self, file: &File) -> bool {
+    pub fn matches_open_file(&self, file: &File) -> bool {
         let found = |found: fs::Metadata| Self::Existing { device: found.dev(), inode: found.ino() };
         file.metadata().is_ok_and(|metadata| found(metadata) == *self)
     }
 
-    fn of_new(path: &Path) -> Option<Self> {
+    fn from_new_path(path: &Path) -> Option<Self> {
         let (target, _) = follow_links(path).ok()?;
         let folder = fs::metadata(directory_of(&target)).ok()?;
         let name = target.file_name()?.to_owned();
@@ -70,7 +70,7 @@ pub struct FileFingerprint {
 
 impl FileFingerprint {
     /// Returns the fingerprint of the file at a path. `None` if there is no regular file at the path.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;
         let lower = PathBuf::from(real.to_string_lossy().to_lowercase());
@@ -104,9 +104,9 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
 /// Whether two paths refer to the same file, existing or not. Also true if they may refer to the same file
 /// according to their [`FileFingerprint`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    let Some(identity) = FileIdentity::of(a) else { return false };
-    let are_alike = || Some(FileFingerprint::of(a)?.may_equal(&FileFingerprint::of(b)?));
-    FileIdentity::of(b) == Some(identity) || are_alike().unwrap_or(false)
+    let Some(identity) = FileIdentity::from_path(a) else { return false };
+    let are_alike = || Some(FileFingerprint::from_path(a)?.may_equal(&FileFingerprint::from_path(b)?));
+    FileIdentity::from_path(b) == Some(identity) || are_alike().unwrap_or(false)
 }
 
 #[cfg(test)]
@@ -125,7 +125,7 @@ mod tests {
         symlink("a", at("link")).expect("a link");
         fs::hard_link(at("a"), at("hard")).expect("a link");
         symlink("far/away", at("near")).expect("a link");
-        let of = |name: &str| FileIdentity::of(&at(name)).expect(name);
+        let of = |name: &str| FileIdentity::from_path(&at(name)).expect(name);
         for name in ["./a", "far/../a", "link", "hard", "far/away/../../a"] {
             assert_eq!(of(name), of("a"), "{name}");
         }
@@ -141,7 +141,7 @@ mod tests {
         symlink("far/away", at("near")).expect("a link");
         symlink("second", at("first")).expect("a link");
         symlink("near/new", at("second")).expect("a link");
-        let of = |name: &str| FileIdentity::of(&at(name));
+        let of = |name: &str| FileIdentity::from_path(&at(name));
         for name in ["near/new", "./far/away/new", "first", "second"] {
             assert_eq!(of(name), of("far/away/new"), "{name}");
             assert!(matches!(of(name), Some(FileIdentity::New { .. })), "{name}");
@@ -191,7 +191,7 @@ mod tests {
         for path in
             [folder.path(), Path::new("/dev/null"), Path::new("/dev/null/x"), &circle, Path::new("..")]
         {
-            assert_eq!(FileIdentity::of(path), None, "{}", path.display());
+            assert_eq!(FileIdentity::from_path(path), None, "{}", path.display());
         }
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::system::text::is_plain;
+use crate::system::text::is_terminal_safe;
 
 /// Formats a value on a single line, without a line feed.
 ///
@@ -19,14 +19,14 @@ pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
 ///
 /// # Errors
 /// The value cannot be serialized.
-pub fn file(value: &impl Serialize) -> serde_json::Result<String> {
+pub fn to_pretty_text(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string_pretty(value).map(|text| escape_unsafe(text) + "\n")
 }
 
 /// Escapes unsafe characters, which occur only inside strings. Line feeds occur only between tokens and are
 /// kept.
 fn escape_unsafe(text: String) -> String {
-    let is_safe = |c: char| c == '\n' || is_plain(c);
+    let is_safe = |c: char| c == '\n' || is_terminal_safe(c);
     if text.chars().all(is_safe) {
         return text;
     }
@@ -54,7 +54,7 @@ mod tests {
         let text = to_line(&[odd]).expect("JSON");
         assert_eq!(text, "[\"a\\u009b\\u007f\\u202e\\u200d\\udb40\\udc41\\u001b\\n\\t\\\"\\\\ä木🌳\"]");
         assert_eq!(serde_json::from_str::<[String; 1]>(&text).expect("JSON"), [odd]);
-        let laid_out = file(&[odd]).expect("JSON");
+        let laid_out = to_pretty_text(&[odd]).expect("JSON");
         assert_eq!(laid_out.lines().count(), 3);
         assert_eq!(serde_json::from_str::<[String; 1]>(&laid_out).expect("JSON"), [odd]);
     }

@@ -41,8 +41,8 @@ pub use exr::mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FileFingerprint, FileIdentity, is_same_file};
 pub use origin::{
-    Replaced, may_replace_image, may_replace_json, may_replace_plot, may_replace_table, scene_of_image,
-    sign_plot,
+    ReplaceCheck, may_replace_image, may_replace_json, may_replace_plot, may_replace_table,
+    scene_name_in_png, sign_plot,
 };
 
 use crate::control::CancelToken;
@@ -90,11 +90,11 @@ pub fn encode(
     format: Format,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    encode_with((image, &[]), options, format, token)
+    encode_with_layers((image, &[]), options, format, token)
 }
 
 /// Like [`encode`], but with layers. Only EXR files support layers.
-pub(crate) fn encode_with(
+pub(crate) fn encode_with_layers(
     (image, layers): (&RadianceImage, &[LayerImage]),
     options: &EncodeOptions,
     format: Format,
@@ -140,7 +140,7 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
 /// Same as [`check_target`], but does not detect directories that reject new files despite their permissions.
 pub fn check_target_read_only(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
-    inspect_path(path)?;
+    check_path_read_only(path)?;
     Ok(format)
 }
 
@@ -148,7 +148,7 @@ pub fn check_target_read_only(path: &Path) -> Result<Format, OutputError> {
 ///
 /// # Errors
 /// Same as [`check_target_read_only`], but the extension is not checked.
-pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
+pub fn check_path_read_only(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve(path).map(drop)
 }
 

@@ -6,23 +6,23 @@ use std::path::Path;
 
 /// Moves a file or a folder. Fails if the destination exists.
 #[cfg(any(target_os = "linux", target_vendor = "apple"))]
-pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
+pub(super) fn rename_no_replace(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
         // The file system or kernel does not support the flag.
-        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => move_by_steps(from, to),
+        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => create_then_rename(from, to),
         moved => moved.map_err(io::Error::from),
     }
 }
 
 #[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
-pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
-    move_by_steps(from, to)
+pub(super) fn rename_no_replace(from: &Path, to: &Path) -> io::Result<()> {
+    create_then_rename(from, to)
 }
 
-/// Implements [`move_new`] with two system calls. The first call fails if the destination exists.
-fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
+/// Implements [`rename_no_replace`] with two system calls. The first call fails if the destination exists.
+fn create_then_rename(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() {
         // A rename can replace only an empty folder, such as this new one.
         fs::create_dir(to)?;
@@ -43,13 +43,13 @@ mod tests {
         let at = |name: &str| directory.path().join(name);
         fs::create_dir_all(at("from/in")).expect("a folder");
         fs::create_dir(at("to")).expect("a folder");
-        assert!(move_by_steps(&at("from"), &at("to")).is_err() && at("from/in").exists());
-        move_by_steps(&at("from"), &at("new")).expect("moved");
+        assert!(create_then_rename(&at("from"), &at("to")).is_err() && at("from/in").exists());
+        create_then_rename(&at("from"), &at("new")).expect("moved");
         fs::write(at("file"), "1").expect("a file");
         fs::write(at("other"), "2").expect("a file");
-        assert!(move_by_steps(&at("file"), &at("other")).is_err());
+        assert!(create_then_rename(&at("file"), &at("other")).is_err());
         assert_eq!(fs::read(at("other")).expect("a file"), b"2");
-        move_by_steps(&at("file"), &at("last")).expect("moved");
+        create_then_rename(&at("file"), &at("last")).expect("moved");
         assert!(at("new/in").exists() && at("last").exists());
     }
 }

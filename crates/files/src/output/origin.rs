@@ -18,7 +18,7 @@ const PLOT_BYTES: u64 = 64 << 20;
 
 /// Result of checking the file that would be replaced.
 #[derive(Debug)]
-pub enum Replaced {
+pub enum ReplaceCheck {
     /// No file, or a file that may be replaced.
     Own,
     /// A file not written by glimt. Contains the type of file that glimt would write, such as "a report".
@@ -27,8 +27,8 @@ pub enum Replaced {
     Unreadable(io::Error),
 }
 
-impl Replaced {
-    fn of(file: Option<io::Result<File>>, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
+impl ReplaceCheck {
+    fn from_file(file: Option<io::Result<File>>, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         match file {
             None => Self::Own,
             Some(Ok(file)) => {
@@ -42,10 +42,10 @@ impl Replaced {
         }
     }
 
-    /// Like [`Self::of`], but for text files. Empty files may also be replaced.
-    fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
+    /// Like [`Self::from_file`], but for text files. Empty files may also be replaced.
+    fn from_text_file(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
-        Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))
+        Self::from_file(open_existing(path), kind, |file| is_empty(&file) || is_own(file))
     }
 
     /// Reason not to replace the file. `None` if it may be replaced.
@@ -61,14 +61,14 @@ impl Replaced {
 }
 
 /// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
-pub fn may_replace_image(path: &Path) -> Replaced {
-    Replaced::of(replaced(path), "an image", is_own_image)
+pub fn may_replace_image(path: &Path) -> ReplaceCheck {
+    ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_image)
 }
 
 /// Returns the scene named in a PNG file that glimt wrote. `None` if there is no such file or scene name.
-pub fn scene_of_image(path: &Path) -> Option<String> {
+pub fn scene_name_in_png(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
-    let reader = png_header(replaced(path)?.ok()?)?;
+    let reader = png_header(open_existing(path)?.ok()?)?;
     let info = reader.info();
     let latin = info.uncompressed_latin1_text.iter().find(|text| text.keyword == KEY);
     let utf8 = || info.utf8_text.iter().find(|text| text.keyword == KEY)?.get_text().ok();
@@ -80,8 +80,8 @@ pub fn may_replace_json<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
     is_own: impl Fn(&T) -> bool,
-) -> Replaced {
-    Replaced::of_text(path, kind, |file| {
+) -> ReplaceCheck {
+    ReplaceCheck::from_text_file(path, kind, |file| {
         let mut reader = BufReader::new(file);
         // Avoid reading a large file in another format completely.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
@@ -91,8 +91,8 @@ pub fn may_replace_json<T: DeserializeOwned>(
 
 /// Checks whether a table may be replaced. It must be empty, or start with `first_line`, including the line
 /// end.
-pub fn may_replace_table(path: &Path, first_line: &str) -> Replaced {
-    Replaced::of_text(path, "a table", |file| {
+pub fn may_replace_table(path: &Path, first_line: &str) -> ReplaceCheck {
+    ReplaceCheck::from_text_file(path, "a table", |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
         is_read && start == first_line.as_bytes()
@@ -101,8 +101,8 @@ pub fn may_replace_table(path: &Path, first_line: &str) -> Replaced {
 
 /// Checks whether a plot may be replaced. It must be empty, or contain `texts` and the signature that
 /// [`sign_plot`] adds. Plots from older versions, which have no signature, are also accepted.
-pub fn may_replace_plot(path: &Path, texts: &[&str]) -> Replaced {
-    Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
+pub fn may_replace_plot(path: &Path, texts: &[&str]) -> ReplaceCheck {
+    ReplaceCheck::from_text_file(path, "a plot", |file| is_glimt_plot(file, texts))
 }
 
 /// Start of the signature, which follows the first tag in an SVG file.
@@ -117,7 +117,7 @@ pub fn sign_plot(svg: &str) -> String {
 }
 
 /// Opens the regular file that would be replaced, if it exists.
-fn replaced(path: &Path) -> Option<io::Result<File>> {
+fn open_existing(path: &Path) -> Option<io::Result<File>> {
     match resolve_path::resolve(path) {
         Ok(WriteTarget::File(TargetFile { path, existing: Some(_) })) => Some(File::open(path)),
         // Nothing would be replaced. Errors are reported when the file is written.
@@ -133,18 +133,18 @@ fn png_header(file: File) -> Option<png::Reader<BufReader<File>>> {
     decoder.read_info().ok()
 }
 
-fn is_own_image(file: File) -> bool {
+fn is_glimt_image(file: File) -> bool {
     let Some(reader) = png_header(file) else { return false };
     let texts = &reader.info().uncompressed_latin1_text;
-    texts.iter().any(|text| text.keyword == "Software" && is_program(&text.text))
+    texts.iter().any(|text| text.keyword == "Software" && is_glimt_software(&text.text))
 }
 
 /// Whether the text has the form `glimt 0.1.0`.
-fn is_program(software: &str) -> bool {
+fn is_glimt_software(software: &str) -> bool {
     software.split_once(' ').is_some_and(|(name, _)| name == PROGRAM)
 }
 
-fn is_own_plot(file: File, texts: &[&str]) -> bool {
+fn is_glimt_plot(file: File, texts: &[&str]) -> bool {
     let mut svg = Vec::new();
     if file.take(PLOT_BYTES).read_to_end(&mut svg).is_err() || !svg.starts_with(b"<svg ") {
         return false;
@@ -163,13 +163,13 @@ mod tests {
     fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(may_replace_image(&path), Replaced::Own), "no file");
+        assert!(matches!(may_replace_image(&path), ReplaceCheck::Own), "no file");
         std::fs::write(&path, "an image").expect("written");
-        assert!(matches!(may_replace_image(&path), Replaced::Foreign("an image")));
+        assert!(matches!(may_replace_image(&path), ReplaceCheck::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
-        let replaced = Replaced::of(denied(), "an image", |_| true);
+        let replaced = ReplaceCheck::from_file(denied(), "an image", |_| true);
         assert!(
-            matches!(replaced, Replaced::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
+            matches!(replaced, ReplaceCheck::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
         );
     }
 
@@ -177,10 +177,10 @@ mod tests {
     fn unreadable_files_are_reported_with_the_reason() {
         for errno in [nix::libc::EACCES, nix::libc::EMFILE] {
             let error = || io::Error::from_raw_os_error(errno);
-            let reason = Replaced::Unreadable(error()).reason_to_keep().expect("it is kept");
+            let reason = ReplaceCheck::Unreadable(error()).reason_to_keep().expect("it is kept");
             assert!(reason.ends_with(&crate::system::describe_error(&error())), "{reason}");
         }
-        assert!(Replaced::Foreign("a report").reason_to_keep().expect("it is kept").contains("a report"));
-        assert_eq!(Replaced::Own.reason_to_keep(), None);
+        assert!(ReplaceCheck::Foreign("a report").reason_to_keep().expect("it is kept").contains("a report"));
+        assert_eq!(ReplaceCheck::Own.reason_to_keep(), None);
     }
 }

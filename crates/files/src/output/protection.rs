@@ -12,18 +12,18 @@ const STICKY: u32 = 0o1000;
 
 /// A flag that protects a file, or all files in a directory. Not even root can replace a protected file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Flag {
+pub(super) enum ProtectionFlag {
     /// `chattr +a`
     AppendOnly,
     /// `chattr +i`
     Immutable,
 }
 
-impl Flag {
+impl ProtectionFlag {
     /// Returns the flag that protects a file or directory. `None` if there is none or flags are not
     /// supported.
     #[cfg(target_os = "linux")]
-    pub(super) fn of(path: &Path) -> Option<Self> {
+    pub(super) fn from_path(path: &Path) -> Option<Self> {
         use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
         let found = statx(CWD, path, AtFlags::empty(), StatxFlags::empty()).ok()?.stx_attributes;
         if found.contains(StatxAttributes::IMMUTABLE) {
@@ -34,12 +34,12 @@ impl Flag {
     }
 
     #[cfg(not(target_os = "linux"))]
-    pub(super) fn of(_: &Path) -> Option<Self> {
+    pub(super) fn from_path(_: &Path) -> Option<Self> {
         None
     }
 
     /// Description of the flag.
-    pub(super) fn words(self) -> &'static str {
+    pub(super) fn description(self) -> &'static str {
         match self {
             Self::AppendOnly => "append-only (chattr +a)",
             Self::Immutable => "immutable (chattr +i)",
@@ -60,19 +60,19 @@ impl Flag {
 pub(super) fn is_protected_by_sticky_bit(directory: &Metadata, file: &Metadata) -> bool {
     let user = geteuid();
     let is_own = |found: &Metadata| Uid::from_raw(found.uid()) == user;
-    directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !may_act_for_owners(user)
+    directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !has_fowner_capability(user)
 }
 
 /// Whether this thread may act as the owner of any file.
 #[cfg(target_os = "linux")]
-fn may_act_for_owners(user: Uid) -> bool {
+fn has_fowner_capability(user: Uid) -> bool {
     use rustix::thread::{CapabilitySet, capabilities};
     capabilities(None)
         .map_or(user.is_root(), |capabilities| capabilities.effective.contains(CapabilitySet::FOWNER))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn may_act_for_owners(user: Uid) -> bool {
+fn has_fowner_capability(user: Uid) -> bool {
     user.is_root()
 }
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::unistd::{AccessFlags, access};
 
-use super::protection::{self, Flag};
+use super::protection::{self, ProtectionFlag};
 use super::{OutputError, temporary};
 
 /// Maximum number of links to follow, as in Linux.
@@ -43,12 +43,12 @@ impl TargetFile {
 /// Resolves a path, and checks without writing whether it can be written.
 pub(super) fn resolve(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
-        return Err(is_a_directory(path));
+        return Err(directory_error(path));
     }
     match follow_links(path).map_err(|error| OutputError::file(path, error))? {
-        (target, None) => new_file(path, target),
+        (target, None) => resolve_new(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
-        (target, Some(metadata)) => existing(path, target, metadata),
+        (target, Some(metadata)) => resolve_existing(path, target, metadata),
     }
 }
 
@@ -89,15 +89,15 @@ pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>
     Err(Errno::ELOOP.into())
 }
 
-fn new_file(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
+fn resolve_new(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
     check_directory(path, directory_of(&target))?;
     Ok(WriteTarget::File(TargetFile { path: target, existing: None }))
 }
 
-fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTarget, OutputError> {
+fn resolve_existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTarget, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
-        return Err(is_a_directory(path));
+        return Err(directory_error(path));
     }
     if kind.is_block_device() || kind.is_socket() {
         let what = if kind.is_socket() { "a socket" } else { "a block device" };
@@ -146,8 +146,8 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
 /// Checks that no flag protects the file or directory from changes. If one did, the new file could not be
 /// renamed or removed.
 fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
-    let Some(flag) = Flag::of(what) else { return Ok(()) };
-    let why = format!("{name} is {}", flag.words());
+    let Some(flag) = ProtectionFlag::from_path(what) else { return Ok(()) };
+    let why = format!("{name} is {}", flag.description());
     Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.removal_advice() })
 }
 
@@ -155,7 +155,7 @@ fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), Output
     access(what, how).map_err(|errno| OutputError::file(path, errno))
 }
 
-fn is_a_directory(path: &Path) -> OutputError {
+fn directory_error(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
     OutputError::Target { path: path.to_owned(), why, way_out: "specify a file in it" }
 }

@@ -8,9 +8,9 @@ use super::resolve_path::directory_of;
 /// Returns a scene's path relative to an image, with `/` as the separator. If the scene is in the image's
 /// folder, the path starts with `./`. Bare file names are ambiguous, because earlier versions wrote them for
 /// scenes in any folder.
-pub fn relative(scene: &Path, image: &Path) -> String {
+pub fn relative_to_image(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
-    let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
+    let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return file_name(scene) };
     let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(shared).map(|_| Component::ParentDir);
     let down = to.components().skip(shared);
@@ -20,21 +20,21 @@ pub fn relative(scene: &Path, image: &Path) -> String {
 }
 
 /// Whether the path `named` in an image's metadata refers to this scene.
-pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
+pub fn refers_to_scene(named: &str, scene: &Path, image: &Path) -> bool {
     if !named.contains('/') {
-        return named == bare(scene);
+        return named == file_name(scene);
     }
-    let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
+    let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative_to_image(scene, image) };
     // The image may be a link. It may have been written through the link's path or through the target's path.
     let target = fs::canonicalize(image).ok();
     [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
         let file = fs::canonicalize(directory_of(image).join(named));
-        named == relative(scene, image) || file.is_ok_and(|file| file == scene_file)
+        named == relative_to_image(scene, image) || file.is_ok_and(|file| file == scene_file)
     })
 }
 
 /// File name without the folder.
-fn bare(scene: &Path) -> String {
+fn file_name(scene: &Path) -> String {
     scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -67,11 +67,15 @@ mod tests {
             ("c/scene.png", "../a/scene.toml"),
             ("a/b/../b/../scene.png", "./scene.toml"),
         ] {
-            assert_eq!(relative(&scene, &at(image)), expected, "{image}");
-            assert!(is_same(expected, &scene, &at(image)), "{image}");
-            assert!(!is_same(expected, &at("c/x"), &at(image)), "{image}");
+            assert_eq!(relative_to_image(&scene, &at(image)), expected, "{image}");
+            assert!(refers_to_scene(expected, &scene, &at(image)), "{image}");
+            assert!(!refers_to_scene(expected, &at("c/x"), &at(image)), "{image}");
         }
-        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "the folder does not exist");
+        assert_eq!(
+            relative_to_image(&scene, &at("none/scene.png")),
+            "scene.toml",
+            "the folder does not exist"
+        );
     }
 
     #[test]
@@ -79,10 +83,12 @@ mod tests {
         let folder = folder(&["a/scene.toml", "b/scene.toml"]);
         let at = |path: &str| folder.path().join(path);
         let (one, other, image) = (at("a/scene.toml"), at("b/scene.toml"), at("scene.png"));
-        let named = relative(&one, &image);
-        assert!(is_same(&named, &one, &image) && !is_same(&named, &other, &image));
-        assert!(is_same("scene.toml", &one, &image) && is_same("scene.toml", &other, &image));
-        assert!(!is_same("room.toml", &one, &image) && !is_same("./scene.toml", &one, &image));
+        let named = relative_to_image(&one, &image);
+        assert!(refers_to_scene(&named, &one, &image) && !refers_to_scene(&named, &other, &image));
+        assert!(refers_to_scene("scene.toml", &one, &image) && refers_to_scene("scene.toml", &other, &image));
+        assert!(
+            !refers_to_scene("room.toml", &one, &image) && !refers_to_scene("./scene.toml", &one, &image)
+        );
     }
 
     #[test]
@@ -93,21 +99,25 @@ mod tests {
         symlink(at("a"), at("link")).expect("a link");
         symlink(at("a/scene.toml"), at("other.toml")).expect("a link");
         let image = at("scene.png");
-        assert!(is_same(&relative(&at("a/scene.toml"), &image), &at("link/scene.toml"), &image));
-        assert!(is_same(&relative(&at("a/scene.toml"), &image), &at("other.toml"), &image));
-        assert!(is_same(&relative(&at("other.toml"), &image), &at("a/scene.toml"), &image));
+        assert!(refers_to_scene(
+            &relative_to_image(&at("a/scene.toml"), &image),
+            &at("link/scene.toml"),
+            &image
+        ));
+        assert!(refers_to_scene(&relative_to_image(&at("a/scene.toml"), &image), &at("other.toml"), &image));
+        assert!(refers_to_scene(&relative_to_image(&at("other.toml"), &image), &at("a/scene.toml"), &image));
         fs::write(at("big/scene.png"), "").expect("written");
         symlink(at("big/scene.png"), &image).expect("a link");
         let scene = at("a/scene.toml");
-        assert!(is_same(&relative(&scene, &image), &scene, &image));
-        assert!(is_same(&relative(&scene, &at("big/scene.png")), &scene, &image));
+        assert!(refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
+        assert!(refers_to_scene(&relative_to_image(&scene, &at("big/scene.png")), &scene, &image));
         // Move both together, then only the scene.
-        let named = relative(&scene, &at("a/scene.png"));
+        let named = relative_to_image(&scene, &at("a/scene.png"));
         fs::rename(at("a"), at("moved")).expect("moved");
-        assert!(is_same(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
+        assert!(refers_to_scene(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
         fs::create_dir(at("elsewhere")).expect("made");
         fs::rename(at("moved/scene.toml"), at("elsewhere/scene.toml")).expect("moved");
-        assert!(!is_same(&named, &at("elsewhere/scene.toml"), &at("moved/scene.png")));
+        assert!(!refers_to_scene(&named, &at("elsewhere/scene.toml"), &at("moved/scene.png")));
     }
 
     #[test]
@@ -118,6 +128,6 @@ mod tests {
         let scene = folder.path().join(OsStr::from_bytes(b"sc\xffne.toml"));
         fs::write(&scene, "").expect("written");
         let image = folder.path().join("a.png");
-        assert!(is_same(&relative(&scene, &image), &scene, &image));
+        assert!(refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
     }
 }

@@ -6,8 +6,8 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 
-use super::move_new::move_new;
-use super::temporary::{ATTEMPTS, next_name, remove_stale_folders};
+use super::move_new::rename_no_replace;
+use super::temporary::{ATTEMPTS, next_temporary_name, remove_stale_folders};
 use super::{OutputError, cancellable};
 use crate::control::CancelToken;
 use crate::system::folder::remove_all;
@@ -41,8 +41,8 @@ pub fn create_files_atomically(
     let mut placed: Vec<&OsStr> = Vec::new();
     for (name, _) in files {
         let Some(first) = name.iter().next().filter(|first| !placed.contains(first)) else { continue };
-        if let Err(error) = move_new(&hidden.path.join(first), &here.join(first)) {
-            take_back(here, &placed, files);
+        if let Err(error) = rename_no_replace(&hidden.path.join(first), &here.join(first)) {
+            undo_moves(here, &placed, files);
             return Err(at(Path::new(first))(error));
         }
         placed.push(first);
@@ -52,7 +52,7 @@ pub fn create_files_atomically(
 
 /// Removes files that were already moved. Also removes their folders, unless these contain other files.
 /// Ignores errors because the caller reports the original error.
-fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
+fn undo_moves(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
     {
@@ -72,7 +72,7 @@ struct StagingFolder {
 impl StagingFolder {
     fn create(folder: &Path, name: &OsStr) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
-            let path = folder.join(next_name(name));
+            let path = folder.join(next_temporary_name(name));
             match DirBuilder::new().mode(0o700).create(&path) {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),

@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use nix::fcntl::OFlag;
 
-use super::move_new::move_new;
-use crate::system::folder::{names, remove_all};
+use super::move_new::rename_no_replace;
+use crate::system::folder::{entry_names, remove_all};
 use crate::system::machine::ProcessIdentity;
 
 /// Maximum length of a file name on nearly all file systems.
@@ -35,13 +35,13 @@ impl TemporaryFile {
     /// `.NAME.glimt-<machine>-<process>-<number>.tmp`.
     pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
-            let path = directory.join(next_name(name));
+            let path = directory.join(next_temporary_name(name));
             match OpenOptions::new().write(true).create_new(true).mode(mode).open(&path) {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
                 Ok(file) => {
                     let temporary = Self { file, path, kept: false };
-                    if temporary.claim()? {
+                    if temporary.try_lock()? {
                         return Ok(temporary);
                     }
                 }
@@ -51,7 +51,7 @@ impl TemporaryFile {
     }
 
     /// Locks the file. Returns false if another process has locked it or has removed it as stale.
-    fn claim(&self) -> io::Result<bool> {
+    fn try_lock(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
             // If locking is not supported, no process removes the file as stale.
@@ -70,15 +70,15 @@ impl TemporaryFile {
     }
 
     /// Renames the file without overwriting an existing file.
-    pub(super) fn move_to_new(&mut self, target: &Path) -> io::Result<()> {
-        move_new(&self.path, target)?;
+    pub(super) fn rename_no_replace(&mut self, target: &Path) -> io::Result<()> {
+        rename_no_replace(&self.path, target)?;
         self.kept = true;
         Ok(())
     }
 
     /// Renames the file back to its temporary name.
-    pub(super) fn take_back(&mut self, from: &Path) -> io::Result<()> {
-        move_new(from, &self.path)?;
+    pub(super) fn rename_back(&mut self, from: &Path) -> io::Result<()> {
+        rename_no_replace(from, &self.path)?;
         self.kept = false;
         Ok(())
     }
@@ -135,7 +135,7 @@ pub(super) fn remove_stale_folders(directory: &Path) {
 
 /// Lists the entries of a directory whose names identify a dead writer.
 fn stale_entries(directory: &Path) -> Vec<PathBuf> {
-    let names = names(directory).into_iter().flatten();
+    let names = entry_names(directory).into_iter().flatten();
     names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
 }
 
@@ -163,11 +163,11 @@ fn still_refers_to(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-pub(super) fn next_name(name: &OsStr) -> OsString {
-    name_of(name, &ProcessIdentity::current())
+pub(super) fn next_temporary_name(name: &OsStr) -> OsString {
+    temporary_name(name, &ProcessIdentity::current())
 }
 
-fn name_of(name: &OsStr, writer: &ProcessIdentity) -> OsString {
+fn temporary_name(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
     let ending = format!(".glimt-{:016x}-{}-{number}.tmp", writer.machine, writer.process);
@@ -201,13 +201,13 @@ pub(super) mod tests {
 
     /// Returns a temporary name for a process that has ended on this machine.
     pub(in crate::output) fn dead_name(name: &str) -> OsString {
-        name_of(OsStr::new(name), &dead_process())
+        temporary_name(OsStr::new(name), &dead_process())
     }
 
     /// A temporary name from a process on another machine.
     pub(in crate::output) fn foreign_name(name: &str) -> OsString {
         let dead = dead_process();
-        name_of(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
+        temporary_name(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
     }
 
     fn dead_process() -> ProcessIdentity {
@@ -220,7 +220,7 @@ pub(super) mod tests {
     #[test]
     fn only_temporary_names_have_a_writer() {
         for name in ["out.png", "a.glimt-b.png", "a.glimt-1-2.tmp", &"ä".repeat(127)] {
-            let temporary = next_name(OsStr::new(name));
+            let temporary = next_temporary_name(OsStr::new(name));
             assert_eq!(parse_writer(&temporary), Some(ProcessIdentity::current()), "{temporary:?}");
             assert!(temporary.len() <= NAME_BYTES);
         }
@@ -255,7 +255,7 @@ pub(super) mod tests {
         // The writers of these files may be alive.
         let kept = [
             write(foreign_name("b.png")),
-            write(next_name(OsStr::new("b.png"))),
+            write(next_temporary_name(OsStr::new("b.png"))),
             write(".b.png.glimt-123-4.tmp".into()),
             write(".b.png.tmp".into()),
         ];
@@ -293,8 +293,8 @@ pub(super) mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let file = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         fs::remove_file(&file.path).expect("removed");
-        assert!(!file.claim().expect("no error"));
+        assert!(!file.try_lock().expect("no error"));
         fs::write(&file.path, "another").expect("a file");
-        assert!(!file.claim().expect("no error"));
+        assert!(!file.try_lock().expect("no error"));
     }
 }

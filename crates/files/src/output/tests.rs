@@ -2,7 +2,7 @@ use std::io::Cursor;
 
 use super::temporary::tests::dead_name;
 use super::*;
-use crate::film::tone::{Tonemap, develop, develop16};
+use crate::film::tone::{Tonemap, tone_map_to_8_bits, tone_map_to_16_bits};
 use crate::math::Vec3;
 
 fn encode(image: &RadianceImage, options: &EncodeOptions, format: Format) -> Result<Vec<u8>, OutputError> {
@@ -43,10 +43,13 @@ fn png_contains_the_tone_mapped_image() {
         assert_eq!((decoded.width(), decoded.height(), decoded.color()), (37, 23, color));
         match depth {
             BitDepth::Eight => {
-                assert_eq!(decoded.as_bytes(), develop(&image, &options.tone).pixels.as_flattened());
+                assert_eq!(
+                    decoded.as_bytes(),
+                    tone_map_to_8_bits(&image, &options.tone).pixels.as_flattened()
+                );
             }
             BitDepth::Sixteen => {
-                let expected = develop16(&image, &options.tone);
+                let expected = tone_map_to_16_bits(&image, &options.tone);
                 let decoded = decoded.into_rgb16().into_raw();
                 assert_eq!(decoded, expected.pixels.as_flattened());
             }
@@ -205,10 +208,10 @@ fn ppm_contains_the_tone_mapped_image() {
     let eight = encode(&image, &options(BitDepth::Eight), Format::Ppm).expect("a PPM");
     let tone = options(BitDepth::Eight).tone;
     let decoded = decode(&eight, image::ImageFormat::Pnm).into_rgb8().into_raw();
-    assert_eq!(decoded, develop(&image, &tone).pixels.as_flattened());
+    assert_eq!(decoded, tone_map_to_8_bits(&image, &tone).pixels.as_flattened());
     let sixteen = encode(&image, &options(BitDepth::Sixteen), Format::Ppm).expect("a PPM");
     let decoded = decode(&sixteen, image::ImageFormat::Pnm).into_rgb16().into_raw();
-    assert_eq!(decoded, develop16(&image, &tone).pixels.as_flattened());
+    assert_eq!(decoded, tone_map_to_16_bits(&image, &tone).pixels.as_flattened());
 }
 
 #[test]
@@ -219,7 +222,7 @@ fn jpeg_chroma_is_not_subsampled() {
     let options = EncodeOptions::default();
     let bytes = encode(&image, &options, Format::Jpeg).expect("a JPEG");
     let decoded = decode(&bytes, image::ImageFormat::Jpeg).into_rgb8();
-    for (decoded, expected) in decoded.pixels().zip(develop(&image, &options.tone).pixels) {
+    for (decoded, expected) in decoded.pixels().zip(tone_map_to_8_bits(&image, &options.tone).pixels) {
         for (a, b) in decoded.0.iter().zip(expected) {
             assert!(a.abs_diff(b) <= 16, "{decoded:?} {expected:?}");
         }
@@ -239,7 +242,7 @@ fn webp_has_the_same_pixels_and_settings_as_png() {
     let path = folder.path().join("a.webp");
     std::fs::write(&path, &bytes).expect("written");
     let made = super::settings::read_info(&path).expect("settings");
-    assert_eq!((made.format.as_str(), made.size, made.is_own()), ("WebP", Some((37, 21)), true));
+    assert_eq!((made.format.as_str(), made.size, made.is_written_by_glimt()), ("WebP", Some((37, 21)), true));
     assert!(
         made.settings.contains(&("scene".to_owned(), "a \"b\" <c> & d".to_owned())),
         "{:?}",

@@ -45,10 +45,10 @@ pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// System errors such as [`ErrorKind::AlreadyExists`].
-pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn create_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    if written.is_err() && FileIdentity::of(path).is_some_and(|found| found.is_of(&file)) {
+    if written.is_err() && FileIdentity::from_path(path).is_some_and(|found| found.matches_open_file(&file)) {
         // The file is still ours. Ignore errors because the caller reports the original error.
         let _ = fs::remove_file(path);
     }
@@ -160,13 +160,15 @@ fn replace(
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
-                Some(expected) => match held::replace(new, &target.path, expected).map_err(named)? {
-                    Some(file) => file,
-                    None => {
-                        (guard.may_replace)(&target.path)?;
-                        return Err(named(io::Error::other("it has changed in the meantime")));
+                Some(expected) => {
+                    match held::replace_if_unchanged(new, &target.path, expected).map_err(named)? {
+                        Some(file) => file,
+                        None => {
+                            (guard.may_replace)(&target.path)?;
+                            return Err(named(io::Error::other("it has changed in the meantime")));
+                        }
                     }
-                },
+                }
             };
             let synced = match durability {
                 Durability::Process => Ok(()),

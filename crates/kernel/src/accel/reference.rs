@@ -143,7 +143,7 @@ impl TriangleReference {
             if (from < at && at < to) || (to < at && at < from) {
                 let (start, way) = (before.as_dvec3(), corner.as_dvec3() - before.as_dvec3());
                 let part = (f64::from(at) - f64::from(from)) / (f64::from(to) - f64::from(from));
-                let crossing = around_rounded(start + way * part);
+                let crossing = round_outward(start + way * part);
                 parts[0].grow(&crossing);
                 parts[1].grow(&crossing);
             }
@@ -174,7 +174,7 @@ impl TriangleReference {
 
 /// `f32` box around a double-precision point, rounded outward.
 #[inline(always)]
-fn around_rounded(exact: DVec3) -> SimdBounds {
+fn round_outward(exact: DVec3) -> SimdBounds {
     let near = exact.as_vec3();
     let off = exact - near.as_dvec3();
     let [mut min, mut max] = [near; 2];
@@ -255,7 +255,7 @@ impl ClippedTriangle {
     }
 
     /// Bounding box of the polygon. The corners are ∞ and −∞ if the polygon is empty.
-    pub fn extent(&self) -> (DVec3, DVec3) {
+    pub fn bounds(&self) -> (DVec3, DVec3) {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))
     }

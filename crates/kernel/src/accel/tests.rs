@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
-use crate::math::random::signed as random;
+use crate::math::random::signed_generator as random;
 
 type TriangleSoup = Vec<[Vec3; 3]>;
 
@@ -128,8 +128,8 @@ fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<St
             Some(id) != except && sheared.intersect(corners, ray.t_max).is_some()
         };
         let shadow = expected.is_some() && mesh.iter().zip(0..).any(is_hit);
-        let found = [planes.closest(&ray), boxes.closest(&ray)];
-        let shadows = [planes.any(&ray, except), boxes.any(&ray, except)];
+        let found = [planes.closest_hit(&ray), boxes.closest_hit(&ray)];
+        let shadows = [planes.any_hit(&ray, except), boxes.any_hit(&ray, except)];
         if found.iter().any(|&found| bits(found) != bits(expected)) || shadows != [shadow; 2] {
             different += 1;
             first.get_or_insert_with(|| {
@@ -170,8 +170,8 @@ fn kd_trees_are_valid_and_match_brute_force() {
             .unwrap_or_else(|fault| panic!("{number}: {fault}"));
         for ray in rays(&mesh).iter().step_by(if mesh.len() > 1000 { 8 } else { 1 }) {
             let expected = closest_by_brute_force(&mesh, ray);
-            assert_eq!(bits(tree.closest(ray)), bits(expected), "mesh {number}, {ray:?}");
-            assert_eq!(tree.any(ray, None), expected.is_some(), "mesh {number}, {ray:?}");
+            assert_eq!(bits(tree.closest_hit(ray)), bits(expected), "mesh {number}, {ray:?}");
+            assert_eq!(tree.any_hit(ray, None), expected.is_some(), "mesh {number}, {ray:?}");
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
-use crate::math::random::signed;
+use crate::math::random::signed_generator;
 
 /// Runs closest-hit and any-hit queries. Returns the nearest hits and three masks: undecided closest-hit
 /// rays, rays that hit any triangle other than `except`, and undecided any-hit rays.
@@ -25,8 +25,8 @@ impl SimdKernel for FacetQueries<'_> {
     fn run(self, simd: impl Simd) -> Self::Output {
         let (rows, ends) = RayPacket::new(self.rays);
         let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::without_hits());
-        let open = self.facets.closest(&rows, (met, &ends), &mut found, simd);
-        let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, simd);
+        let open = self.facets.closest_hit_packet(&rows, (met, &ends), &mut found, simd);
+        let [any, open_any] = self.facets.any_hit_packet(&rows, (met, &ends), self.except, simd);
         (found, [open, any, open_any])
     }
 }
@@ -84,7 +84,7 @@ fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
 
 #[test]
 fn decided_packets_match_single_rays() {
-    let mut next = signed(11);
+    let mut next = signed_generator(11);
     // For each kind of ray, count all rays, hits, and undecided rays. Also count rays from surfaces near the
     // origin, and the undecided ones among them.
     let (mut bounces, mut left) = (0, 0);

@@ -7,7 +7,7 @@ use crate::geometry::watertight_packet::ShearedPacket;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
-use crate::math::random::signed;
+use crate::math::random::signed_generator;
 
 struct Tested<'a> {
     rays: &'a [Ray],
@@ -23,8 +23,8 @@ impl SimdKernel for Tested<'_> {
         let (rays, mut found, mut any) = (ShearedPacket::new(&rows), HitPacket::without_hits(), 0);
         let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
         for (number, corners) in (0..).zip(self.triangles) {
-            any |= rays.any((number, corners), met, &ends, simd);
-            rays.closest((number, corners), (met, &mut nearest), &mut found, simd);
+            any |= rays.hit_mask((number, corners), met, &ends, simd);
+            rays.update_closest_hits((number, corners), (met, &mut nearest), &mut found, simd);
         }
         (found, any)
     }
@@ -32,7 +32,7 @@ impl SimdKernel for Tested<'_> {
 
 #[test]
 fn packets_match_single_rays_bit_for_bit() {
-    let mut next = signed(7);
+    let mut next = signed_generator(7);
     let (mut hits, mut shared) = (0, 0);
     for round in 0..20_000 {
         // Triangles share corners and may be degenerate. Rays are parallel to an axis, toward corners, or

@@ -28,13 +28,13 @@ pub struct Cone {
 }
 
 impl SurfaceF64 for Cone {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let point = self.exact_point(ray, hit);
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        let point = self.exact_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().closest_point_f64(point, self.reach());
+            return self.base().closest_point_f64(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
-        self.exact_side(radial_direction(local.truncate()), self.side_direction(local))
+        self.side_point_f64(radial_direction(local.truncate()), self.side_direction(local))
     }
 }
 
@@ -49,10 +49,10 @@ impl Cone {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
+        self.intersect_f64(ray).map(surface_of_revolution::to_shape_hit)
     }
 
-    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+    fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line_to_local(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
         let ends = LineInterval::between_heights(&line, (0.0, 0), (base, 1))?;
@@ -67,7 +67,7 @@ impl Cone {
             0 => (local.truncate().length() * self.height - local.z * self.radius) / self.slant,
             _ => local.z - self.height,
         };
-        is_within_rounding_error(distance, self.reach())
+        is_within_rounding_error(distance, self.coordinate_bound())
     }
 
     /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends past the base and the
@@ -94,34 +94,34 @@ impl Cone {
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
-            (false, _) => LineInterval::from_side(s0.min(s1), s0.max(s1)),
-            (true, true) => LineInterval::from_side(s0.max(s1), f64::INFINITY),
-            (true, false) => LineInterval::from_side(f64::NEG_INFINITY, s0.min(s1)),
+            (false, _) => LineInterval::from_side_crossings(s0.min(s1), s0.max(s1)),
+            (true, true) => LineInterval::from_side_crossings(s0.max(s1), f64::INFINITY),
+            (true, false) => LineInterval::from_side_crossings(f64::NEG_INFINITY, s0.min(s1)),
         })
     }
 
     /// Hit point before rounding.
-    fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn exact_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line_to_local(ray);
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
             cap => LineInterval::between_heights(&line, (self.height, cap), (self.height, cap)),
         };
-        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.intersect_f64(ray))
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = self.exact_point(ray, hit);
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let point = self.exact_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().closest_surface_point(point, self.reach());
+            return self.base().closest_surface_point(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
         let out = radial_direction(local.truncate());
         let (down, along) = self.side_direction(local);
         let around = out.perp() * (-TAU * down.x * along);
-        let SurfacePointF64 { point, normal, reach } = self.exact_side(out, (down, along));
-        SurfacePoint::exact(
+        let SurfacePointF64 { point, normal, reach } = self.side_point_f64(out, (down, along));
+        SurfacePoint::from_f64(
             point,
             normal,
             Vec2::new(angle_to_u(mirror_y(out)) as f32, (1.0 - along / self.slant) as f32),
@@ -133,11 +133,11 @@ impl Cone {
 
     /// Computes the point on the side from a direction perpendicular to the axis and the result of
     /// [`Cone::side_direction`].
-    fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
+    fn side_point_f64(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
             normal: self.frame.vector_to_world((out * down.y).extend(-down.x)),
-            reach: self.reach(),
+            reach: self.coordinate_bound(),
         }
     }
 
@@ -167,12 +167,12 @@ impl Cone {
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
 
-    fn reach(&self) -> f64 {
+    fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.height + self.radius
     }
 
     /// Point and unit normal on the side at the given texture coordinates.
-    pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn side_point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let out = mirror_y(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
         let normal = (out * self.height).extend(-self.radius) / self.slant;
@@ -194,7 +194,8 @@ impl Cone {
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
-                let (point, normal) = self.side(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
+                let (point, normal) =
+                    self.side_point_and_normal(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
                 AreaPoint { point, normal }
             }
             _ => self.base().sample(0, u),
@@ -270,7 +271,7 @@ mod tests {
     fn met(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cone.intersect(&ray)?;
-        Some((hit.t, hit.primitive, cone.surface(&ray, &hit).normal))
+        Some((hit.t, hit.primitive, cone.surface_point(&ray, &hit).normal))
     }
 
     #[test]
@@ -320,10 +321,10 @@ mod tests {
     fn v_increases_from_base_to_tip() {
         let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
         let hit = hat(true).intersect(&ray).expect("aimed at it");
-        let surface = hat(true).surface(&ray, &hit);
+        let surface = hat(true).surface_point(&ray, &hit);
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.25));
         assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
-        let (point, normal) = hat(true).side(0.5, 0.25);
+        let (point, normal) = hat(true).side_point_and_normal(0.5, 0.25);
         assert!((point - DVec3::new(0.75, 0.5, 0.0)).length() < 1e-14);
         assert!((normal.as_vec3() - surface.normal).length() < 1e-6);
     }
@@ -341,7 +342,7 @@ mod tests {
         }
 
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)> {
-            self.nearest(ray)
+            self.intersect_f64(ray)
         }
 
         fn within(&self, ray: &RayF64) -> Option<LineInterval> {
@@ -349,7 +350,7 @@ mod tests {
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-            self.exact_point(ray, hit)
+            self.exact_hit_point(ray, hit)
         }
     }
 

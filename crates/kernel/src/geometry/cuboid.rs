@@ -90,13 +90,13 @@ impl Cuboid {
     }
 
     /// Surface point at a hit, projected onto the face.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let SurfacePointF64 { point, normal: outwards, reach } = self.exact(ray, hit);
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let SurfacePointF64 { point, normal: outwards, reach } = self.surface_point_f64(ray, hit);
         let chart = self.face_mapping(hit.primitive);
-        let uv = chart.uv(self.local(ray, hit));
+        let uv = chart.uv(self.local_hit_point(ray, hit));
         let FaceMapping { u, v, width, height } = chart;
         let uv = uv.as_vec2();
-        SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
+        SurfacePoint::from_f64(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
     }
 
     /// Texture coordinates of a point on the surface.
@@ -128,7 +128,7 @@ impl Cuboid {
 
     /// Local coordinates of a hit, projected onto the face.
     #[inline(always)]
-    fn local(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn local_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
         let along = |axis: DVec3, half: f64| axis.dot(from_center).max(-half).min(half);
         let DVec3 { x, y, z } = self.half;
@@ -229,8 +229,8 @@ fn face_normal(face: u32) -> (usize, DVec3) {
 
 impl SurfaceF64 for Cuboid {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let (local, n) = (self.local(ray, hit), branchless_face_normal(hit.primitive));
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        let (local, n) = (self.local_hit_point(ray, hit), branchless_face_normal(hit.primitive));
         let out_of = |v: DVec3| self.axes.x_axis * v.x + self.axes.y_axis * v.y + self.axes.z_axis * v.z;
         let reach = self.center.abs().max_element() + self.half.length();
         SurfacePointF64 { point: self.center + out_of(local), normal: out_of(n), reach }
@@ -258,11 +258,11 @@ mod tests {
             let inside = Ray::new(Vec3::ZERO, direction).to_f64();
             let hit = cube.intersect(&inside).expect("a ray from inside should hit");
             assert_eq!(hit.t, t);
-            assert_eq!(cube.surface(&inside, &hit).normal, direction);
+            assert_eq!(cube.surface_point(&inside, &hit).normal, direction);
             let outside = Ray::new(-direction * 10.0, direction).to_f64();
             let hit = cube.intersect(&outside).expect("a ray toward the center should hit");
             assert_eq!(hit.t, 10.0 - t);
-            assert_eq!(cube.surface(&outside, &hit).normal, -direction);
+            assert_eq!(cube.surface_point(&outside, &hit).normal, -direction);
         }
     }
 
@@ -285,7 +285,7 @@ mod tests {
             let ray = RayF64 { origin: cube.center, direction: middle - cube.center, t_max: f64::INFINITY };
             let hit = cube.intersect(&ray).expect("a ray from inside should hit");
             assert_eq!((hit.primitive, hit.t), (face, 1.0));
-            let surface = cube.surface(&ray, &hit);
+            let surface = cube.surface_point(&ray, &hit);
             assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);
             assert!((surface.uv.as_vec2() - Vec2::splat(0.5)).length() < 1e-6);
             assert!(

@@ -26,13 +26,13 @@ pub struct Cylinder {
 }
 
 impl SurfaceF64 for Cylinder {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let point = self.exact_point(ray, hit);
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        let point = self.exact_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).closest_point_f64(point, self.reach());
+            return self.cap(hit.primitive).closest_point_f64(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
-        self.exact_side(out, z)
+        self.side_point_f64(out, z)
     }
 }
 
@@ -45,10 +45,10 @@ impl Cylinder {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
+        self.intersect_f64(ray).map(surface_of_revolution::to_shape_hit)
     }
 
-    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+    fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line_to_local(ray);
         let end = if self.capped { self.half_length } else { self.half_length * (1.0 + BORDER) };
         let ends = LineInterval::between_heights(&line, (-end, 1), (end, 2))?;
@@ -63,7 +63,7 @@ impl Cylinder {
             0 => local.truncate().length() - self.radius,
             _ => local.z.abs() - self.half_length,
         };
-        is_within_rounding_error(distance, self.reach())
+        is_within_rounding_error(distance, self.coordinate_bound())
     }
 
     /// Interval in which the line is inside the infinite cylinder. Uses the distance of the projected line
@@ -83,32 +83,32 @@ impl Cylinder {
         }
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (if q == 0.0 { 0.0 } else { c / q }, q / a);
-        Some(LineInterval::from_side(t0.min(t1), t0.max(t1)))
+        Some(LineInterval::from_side_crossings(t0.min(t1), t0.max(t1)))
     }
 
     /// Hit point before rounding.
-    fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn exact_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line_to_local(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
             cap => LineInterval::between_heights(&line, (height, cap), (height, cap)),
         };
-        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.intersect_f64(ray))
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = self.exact_point(ray, hit);
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let point = self.exact_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).closest_surface_point(point, self.reach());
+            return self.cap(hit.primitive).closest_surface_point(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
-        let SurfacePointF64 { point, normal, reach } = self.exact_side(out, z);
-        SurfacePoint::exact(
+        let SurfacePointF64 { point, normal, reach } = self.side_point_f64(out, z);
+        SurfacePoint::from_f64(
             point,
             normal,
-            Vec2::new(angle_to_u(out) as f32, self.height(z) as f32),
+            Vec2::new(angle_to_u(out) as f32, self.height_to_v(z) as f32),
             self.frame.vector_to_world((out.perp() * (TAU * self.radius)).extend(0.0)),
             self.frame.vector_to_world(DVec3::Z * (2.0 * self.half_length)),
             reach,
@@ -122,16 +122,16 @@ impl Cylinder {
     }
 
     /// Computes the point on the side from a height and a direction perpendicular to the axis.
-    fn exact_side(&self, out: DVec2, z: f64) -> SurfacePointF64 {
+    fn side_point_f64(&self, out: DVec2, z: f64) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * self.radius).extend(z)),
             normal: self.frame.vector_to_world(out.extend(0.0)),
-            reach: self.reach(),
+            reach: self.coordinate_bound(),
         }
     }
 
     /// Texture coordinate v of a point on the side.
-    fn height(&self, z: f64) -> f64 {
+    fn height_to_v(&self, z: f64) -> f64 {
         0.5 + z / (2.0 * self.half_length)
     }
 
@@ -142,7 +142,7 @@ impl Cylinder {
         if self.capped && below.abs() < inwards.abs() {
             return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
         }
-        DVec2::new(angle_to_u(radial_direction(local.truncate())), self.height(local.z))
+        DVec2::new(angle_to_u(radial_direction(local.truncate())), self.height_to_v(local.z))
     }
 
     /// Mean curvature of a part.
@@ -150,12 +150,12 @@ impl Cylinder {
         if part == 0 { 0.5 / self.radius } else { 0.0 }
     }
 
-    fn reach(&self) -> f64 {
+    fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.half_length + self.radius
     }
 
     /// Point and unit normal on the side at the given texture coordinates.
-    pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn side_point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
         (
             self.frame.point_to_world((out * self.radius).extend(z)),
@@ -180,7 +180,7 @@ impl Cylinder {
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
-                let (point, normal) = self.side(f64::from(u.x), f64::from(u.y));
+                let (point, normal) = self.side_point_and_normal(f64::from(u.x), f64::from(u.y));
                 AreaPoint { point, normal }
             }
             cap => self.cap(cap).sample(0, u),
@@ -246,7 +246,7 @@ mod tests {
     fn met(cylinder: &Cylinder, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cylinder.intersect(&ray)?;
-        Some((hit.t, hit.primitive, cylinder.surface(&ray, &hit).normal))
+        Some((hit.t, hit.primitive, cylinder.surface_point(&ray, &hit).normal))
     }
 
     #[test]
@@ -277,11 +277,11 @@ mod tests {
     fn side_uvs_match_the_angle_and_the_height() {
         let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = bar(true).intersect(&ray).expect("aimed at it");
-        let surface = bar(true).surface(&ray, &hit);
+        let surface = bar(true).surface_point(&ray, &hit);
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.75));
         assert!((surface.dpdv - Vec3::Y * 4.0).length() < 1e-6);
         assert!((surface.dpdu - Vec3::NEG_Z * std::f32::consts::PI).length() < 1e-6);
-        let (point, normal) = bar(true).side(0.5, 0.75);
+        let (point, normal) = bar(true).side_point_and_normal(0.5, 0.75);
         assert!((point - DVec3::new(1.5, 3.0, 0.0)).length() < 1e-14 && (normal - DVec3::X).length() < 1e-14);
     }
 
@@ -299,7 +299,7 @@ mod tests {
         }
 
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)> {
-            self.nearest(ray)
+            self.intersect_f64(ray)
         }
 
         fn within(&self, ray: &RayF64) -> Option<LineInterval> {
@@ -307,7 +307,7 @@ mod tests {
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-            self.exact_point(ray, hit)
+            self.exact_hit_point(ray, hit)
         }
     }
 

@@ -23,8 +23,8 @@ pub struct Disk {
 }
 
 impl SurfaceF64 for Disk {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        self.closest_point_f64(ray.at(unrounded_t(hit, self.nearest(ray))), self.reach())
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        self.closest_point_f64(ray.at(unrounded_t(hit, self.intersect_f64(ray))), self.coordinate_bound())
     }
 }
 
@@ -37,7 +37,7 @@ impl Disk {
     /// Intersects the plane and checks that the hit is inside the border. Returns `None` for rays in the
     /// plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(to_shape_hit)
+        self.intersect_f64(ray).map(to_shape_hit)
     }
 
     /// [`Disk::intersect`] for a packet.
@@ -53,7 +53,7 @@ impl Disk {
         }
     }
 
-    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+    fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line_to_local(ray);
         let along = -line.foot.z / line.direction.z;
         let across = (line.foot + line.direction * along).truncate().length();
@@ -62,9 +62,9 @@ impl Disk {
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let t = unrounded_t(hit, self.nearest(ray));
-        self.closest_surface_point(ray.at(t), self.reach())
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let t = unrounded_t(hit, self.intersect_f64(ray));
+        self.closest_surface_point(ray.at(t), self.coordinate_bound())
     }
 
     /// Surface point nearest to `point`. `reach` is an upper bound on the magnitudes of the lengths used to
@@ -73,7 +73,7 @@ impl Disk {
         let SurfacePointF64 { point: near, normal, .. } = self.closest_point_f64(point, reach);
         let edge = 2.0 * self.radius;
         let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector_to_world(axis * edge));
-        SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
+        SurfacePoint::from_f64(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
     /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the magnitudes of
@@ -83,7 +83,7 @@ impl Disk {
         SurfacePointF64 { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
 
-    fn reach(&self) -> f64 {
+    fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.radius
     }
 
@@ -99,7 +99,7 @@ impl Disk {
     }
 
     /// Maps a point from the unit disk to this disk.
-    pub fn point(&self, of_unit_disk: DVec2) -> DVec3 {
+    pub fn point_from_unit_disk(&self, of_unit_disk: DVec2) -> DVec3 {
         self.frame.point_to_world((of_unit_disk * self.radius).extend(0.0))
     }
 
@@ -125,7 +125,7 @@ impl Disk {
 
     /// Samples a point uniformly over the area.
     pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
-        AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
+        AreaPoint { point: self.point_from_unit_disk(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
     /// Distance from a point to the disk.
@@ -184,7 +184,7 @@ mod tests {
         let disk = Disk::new(DVec3::ZERO, DVec3::Z, 2.0);
         let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
         let hit = disk.intersect(&ray).expect("the ray should hit the disk");
-        let surface = disk.surface(&ray, &hit);
+        let surface = disk.surface_point(&ray, &hit);
         assert_eq!((surface.uv.as_vec2(), surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
         assert_eq!((surface.dpdu, surface.dpdv), (Vec3::X * 4.0, Vec3::Y * 4.0));
     }

@@ -65,7 +65,7 @@ impl TriangleMesh {
 
     /// Extreme vertices along 26 directions (the axes and the diagonals of two or three axes), in file
     /// coordinates.
-    pub fn extremes(&self) -> Vec<DVec3> {
+    pub fn extreme_vertices(&self) -> Vec<DVec3> {
         let Some(first) = self.positions.first() else { return Vec::new() };
         let steps = [-1.0_f32, 0.0, 1.0];
         let directions =

@@ -115,7 +115,7 @@ impl Shape {
 
     #[inline(never)]
     fn intersect_each(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
-        for lane in packet::lanes(met) {
+        for lane in packet::lane_indices(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.set(lane, &hit);
             }
@@ -126,11 +126,11 @@ impl Shape {
     #[inline(always)]
     fn fill_surfaces(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
-            Self::Sphere(sphere) => row.fill_from(sphere, rays, hits, of),
-            Self::Quad(quad) => row.fill_from(quad, rays, hits, of),
-            Self::Plane(plane) => row.fill_from(plane, rays, hits, of),
-            Self::Box(cuboid) => row.fill_from(cuboid, rays, hits, of),
-            Self::Triangle(triangle) => row.fill_from(triangle, rays, hits, of),
+            Self::Sphere(sphere) => row.fill_from_shape(sphere, rays, hits, of),
+            Self::Quad(quad) => row.fill_from_shape(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_from_shape(plane, rays, hits, of),
+            Self::Box(cuboid) => row.fill_from_shape(cuboid, rays, hits, of),
+            Self::Triangle(triangle) => row.fill_from_shape(triangle, rays, hits, of),
             Self::Disk(_) | Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => return false,
         }
         true
@@ -140,8 +140,8 @@ impl Shape {
     #[inline(always)]
     fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
-            Self::Quad(quad) => row.fill_uv_from(quad, rays, hits, of),
-            Self::Plane(plane) => row.fill_uv_from(plane, rays, hits, of),
+            Self::Quad(quad) => row.fill_uv_from_shape(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_uv_from_shape(plane, rays, hits, of),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Triangle(_)
@@ -155,17 +155,22 @@ impl Shape {
 
     /// Surface point at a hit.
     #[inline]
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        for_shape!(self, it => it.surface(ray, hit))
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        for_shape!(self, it => it.surface_point(ray, hit))
     }
 
     /// Surface point at a hit, with at least the requested fields.
     #[inline]
-    pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
+    pub fn requested_surface_point(
+        &self,
+        ray: &RayF64,
+        hit: &ShapeHit,
+        asked: SurfaceRequest,
+    ) -> SurfacePoint {
         if asked.uv {
-            self.surface(ray, hit)
+            self.surface_point(ray, hit)
         } else {
-            for_shape!(self, it => it.exact(ray, hit)).without_uv()
+            for_shape!(self, it => it.surface_point_f64(ray, hit)).without_uv()
         }
     }
 
@@ -389,7 +394,7 @@ mod tests {
                     let hit = shape.intersect(&ray).unwrap_or_else(|| panic!("{shape:?} {part} {u}"));
                     assert!((hit.t - 0.01).abs() < 1e-5, "{shape:?} {part} {u}: {hit:?}");
                     assert_eq!(hit.primitive, part, "{shape:?} {u}");
-                    let normal = shape.surface(&ray, &hit).normal.as_dvec3();
+                    let normal = shape.surface_point(&ray, &hit).normal.as_dvec3();
                     assert!((normal - place.normal).length() < 1e-4, "{shape:?} {u}: {normal}");
                 }
             }
@@ -400,8 +405,9 @@ mod tests {
     fn surfaces_match_with_and_without_uvs() {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
-                let [bare, full] = [false, true]
-                    .map(|uv| shape.requested_surface(&ray, &hit, SurfaceRequest { uv, shadow_point: true }));
+                let [bare, full] = [false, true].map(|uv| {
+                    shape.requested_surface_point(&ray, &hit, SurfaceRequest { uv, shadow_point: true })
+                });
                 let parts =
                     |of: &SurfacePoint| [of.point, of.error, of.normal, of.shadow_point, of.shading_normal];
                 assert_eq!(parts(&bare), parts(&full), "{shape:?} {ray:?}");
@@ -475,7 +481,7 @@ mod tests {
                 Shape::Quad(_) | Shape::Plane(_) | Shape::Triangle(_) | Shape::Disk(_) => false,
             };
             for (ray, hit) in hits(&shape) {
-                let surface = shape.surface(&ray, &hit);
+                let surface = shape.surface_point(&ray, &hit);
                 let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
                 let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
                 assert!(!shape.contains(before) || !is_closed, "{shape:?}");
@@ -494,7 +500,7 @@ mod tests {
         for shape in shapes() {
             let mut seen = 0;
             for (ray, hit) in hits(&shape) {
-                let surface = shape.surface(&ray, &hit);
+                let surface = shape.surface_point(&ray, &hit);
                 let point = surface.point.as_dvec3();
                 let uv = shape.uv_at(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
@@ -533,7 +539,7 @@ mod tests {
         for shape in shapes() {
             let mut compared = 0;
             for (ray, hit) in hits(&shape).step_by(7) {
-                let surface = shape.surface(&ray, &hit);
+                let surface = shape.surface_point(&ray, &hit);
                 let (point, normal) = (surface.point.as_dvec3(), surface.normal.as_dvec3());
                 let step = 1e-2;
                 let normal_at = |aside: DVec3| {
@@ -542,7 +548,7 @@ mod tests {
                     let hit = shape
                         .intersect(&ray)
                         .filter(|near| near.primitive == hit.primitive && near.t < 0.1)?;
-                    Some(shape.surface(&ray, &hit).normal.as_dvec3())
+                    Some(shape.surface_point(&ray, &hit).normal.as_dvec3())
                 };
                 let (a, b) = normal.any_orthonormal_pair();
                 let along = |e: DVec3| Some((normal_at(e)? - normal_at(-e)?).dot(e) / (2.0 * step));

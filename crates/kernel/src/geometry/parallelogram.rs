@@ -48,7 +48,7 @@ impl Parallelogram {
         let accepted = ray.accept(t)?;
         let from_corner = ray.direction * t - to_corner;
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-        (is_in_edge(s) && is_in_edge(t)).then(|| ShapeHit::at(accepted))
+        (is_in_unit_interval(s) && is_in_unit_interval(t)).then(|| ShapeHit::from_t(accepted))
     }
 
     /// [`Parallelogram::intersect`] for a packet.
@@ -69,16 +69,16 @@ impl Parallelogram {
             let t = above[lane] / along[lane];
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-            let is_inside = is_in_edge(s) & is_in_edge(r);
+            let is_inside = is_in_unit_interval(s) & is_in_unit_interval(r);
             let accepted = accept(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
-        SurfacePoint::exact(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
+        SurfacePoint::from_f64(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
     /// Coordinates of a hit along the edges, in [0, 1].
@@ -139,7 +139,7 @@ impl Parallelogram {
 
 impl SurfaceF64 for Parallelogram {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let [s, t] = self.coordinates(ray, hit);
         let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
         SurfacePointF64 { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
@@ -156,7 +156,7 @@ impl UvMapped for Parallelogram {
 
 /// Whether an edge coordinate is in [0, 1], up to the border margin.
 #[inline(always)]
-fn is_in_edge(x: f64) -> bool {
+fn is_in_unit_interval(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)
 }
 
@@ -178,7 +178,7 @@ mod tests {
         let ray = Ray::new(origin, target - origin).to_f64();
         let hit = quad.intersect(&ray).expect("the ray should hit the quad");
         assert!((hit.t - 1.0).abs() < 1e-6);
-        let surface = quad.surface(&ray, &hit);
+        let surface = quad.surface_point(&ray, &hit);
         assert!((surface.uv.as_vec2() - Vec2::new(0.25, 0.75)).length() < 1e-6);
         assert!((surface.point - target).length() < 1e-5);
         let outside = (quad.corner + quad.u * 1.01 + quad.v * 0.5).as_vec3();

@@ -36,7 +36,7 @@ impl Sphere {
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (c / q, q / a);
         let (near, far) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
-        ray.accept(near).or_else(|| ray.accept(far)).map(ShapeHit::at)
+        ray.accept(near).or_else(|| ray.accept(far)).map(ShapeHit::from_t)
     }
 
     /// [`Sphere::intersect`] for a packet.
@@ -73,10 +73,10 @@ impl Sphere {
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         let (uv, dpdu, dpdv) = sphere_parametrization(normal);
-        SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
+        SurfacePoint::from_f64(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
     /// Texture coordinates of a point on the surface.
@@ -142,7 +142,7 @@ impl Sphere {
 
 impl SurfaceF64 for Sphere {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
         // At the center, any normal is correct.
         let is_told = outwards.length_squared() > 0.0;

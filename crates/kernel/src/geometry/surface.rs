@@ -17,7 +17,7 @@ pub struct ShapeHit {
 
 impl ShapeHit {
     /// A hit on a shape with a single part.
-    pub fn at(t: f32) -> Self {
+    pub fn from_t(t: f32) -> Self {
         Self { t, primitive: 0, u: 0.0, v: 0.0 }
     }
 }
@@ -74,7 +74,7 @@ impl SurfacePoint {
     /// Creates a surface point from a double-precision point, without a separate shading normal. Its error
     /// bound accounts for rounding to `f32` and for the double-precision error. `reach` is the largest
     /// magnitude among the lengths used to compute the point and the next hit.
-    pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
+    pub fn from_f64(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
         Self {

@@ -104,7 +104,7 @@ impl LineInterval {
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
     /// Interval between two points on the side (part 0).
-    pub fn from_side(enter: f64, leave: f64) -> Self {
+    pub fn from_side_crossings(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
 
@@ -193,7 +193,7 @@ pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
 
 /// Converts t and the part index to a hit.
 pub fn to_shape_hit((t, primitive): (f64, u32)) -> ShapeHit {
-    ShapeHit { primitive, ..ShapeHit::at(t as f32) }
+    ShapeHit { primitive, ..ShapeHit::from_t(t as f32) }
 }
 
 /// The unrounded t of a hit, computed by intersecting the ray again. Returns the rounded t if the second
@@ -249,13 +249,13 @@ pub(super) mod tests {
     use crate::geometry::cylinder::Cylinder;
     use crate::geometry::torus::Torus;
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     #[test]
     fn rays_do_not_rehit_curved_shapes_at_origin() {
         // All of these shapes touch the origin and have z ≥ 0.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
-        let mut next = unit(7);
+        let mut next = unit_generator(7);
         for _ in 0..2000 {
             let [x, y, z] = std::array::from_fn(|_| next() - 0.5);
             let out = Vec3::new(x, y, -z.abs() - 1e-6);

@@ -1,6 +1,6 @@
 //! Packets of surface points, with SIMD loops for the most common shapes.
 
-use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lanes};
+use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lane_indices};
 use super::surface::point_error_bound;
 use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
@@ -39,14 +39,14 @@ pub struct SurfacePointF64 {
 impl SurfacePointF64 {
     /// Surface point without texture coordinates and tangents.
     pub fn without_uv(&self) -> SurfacePoint {
-        SurfacePoint::exact(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
+        SurfacePoint::from_f64(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
     }
 }
 
 /// A shape that computes surface points in double precision.
 pub trait SurfaceF64 {
     /// Surface point at a hit.
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64;
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64;
 }
 
 /// A shape with a branchless texture coordinate computation.
@@ -86,16 +86,16 @@ impl SurfacePacket {
         if shape.fill_uvs(self, rays, hits, of) {
             return;
         }
-        for lane in lanes(of) {
+        for lane in lane_indices(of) {
             let Some(hit) = hits.get(lane) else { continue };
-            let uv = shape.surface(&rays.ray_f64(lane), &hit).uv;
+            let uv = shape.surface_point(&rays.ray_f64(lane), &hit).uv;
             (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
         }
     }
 
     /// [`SurfacePacket::fill_uv`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_uv_from(
+    pub(super) fn fill_uv_from_shape(
         &mut self,
         shape: &impl UvMapped,
         rays: &RayPacket,
@@ -103,7 +103,7 @@ impl SurfacePacket {
         of: u32,
     ) {
         for lane in 0..PACKET_SIZE {
-            let uv = shape.uv(&rays.ray_f64(lane), &ShapeHit::at(hits.t[lane]));
+            let uv = shape.uv(&rays.ray_f64(lane), &ShapeHit::from_t(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
             self.uv[0][lane] = if is_own { uv.x } else { self.uv[0][lane] };
             self.uv[1][lane] = if is_own { uv.y } else { self.uv[1][lane] };
@@ -112,7 +112,13 @@ impl SurfacePacket {
 
     /// [`SurfacePacket::fill`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_from(&mut self, shape: &impl SurfaceF64, rays: &RayPacket, hits: &HitPacket, of: u32) {
+    pub(super) fn fill_from_shape(
+        &mut self,
+        shape: &impl SurfaceF64,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+    ) {
         let mut found = Self::EMPTY;
         for lane in 0..PACKET_SIZE {
             let hit = ShapeHit {
@@ -121,7 +127,7 @@ impl SurfacePacket {
                 u: hits.u[lane],
                 v: hits.v[lane],
             };
-            let SurfacePointF64 { point, normal, reach } = shape.exact(&rays.ray_f64(lane), &hit);
+            let SurfacePointF64 { point, normal, reach } = shape.surface_point_f64(&rays.ray_f64(lane), &hit);
             let point = point.as_vec3();
             set_lane(&mut found.point, lane, point);
             set_lane(&mut found.error, lane, point_error_bound(point, reach));

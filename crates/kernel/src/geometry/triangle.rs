@@ -59,9 +59,16 @@ impl Triangle {
     }
 
     /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0), and (0, 1).
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
-        SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
+        SurfacePoint::from_f64(
+            point,
+            normal,
+            Vec2::new(hit.u, hit.v),
+            self.b - self.a,
+            self.c - self.a,
+            reach,
+        )
     }
 
     /// Texture coordinates of a point on the triangle.
@@ -117,7 +124,7 @@ pub fn barycentric_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
 
 impl SurfaceF64 for Triangle {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
@@ -158,7 +165,7 @@ mod tests {
             let [a, b, c] = [corner(-size, size), corner(size, size), corner(0.1, -size)];
             let ray = Ray::new(Vec3::new(0.25, 3.0, -0.5), Vec3::new(0.3, -1.0, 0.1)).to_f64();
             let triangle = Triangle { a, b, c };
-            let surface = triangle.surface(&ray, &triangle.intersect(&ray).expect("below"));
+            let surface = triangle.surface_point(&ray, &triangle.intersect(&ray).expect("below"));
             let t =
                 (0.3 * 0.25 + 0.2 * 0.5 - 3.0) / (-1.0 - 0.3 * f64::from(0.3_f32) + 0.2 * f64::from(0.1_f32));
             let off = (surface.point.as_dvec3() - ray.at(t)).abs().max_element();

@@ -161,14 +161,14 @@ impl TriangleList {
     /// Updates `found` with the nearest hits of the rays in `met`. All other rays must have negative ends.
     /// Returns the mask of undecided rays, whose hits are left unchanged.
     #[inline(always)]
-    pub fn closest(
+    pub fn closest_hit_packet(
         &self,
         rays: &RayPacket,
         (met, ends): (u32, &F32x16),
         found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
-        let candidates = self.candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
+        let candidates = self.find_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
         let CandidateHits { hit, undecided, hits } =
             self.test_candidates(rays, &candidates, (met, ends), simd);
         select(&hit, &hits.t, &mut found.t);
@@ -181,14 +181,14 @@ impl TriangleList {
     /// Returns the mask of the rays in `met` that hit any triangle other than the ray's entry in `except`,
     /// and the mask of undecided rays. All other rays must have negative ends.
     #[inline(always)]
-    pub fn any(
+    pub fn any_hit_packet(
         &self,
         rays: &RayPacket,
         (met, ends): (u32, &F32x16),
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> [u32; 2] {
-        let candidates = self.candidates(rays, ends, except, simd);
+        let candidates = self.find_candidates(rays, ends, except, simd);
         let mut is_met = candidates.doubtful;
         for i in 0..PACKET_SIZE {
             is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
@@ -202,14 +202,14 @@ impl TriangleList {
 
     /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
     #[inline(always)]
-    fn candidates(
+    fn find_candidates(
         &self,
         rays: &RayPacket,
         ends: &F32x16,
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> Candidates {
-        let ErrorTerms { plane, far, across, length, end } = self.errors(rays);
+        let ErrorTerms { plane, far, across, length, end } = self.error_terms(rays);
         let mut found = Candidates {
             near: [f32::INFINITY; PACKET_SIZE],
             number: [0; PACKET_SIZE],
@@ -302,7 +302,7 @@ impl TriangleList {
             }
         }
         let [a, b, c] = &corners;
-        let hits = ShearedPacket::new(rays).hits(&candidates.number, [a, b, c], ends);
+        let hits = ShearedPacket::new(rays).intersect(&candidates.number, [a, b, c], ends);
         let (mut hit, mut undecided) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let is_any = candidates.near[i] < f32::INFINITY;
@@ -319,7 +319,7 @@ impl TriangleList {
 
     /// Computes the error terms for the rays.
     #[inline(always)]
-    fn errors(&self, rays: &RayPacket) -> ErrorTerms {
+    fn error_terms(&self, rays: &RayPacket) -> ErrorTerms {
         let none = [0.0; PACKET_SIZE];
         let mut errors = ErrorTerms { plane: none, far: none, across: none, length: none, end: none };
         for i in 0..PACKET_SIZE {

@@ -1,7 +1,7 @@
 //! Watertight intersection of mesh triangles with packets of rays in arbitrary directions. Performs the
 //! operations of [`ShearedRay::intersect`] in the same order, so the results are bit-identical.
 
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, lanes};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, lane_indices};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
 use crate::math::Vec3;
 use crate::math::float::gamma;
@@ -95,14 +95,14 @@ impl<'a> ShearedPacket<'a> {
     /// Updates `found` with nearer hits on a triangle. Triangles must be tested in order of increasing
     /// indices. `met` is the mask of traced rays. All other rays must have negative ends.
     #[inline(always)]
-    pub fn closest(
+    pub fn update_closest_hits(
         &self,
         (number, corners): (u32, &[Vec3; 3]),
         (met, ends): (u32, &mut F32x16),
         found: &mut HitPacket,
         simd: impl Simd,
     ) {
-        let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
+        let hits = self.intersect(&[number; PACKET_SIZE], *corners, ends);
         let mut is_nearer = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // A hit at the end of a ray counts, unless an earlier triangle was hit at the same t.
@@ -116,30 +116,36 @@ impl<'a> ShearedPacket<'a> {
         select_u32(&is_nearer, &[number; PACKET_SIZE], &mut found.primitive);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         if doubtful != 0 {
-            self.closest_one_by_one(doubtful, (number, corners), ends, found);
+            self.update_closest_hits_scalar(doubtful, (number, corners), ends, found);
         }
     }
 
     /// Mask of the rays in `met` that hit a triangle. All other rays must have negative ends.
     #[inline(always)]
-    pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &F32x16, simd: impl Simd) -> u32 {
-        let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
+    pub fn hit_mask(
+        &self,
+        (number, corners): (u32, &[Vec3; 3]),
+        met: u32,
+        ends: &F32x16,
+        simd: impl Simd,
+    ) -> u32 {
+        let hits = self.intersect(&[number; PACKET_SIZE], *corners, ends);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         let hit = simd.movemask(&hits.hit) & met;
-        if doubtful == 0 { hit } else { hit | self.any_one_by_one(doubtful, corners, ends) }
+        if doubtful == 0 { hit } else { hit | self.hit_mask_scalar(doubtful, corners, ends) }
     }
 
-    /// [`ShearedPacket::closest`] for the given rays, one by one.
+    /// [`ShearedPacket::update_closest_hits`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
-    fn closest_one_by_one(
+    fn update_closest_hits_scalar(
         &self,
         these: u32,
         (number, corners): (u32, &[Vec3; 3]),
         ends: &mut F32x16,
         found: &mut HitPacket,
     ) {
-        for i in lanes(these) {
+        for i in lane_indices(these) {
             let Some(hit) = self.intersect_lane(i, corners, ends[i]) else { continue };
             if found.t[i].is_nan() || hit.t < found.t[i] {
                 found.set(i, &super::ShapeHit { primitive: number, ..hit });
@@ -148,11 +154,11 @@ impl<'a> ShearedPacket<'a> {
         }
     }
 
-    /// [`ShearedPacket::any`] for the given rays, one by one.
+    /// [`ShearedPacket::hit_mask`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
-    fn any_one_by_one(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
-        lanes(these)
+    fn hit_mask_scalar(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
+        lane_indices(these)
             .filter(|&i| self.intersect_lane(i, corners, ends[i]).is_some())
             .fold(0, |hit, i| hit | 1 << i)
     }
@@ -200,7 +206,7 @@ impl<'a> ShearedPacket<'a> {
     /// [`ShearedRay::intersect`] for a packet in which each ray has its own triangle. Rays that start on
     /// their triangle do not hit it.
     #[inline(always)]
-    pub(super) fn hits(
+    pub(super) fn intersect(
         &self,
         numbers: &[u32; PACKET_SIZE],
         corners: [impl Corner; 3],

@@ -168,10 +168,10 @@ impl Light {
     pub fn center(&self) -> Option<(LightCenter, LightGeometry)> {
         Some(match self.family() {
             LightFamily::Delta(light) => {
-                (LightCenter::At(light.isotropic().position.as_vec3()), LightGeometry::Nothing)
+                (LightCenter::At(light.isotropic_equivalent().position.as_vec3()), LightGeometry::Nothing)
             }
             LightFamily::Infinite(light) => (LightCenter::Towards(light.center()?), LightGeometry::Nothing),
-            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.source()),
+            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.geometry()),
         })
     }
 

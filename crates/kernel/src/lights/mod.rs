@@ -45,16 +45,16 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, EmissionTexture, Emitter, LightPart, MeshEmitter, Side, UvChart, UvTriangle, area_light,
-    back_light, see_through_light,
+    AreaLight, EmissionTexture, Emitter, LightCoverage, MeshEmitter, Side, UvMapping, UvTriangle,
+    back_area_light, front_area_light, see_through_area_light,
 };
 pub use light::{Light, LightFamily};
-pub use packet::{LightObjectPacket, LightSamplePacket};
+pub use packet::{LightGeometryPacket, LightSamplePacket};
 pub use photon_emission::{
     BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSamples, LightSampler, LightSamplingEffort, Lights, SamplingMode};
+pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ pub struct LightSamplePacket {
     /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
     /// Geometry that the shadow rays ignore.
-    pub sources: LightObjectPacket,
+    pub sources: LightGeometryPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
     /// Inverse pdfs in sr, set only for environments. For other lights, they are computed on request.
@@ -25,16 +25,16 @@ pub struct LightSamplePacket {
 /// A packet of [`LightGeometry`]s.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct LightObjectPacket {
-    /// Object index, or [`LightObjectPacket::NONE`] if there is no geometry.
+pub struct LightGeometryPacket {
+    /// Object index, or [`LightGeometryPacket::NONE`] if there is no geometry.
     pub object: [u32; PACKET_SIZE],
-    /// Primitive index, or [`LightObjectPacket::NONE`] for the entire object.
+    /// Primitive index, or [`LightGeometryPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
     /// Whether any lane has an object.
     pub is_any: bool,
 }
 
-impl LightObjectPacket {
+impl LightGeometryPacket {
     /// Marks a lane that has no object, or a lane that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
@@ -43,21 +43,21 @@ impl LightObjectPacket {
 
     /// A packet with the same source in all lanes.
     #[inline(always)]
-    pub fn of(source: LightGeometry) -> Self {
-        let (object, part) = object_and_part(source);
+    pub fn splat(source: LightGeometry) -> Self {
+        let (object, part) = encode_geometry(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
 
     /// Copies a lane from another packet.
     #[inline(always)]
-    pub fn copy(&mut self, lane: usize, other: &Self, from: usize) {
+    pub fn copy_lane(&mut self, lane: usize, other: &Self, from: usize) {
         (self.object[lane], self.part[lane]) = (other.object[from], other.part[from]);
         self.is_any |= other.is_any;
     }
 
     /// Returns a lane's light source geometry.
     #[inline]
-    pub fn source(&self, lane: usize) -> LightGeometry {
+    pub fn geometry(&self, lane: usize) -> LightGeometry {
         match (self.object[lane], self.part[lane]) {
             (Self::NONE, _) => LightGeometry::Nothing,
             (object, Self::NONE) => LightGeometry::Object(object),
@@ -68,18 +68,18 @@ impl LightObjectPacket {
 
     /// Sets a lane's light source geometry.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, source: LightGeometry) {
-        (self.object[lane], self.part[lane]) = object_and_part(source);
+    pub fn set_geometry(&mut self, lane: usize, source: LightGeometry) {
+        (self.object[lane], self.part[lane]) = encode_geometry(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn object_and_part(source: LightGeometry) -> (u32, u32) {
+fn encode_geometry(source: LightGeometry) -> (u32, u32) {
     match source {
-        LightGeometry::Nothing => (LightObjectPacket::NONE, LightObjectPacket::NONE),
-        LightGeometry::Object(object) => (object, LightObjectPacket::NONE),
-        LightGeometry::SeeThrough(object) => (object, LightObjectPacket::SEE_THROUGH),
+        LightGeometry::Nothing => (LightGeometryPacket::NONE, LightGeometryPacket::NONE),
+        LightGeometry::Object(object) => (object, LightGeometryPacket::NONE),
+        LightGeometry::SeeThrough(object) => (object, LightGeometryPacket::SEE_THROUGH),
         LightGeometry::Primitive(object, part) => (object, part),
     }
 }
@@ -137,16 +137,16 @@ impl LightSamplePacket {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
             weights: [[0.0; PACKET_SIZE]; 3],
-            sources: LightObjectPacket::of(source),
+            sources: LightGeometryPacket::splat(source),
             beyond: 0,
             environment_inverse_pdfs: [0.0; PACKET_SIZE],
         }
     }
 
-    fn put(&mut self, i: usize, sample: &LightSample) {
+    fn set_sample(&mut self, i: usize, sample: &LightSample) {
         set_lane(&mut self.directions, i, sample.direction);
         set_lane(&mut self.weights, i, sample.weight);
-        self.sources.set(i, sample.source);
+        self.sources.set_geometry(i, sample.source);
         match sample.end {
             ShadowRayEnd::At(target) => set_lane(&mut self.targets, i, target),
             ShadowRayEnd::Beyond => self.beyond |= 1 << i,
@@ -162,7 +162,7 @@ impl LightSamplePacket {
         let mut row = Self::black(LightGeometry::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
-                row.put(i, &sample);
+                row.set_sample(i, &sample);
             }
         }
         row

@@ -9,7 +9,7 @@ use super::delta::DeltaLight;
 use super::packet::{LightSamplePacket, packet_of};
 use super::sample::LightGeometry;
 use super::{Light, Lights};
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
@@ -23,7 +23,7 @@ macro_rules! convex_packet_of {
             (direction, target, light.radiance * factor)
         });
         for $i in 0..PACKET_SIZE {
-            row.sources.set($i, LightGeometry::Object($all[$i].1.object));
+            row.sources.set_geometry($i, LightGeometry::Object($all[$i].1.object));
         }
         row
     }};
@@ -57,11 +57,11 @@ impl Lights {
                     let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
-            } else if let Some(filler) = sphere(lights[first]) {
-                let balls = lights_of_kind((&lights, left), &mut of, sphere, filler);
+            } else if let Some(filler) = as_sphere_light(lights[first]) {
+                let balls = lights_of_kind((&lights, left), &mut of, as_sphere_light, filler);
                 convex_packet_of!(i => balls, points, u)
-            } else if let Some(filler) = quad(lights[first]) {
-                let quads = lights_of_kind((&lights, left), &mut of, quad, filler);
+            } else if let Some(filler) = as_quad_light(lights[first]) {
+                let quads = lights_of_kind((&lights, left), &mut of, as_quad_light, filler);
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
@@ -69,8 +69,8 @@ impl Lights {
                     }
                 }
                 row
-            } else if let Some(filler) = area_sampled(lights[first]) {
-                let all = lights_of_kind((&lights, left), &mut of, area_sampled, filler);
+            } else if let Some(filler) = as_area_sampled_light(lights[first]) {
+                let all = lights_of_kind((&lights, left), &mut of, as_area_sampled_light, filler);
                 triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
             } else {
                 of = 1 << first;
@@ -93,11 +93,11 @@ impl Lights {
         }
         // Apply the emission textures. They do not affect the pdfs.
         let mut lookups = 0;
-        for i in lanes(used) {
+        for i in lane_indices(used) {
             let weight = lane(&row.weights, i);
             if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
                 let (target, direction) = (lane(&row.targets, i), lane(&row.directions, i));
-                let weight = weight * texture.at(target, row.sources.part[i], direction);
+                let weight = weight * texture.radiance_factor(target, row.sources.part[i], direction);
                 set_lane(&mut row.weights, i, weight);
                 lookups += 1;
             }
@@ -107,21 +107,21 @@ impl Lights {
 }
 
 #[inline(always)]
-fn sphere(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
+fn as_sphere_light(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
     let light = light.as_area()?;
     light.shape.as_sphere().map(|sphere| (sphere, light))
 }
 
 #[inline(always)]
-fn quad(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
+fn as_quad_light(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
     let light = light.as_area()?;
     light.shape.as_quad().map(|(quad, _)| (quad, light))
 }
 
 #[inline(always)]
-fn area_sampled(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
+fn as_area_sampled_light(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     let light = light.as_area()?;
-    light.shape.as_mesh().and_then(MeshEmitter::area_sampled).map(|facets| (facets, light))
+    light.shape.as_mesh().and_then(MeshEmitter::as_area_sampled).map(|facets| (facets, light))
 }
 
 /// Returns each lane's light of one kind. Adds the lanes that have such a light to `of`. The other lanes get

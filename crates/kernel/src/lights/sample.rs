@@ -62,7 +62,7 @@ pub struct LightHit {
 
 impl LightHit {
     /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area. 0 if the light is seen from behind.
-    pub(super) fn pdf_by_area(&self, area: f64) -> f32 {
+    pub(super) fn uniform_area_pdf(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }
     }

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, LightPart, MeshEmitter, Side};
+use super::area::{AreaLight, LightCoverage, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SamplingMode {
+pub enum LightSamplingPurpose {
     /// Only direct lighting. Light sampling is the only source of noise.
     Eye,
     /// Path tracing. The image also has noise from other sources.
@@ -68,18 +68,18 @@ impl LightSamplingEffort {
 
     /// Creates a cut through a tree for this effort.
     #[inline(always)]
-    pub fn cut(self, tree: &LightTree) -> LightTreeCut<'_> {
+    pub fn new_tree_cut(self, tree: &LightTree) -> LightTreeCut<'_> {
         LightTreeCut::new(tree, self.nodes)
     }
 }
 
 /// Expected number of samples that each light gets at a vertex, per requested sample.
-pub struct ExpectedSamples<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
+pub struct ExpectedSampleCounts<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
-impl ExpectedSamples<'_> {
+impl ExpectedSampleCounts<'_> {
     /// Expected number of samples for a light.
     #[inline]
-    pub fn of(&self, number: u32) -> f32 {
+    pub fn for_light(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(sampler, cut)| {
             if sampler.leaves_beyond && !sampler.tree.contains(number) {
                 1.0
@@ -108,7 +108,7 @@ impl Lights {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
-                lights.index_light(number, light);
+                lights.register_area_light(number, light);
             } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
                 lights.suns.push((number, *sun));
             } else if let Some(light) = light.as_environment() {
@@ -135,14 +135,14 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
-    pub fn sampler(&self, receivers: SamplingMode) -> Option<LightSampler<'_>> {
+    pub fn sampler(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
-            SamplingMode::Eye => {
+            LightSamplingPurpose::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            SamplingMode::Paths => {
+            LightSamplingPurpose::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -153,26 +153,31 @@ impl Lights {
     /// Expected number of samples for each light at a surface point, given only the point's position and
     /// normal.
     #[inline]
-    pub fn samples_at(&self, receivers: SamplingMode, point: Vec3, normal: Vec3) -> ExpectedSamples<'_> {
+    pub fn expected_sample_counts(
+        &self,
+        receivers: LightSamplingPurpose,
+        point: Vec3,
+        normal: Vec3,
+    ) -> ExpectedSampleCounts<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler(receivers) else { return ExpectedSamples(None) };
-        let mut cut = sampler.picks.cut(sampler.tree);
-        cut.move_to(&Receiver::without_lobe(point, normal));
-        ExpectedSamples(Some((sampler, cut)))
+        let Some(sampler) = self.sampler(receivers) else { return ExpectedSampleCounts(None) };
+        let mut cut = sampler.picks.new_tree_cut(sampler.tree);
+        cut.adapt_to_receiver(&Receiver::without_lobe(point, normal));
+        ExpectedSampleCounts(Some((sampler, cut)))
     }
 
     /// Memory used by the trees over lights and over the triangles of mesh lights, in bytes.
     pub fn memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| {
             let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
-            mesh.and_then(MeshEmitter::tree).map_or(0, LightTree::memory_bytes)
+            mesh.and_then(MeshEmitter::light_tree).map_or(0, LightTree::memory_bytes)
         };
         let mut trees: Vec<_> = [&self.tree, &self.local_tree].into_iter().flatten().collect();
         trees.dedup_by(|a, b| Arc::ptr_eq(a, b));
         trees.iter().map(|tree| tree.memory_bytes()).chain(self.all.iter().map(of_mesh)).sum()
     }
 
-    fn index_light(&mut self, number: u32, light: &AreaLight) {
+    fn register_area_light(&mut self, number: u32, light: &AreaLight) {
         let by_object = match light.side {
             Side::Front => &mut self.by_object,
             Side::Back => &mut self.by_back,
@@ -188,10 +193,10 @@ impl Lights {
             }
         };
         match light.part {
-            LightPart::Whole => {
+            LightCoverage::Whole => {
                 by_object.insert(light.object, ObjectLights::Whole(number));
             }
-            LightPart::Listed => {
+            LightCoverage::Listed => {
                 light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(index_light);
             }
         }

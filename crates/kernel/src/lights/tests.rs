@@ -38,7 +38,7 @@ fn shapes() -> Vec<Shape> {
 const OBJECT: u32 = 7;
 
 fn lights_of(shape: &Shape) -> Lights {
-    let lights = area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
+    let lights = front_area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
     Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect(), &CancelToken::new())
         .expect("never canceled")
 }
@@ -50,7 +50,7 @@ const POINT: PointLight =
 pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
-    let normal = shape.surface(&ray, &hit).normal;
+    let normal = shape.surface_point(&ray, &hit).normal;
     Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
@@ -103,7 +103,7 @@ fn per_lane_lights_match_single_samples() {
     };
     let facets = mesh_light(&[[DVec3::ZERO, DVec3::Y, DVec3::X], [DVec3::Z, DVec3::X, DVec3::Y]]);
     let shapes =
-        shapes().into_iter().filter_map(|shape| area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
+        shapes().into_iter().filter_map(|shape| front_area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
     let areas = shapes.chain([quad(0.0), facets, quad(-2.0)]);
     let all: Vec<Light> = std::iter::once(Light::Point(POINT)).chain(areas.map(Light::Area)).collect();
     let lights = Lights::new(all.clone(), &CancelToken::new()).expect("never canceled");
@@ -131,7 +131,7 @@ fn per_lane_lights_match_single_samples() {
             };
             assert_eq!((lane(&row.weights, i), lane(&row.directions, i)), (alone.weight, alone.direction));
             assert_eq!(
-                (ShadowRayEnd::At(lane(&row.targets, i)), row.sources.source(i)),
+                (ShadowRayEnd::At(lane(&row.targets, i)), row.sources.geometry(i)),
                 (alone.end, alone.source)
             );
             assert_eq!(inverse[i] > 0.0, picked[i] > 0, "the inverse pdf should be 0 for point lights only");
@@ -175,7 +175,7 @@ fn sample_pdf_equals_pdf_of_hit() {
 
 /// Lights on both sides of a shape. The first is on the front.
 fn two_sided(shape: &Shape) -> Lights {
-    let both = [area_light(shape, Vec3::ONE, OBJECT), back_light(shape, Vec3::ONE, OBJECT)];
+    let both = [front_area_light(shape, Vec3::ONE, OBJECT), back_area_light(shape, Vec3::ONE, OBJECT)];
     let all = both.into_iter().flatten().map(Light::Area).collect();
     Lights::new(all, &CancelToken::new()).expect("never canceled")
 }
@@ -192,7 +192,8 @@ fn two_sided_samples_cover_the_visible_shape() {
     for shape in shapes().into_iter().chain([open(true), open(false)]) {
         let lights = two_sided(&shape);
         // Use points around the shape and one point inside.
-        let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
+        let is_flat =
+            front_area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
         let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain((!is_flat).then_some(inner)) {
@@ -232,7 +233,7 @@ fn two_sided_samples_cover_the_visible_shape() {
 fn back_sample_pdf_equals_pdf_of_hit() {
     let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false));
     for shape in shapes().into_iter().chain([tube]) {
-        let light = Light::Area(back_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
+        let light = Light::Area(back_area_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
         let mut compared = 0;
         let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
@@ -326,7 +327,7 @@ fn mesh_triangles_map_to_their_lights() {
             radiance: Vec3::splat(radiance),
             texture: None,
             object: 3,
-            part: LightPart::Listed,
+            part: LightCoverage::Listed,
             side: Side::Front,
         })
     };
@@ -358,7 +359,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("never canceled").expect("an area");
     let bounds = mesh.bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    let (side, part) = (Side::Front, LightPart::Listed);
+    let (side, part) = (Side::Front, LightCoverage::Listed);
     AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }
 }
 
@@ -366,7 +367,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
 fn triangle_pairs_are_sampled_like_quads() {
     let (p, u, v) = (DVec3::new(0.3, -0.2, 0.1), DVec3::X, DVec3::new(0.0, 1.0, -0.5));
     let quad = Shape::Quad(Parallelogram::new(p, u, v));
-    let quad = area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
+    let quad = front_area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
     let far = p + u + v;
     let (mut parts, mut seen) = ([0; 2], 0);
     for (first, second) in [
@@ -467,5 +468,5 @@ fn area_samples_are_proportional_to_area() {
 
 #[test]
 fn planes_cannot_be_lights() {
-    assert_eq!(area_light(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0), None);
+    assert_eq!(front_area_light(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0), None);
 }

@@ -23,7 +23,7 @@ const OBJECT: u32 = 7;
 struct PcgRandom(u64);
 
 impl PcgRandom {
-    fn next(&mut self) -> f32 {
+    fn next_f32(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let word = ((self.0 >> ((self.0 >> 59) + 5)) ^ self.0).wrapping_mul(12_605_985_483_714_917_081);
         (word >> 40) as f32 / (1 << 24) as f32
@@ -31,17 +31,17 @@ impl PcgRandom {
 }
 
 /// Samples of the irradiance from a light with radiance 1, at a point on the floor y = 0.
-fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
+fn sample_irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     let mut random = PcgRandom(5);
     let mut one = || {
-        let sample = light.sample(from, Vec3::Y, [random.next(), random.next()]);
+        let sample = light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]);
         sample.map_or(0.0, |sample| f64::from(sample.weight.x * sample.direction.y.max(0.0)))
     };
     (0..count).map(|_| one()).collect()
 }
 
 /// The mean, and the relative standard deviation of a single sample.
-fn spread(samples: &[f64]) -> (f64, f64) {
+fn mean_and_deviation(samples: &[f64]) -> (f64, f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
     let variance = samples.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / n;
@@ -79,8 +79,8 @@ fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
     ]
 }
 
-fn light_of(shape: &Shape) -> AreaLight {
-    area_light(shape, Vec3::ONE, OBJECT).expect("the shape should have an area")
+fn light_from_shape(shape: &Shape) -> AreaLight {
+    front_area_light(shape, Vec3::ONE, OBJECT).expect("the shape should have an area")
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn area_light_variance_is_bounded() {
     for gap in [1e-4, 0.01, 0.1, 1.0, 10.0] {
         for (name, shape) in area_lights(gap) {
             for from in [Vec3::ZERO, Vec3::new(0.05, 0.0, 0.1)] {
-                let samples = irradiance(&light_of(&shape), from, 20_000);
-                let (mean, scatter) = spread(&samples);
+                let samples = sample_irradiance(&light_from_shape(&shape), from, 20_000);
+                let (mean, scatter) = mean_and_deviation(&samples);
                 if !(mean > 1e-9) {
                     continue;
                 }
@@ -134,7 +134,10 @@ fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
     let radius = (1.0 - cos * cos).sqrt();
     let Some(towards) = sum.try_normalize() else { return (0.0, 0.0) };
     let ball = Shape::Sphere(Sphere { center: from.as_dvec3() + towards.as_dvec3(), radius });
-    (spread(&irradiance(&light_of(&ball), from, 20_000)).1, spread(&cosines).1)
+    (
+        mean_and_deviation(&sample_irradiance(&light_from_shape(&ball), from, 20_000)).1,
+        mean_and_deviation(&cosines).1,
+    )
 }
 
 /// Number of direction cells along each axis.
@@ -154,7 +157,7 @@ fn shape_samples_follow_their_pdf() {
         let ball = ("ball", Shape::Sphere(Sphere { center: DVec3::Y * (0.5 + gap), radius: 0.5 }));
         for (name, shape) in area_lights(gap).into_iter().chain([ball]) {
             let name = format!("{name} at {gap}");
-            checked += u32::from(follows_its_pdf(&name, &shape, &light_of(&shape), from));
+            checked += u32::from(follows_its_pdf(&name, &shape, &light_from_shape(&shape), from));
         }
     }
     assert!(checked >= 30, "{checked}");
@@ -174,7 +177,7 @@ fn textured_quad_samples_follow_their_pdf() {
 /// Checks that samples follow their pdf. Returns false if there are too few samples to decide.
 fn follows_its_pdf(name: &str, shape: &Shape, light: &AreaLight, from: Vec3) -> bool {
     let Some((directions, bins)) = histogram(light, from) else { return false };
-    check_bins(name, &bins, &expected(shape, light, from, &directions))
+    check_bins(name, &bins, &expected_counts(shape, light, from, &directions))
 }
 
 /// Quads with emission textures, placed above the origin.
@@ -190,7 +193,7 @@ fn textured_quads(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
         let textured = TexturedQuadEmitter::new(emitter, texels, color).expect("a textured quad");
         let shape = Shape::Quad(quad);
-        let light = light_of(&shape);
+        let light = light_from_shape(&shape);
         (name, shape, AreaLight { shape: Emitter::TexturedQuad(Box::new(textured)), ..light })
     };
     vec![
@@ -208,8 +211,10 @@ fn textured_quad_pdf_matches_its_samples() {
     for (name, shape, light) in [0.02, 0.8].into_iter().flat_map(textured_quads) {
         let (mut compared, mut apart) = (0, 0);
         for _ in 0..4000 {
-            let from = Vec3::new(random.next() - 0.5, 0.0, random.next() - 0.5);
-            let Some(sample) = light.sample(from, Vec3::Y, [random.next(), random.next()]) else { continue };
+            let from = Vec3::new(random.next_f32() - 0.5, 0.0, random.next_f32() - 0.5);
+            let Some(sample) = light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]) else {
+                continue;
+            };
             let Some((met, _)) = light_hit(&shape, from, sample.direction) else { continue };
             let product = light.pdf(from, Vec3::Y, &met) * sample.weight.x;
             compared += 1;
@@ -230,14 +235,19 @@ fn small_bright_areas_have_low_variance() {
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
         let color = |at: [f64; 2]| Vec3::splat(bright(at));
         let textured = TexturedQuadEmitter::new(emitter, [10.0, 10.0], color).expect("a textured quad");
-        let plain = light_of(&Shape::Quad(quad));
+        let plain = light_from_shape(&Shape::Quad(quad));
         let with_texture = AreaLight { shape: Emitter::TexturedQuad(Box::new(textured)), ..plain.clone() };
         let small = Parallelogram::new(DVec3::new(-0.2, gap, 0.1), DVec3::X * 0.1, DVec3::Z * 0.1);
-        let exact = spread(&irradiance(&light_of(&Shape::Quad(small)), Vec3::ZERO, 40_000)).0;
+        let exact = mean_and_deviation(&sample_irradiance(
+            &light_from_shape(&Shape::Quad(small)),
+            Vec3::ZERO,
+            40_000,
+        ))
+        .0;
         let scatter = [&plain, &with_texture].map(|light| {
             let mut random = PcgRandom(5);
             let mut one = || {
-                let sample = light.sample(Vec3::ZERO, Vec3::Y, [random.next(), random.next()]);
+                let sample = light.sample(Vec3::ZERO, Vec3::Y, [random.next_f32(), random.next_f32()]);
                 sample.map_or(0.0, |sample| {
                     let ShadowRayEnd::At(target) = sample.end else { panic!("expected a finite light") };
                     let at = [target.x + 0.5, target.z + 0.5].map(f64::from);
@@ -245,7 +255,7 @@ fn small_bright_areas_have_low_variance() {
                 })
             };
             let samples: Vec<f64> = (0..40_000).map(|_| one()).collect();
-            let (mean, scatter) = spread(&samples);
+            let (mean, scatter) = mean_and_deviation(&samples);
             let error = mean * scatter / 200.0;
             assert!((mean - exact).abs() < 4.0 * error, "{gap}: {mean} ± {error} instead of {exact}");
             scatter
@@ -256,14 +266,19 @@ fn small_bright_areas_have_low_variance() {
 
 /// Computes the expected number of samples in each cell by integrating the pdf. Also returns the variance of
 /// this estimate.
-fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Directions) -> Vec<(f64, f64)> {
+fn expected_counts(
+    shape: &Shape,
+    light: &AreaLight,
+    from: Vec3,
+    directions: &DirectionGrid,
+) -> Vec<(f64, f64)> {
     let square = directions.solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
     let mut random = PcgRandom(3);
     let mut bins = vec![(0.0, 0.0); SIDE * SIDE];
     for i in 0..SIDE * FINE {
         let mut before = 0.0;
         for j in 0..SIDE * FINE {
-            let place = [i, j].map(|k| (k as f32 + random.next()) / (SIDE * FINE) as f32);
+            let place = [i, j].map(|k| (k as f32 + random.next_f32()) / (SIDE * FINE) as f32);
             let met = light_hit(shape, from, directions.direction(place));
             let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
             let (wanted, variance) = &mut bins[i / FINE * SIDE + j / FINE];
@@ -311,7 +326,7 @@ fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
 #[track_caller]
 fn assert_irradiance(shape: &Shape, exact: f64, greatest_error: f64) {
     let count = 40_000;
-    let (mean, scatter) = spread(&irradiance(&light_of(shape), Vec3::ZERO, count));
+    let (mean, scatter) = mean_and_deviation(&sample_irradiance(&light_from_shape(shape), Vec3::ZERO, count));
     let error = mean * scatter / f64::from(count).sqrt();
     assert!(error <= greatest_error * exact, "{shape:?}: ± {error}");
     let allowed = 4.0 * error + 1e-5 * exact;
@@ -367,12 +382,12 @@ fn irradiance_matches_closed_forms() {
 }
 
 /// Directions around an axis, mapped to the unit square.
-struct Directions {
+struct DirectionGrid {
     frame: Frame,
     one_minus_cos: f32,
 }
 
-impl Directions {
+impl DirectionGrid {
     fn solid_angle(&self) -> f64 {
         std::f64::consts::TAU * f64::from(self.one_minus_cos)
     }
@@ -381,7 +396,7 @@ impl Directions {
         self.frame.to_world(crate::sampling::warp::cone(place, self.one_minus_cos))
     }
 
-    fn place(&self, direction: Vec3) -> [f32; 2] {
+    fn to_unit_square(&self, direction: Vec3) -> [f32; 2] {
         let Frame { s, t, n } = self.frame;
         let turn = direction.dot(t).atan2(direction.dot(s)) / std::f32::consts::TAU;
         [(1.0 - direction.dot(n)) / self.one_minus_cos, if turn < 0.0 { turn + 1.0 } else { turn }]
@@ -389,19 +404,19 @@ impl Directions {
 }
 
 /// Counts the samples in each direction cell. Returns `None` if there are no samples.
-fn histogram(light: &AreaLight, from: Vec3) -> Option<(Directions, Vec<usize>)> {
+fn histogram(light: &AreaLight, from: Vec3) -> Option<(DirectionGrid, Vec<usize>)> {
     let mut random = PcgRandom(11);
     let samples: Vec<Vec3> = (0..COUNT)
-        .filter_map(|_| light.sample(from, Vec3::Y, [random.next(), random.next()]))
+        .filter_map(|_| light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]))
         .map(|sample| sample.direction)
         .collect();
     let middle = samples.iter().sum::<Vec3>().try_normalize()?;
     let least = samples.iter().map(|direction| direction.dot(middle)).fold(1.0, f32::min);
     let directions =
-        Directions { frame: Frame::from_normal(middle), one_minus_cos: (1.0 - least) * 1.01 + 1e-6 };
+        DirectionGrid { frame: Frame::from_normal(middle), one_minus_cos: (1.0 - least) * 1.01 + 1e-6 };
     let mut bins = vec![0; SIDE * SIDE];
     for direction in samples {
-        let [i, j] = directions.place(direction).map(|x| ((x * SIDE as f32) as usize).min(SIDE - 1));
+        let [i, j] = directions.to_unit_square(direction).map(|x| ((x * SIDE as f32) as usize).min(SIDE - 1));
         bins[i * SIDE + j] += 1;
     }
     Some((directions, bins))

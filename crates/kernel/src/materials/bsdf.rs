@@ -1,24 +1,24 @@
 //! Non-specular ("rough") materials, which have no δ lobes, and the values that their BSDFs exchange with
 //! integrators.
 //!
-//! To add a kind of BSDF, add a file that implements [`RoughMaterial`], [`RoughPoint`], and
+//! To add a kind of BSDF, add a file that implements [`BxdfMaterial`], [`BxdfParameters`], and
 //! [`Bxdf`](super::bxdf::Bxdf), and a line in the table in [`bxdfs`](super::bxdfs). No other code
-//! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfRow`](super::BsdfRow) for all
+//! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all
 //! lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
 
 use super::lookup::ParameterLookup;
-use super::texture::Color;
+use super::texture::ColorParameter;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Vec3x16};
 
 /// A packet of texture coordinates.
-pub type UvRow = [[f64; PACKET_SIZE]; 2];
+pub type UvPacket = [[f64; PACKET_SIZE]; 2];
 
 /// The lobes that an image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShownLobes {
+pub enum LobeFilter {
     /// Lobes selected by role.
     Of {
         /// The wide lobes.
@@ -30,7 +30,7 @@ pub enum ShownLobes {
     Unit,
 }
 
-impl ShownLobes {
+impl LobeFilter {
     /// All lobes.
     pub const ALL: Self = Self::Of { diffuse: true, specular: true };
 }
@@ -83,7 +83,7 @@ impl BsdfValues {
 /// Sampled directions in which paths continue, on either side of the surfaces.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct SideSamples {
+pub struct DielectricSamplePacket {
     /// Unit directions.
     pub directions: Vec3x16,
     /// Pdfs of the directions in sr⁻¹. 0 for directions from which no light arrives.
@@ -113,7 +113,7 @@ impl NarrowLobe {
     /// Approximates a microfacet lobe with the given α and reflectance, in addition to wide lobes. An
     /// exponent of 1/2α² matches the curvature of the peak in the mirror direction.
     #[inline(always)]
-    pub(super) fn of_microfacets(
+    pub(super) fn from_microfacets(
         normal: Vec3,
         to_eye: Vec3,
         alpha: f32,
@@ -131,9 +131,9 @@ impl NarrowLobe {
 }
 
 /// A non-specular material with textures and parameters.
-pub trait RoughMaterial {
+pub trait BxdfMaterial {
     /// The material at a single point.
-    type Point: RoughPoint;
+    type Point: BxdfParameters;
 
     /// Looks up all parameters. Parameters that do not affect the result need not be looked up.
     fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Self::Point;
@@ -148,13 +148,13 @@ pub trait RoughMaterial {
 
     /// The color that can be looked up for packets and set with
     /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color). `None` if there is no such color.
-    fn packet_color(&self) -> Option<&Color> {
+    fn packet_color(&self) -> Option<&ColorParameter> {
         None
     }
 
     /// Whether the material depends on [`SurfaceDirections::tangent`](super::bxdf::SurfaceDirections::tangent).
     #[inline]
-    fn has_direction(&self) -> bool {
+    fn is_anisotropic(&self) -> bool {
         false
     }
 
@@ -165,12 +165,12 @@ pub trait RoughMaterial {
 }
 
 /// A non-specular material at a single point.
-pub trait RoughPoint {
+pub trait BxdfParameters {
     /// Whether the surface reflects nothing.
     fn is_black(&self) -> bool;
 
     /// Reflectance for ambient light.
-    fn ambient(&self) -> Vec3;
+    fn ambient_reflectance(&self) -> Vec3;
 
     /// The material with its color multiplied by `color`.
     fn tinted(self, color: Vec3) -> Self;

@@ -9,7 +9,7 @@
 //! [`Bxdf::sample`] continues the path at exactly one of them. The pdfs include the directions on both
 //! sides.
 
-use super::bsdf::{LobeSet, NarrowLobe, RoughPoint};
+use super::bsdf::{BxdfParameters, LobeSet, NarrowLobe};
 use crate::math::Vec3;
 use crate::math::soa::Soa;
 
@@ -84,7 +84,7 @@ pub struct SurfaceDirections {
 /// A non-specular BSDF at a single point. Values that depend on the view direction are stored separately.
 pub trait Bxdf: Soa + Default {
     /// The material's parameters at a single point.
-    type Point: RoughPoint;
+    type Point: BxdfParameters;
 
     /// Values that depend on the view direction.
     type View: Soa + Default;
@@ -110,14 +110,14 @@ pub trait Bxdf: Soa + Default {
     /// Flags of all BSDFs of this kind.
     const ALWAYS: BxdfFlags;
 
-    /// A flag for which [`Bxdf::narrow`] is compiled into two loops, one for surfaces with the flag and one
+    /// A flag for which [`Bxdf::narrow_lobe_value`] is compiled into two loops, one for surfaces with the flag and one
     /// for surfaces without it.
     const SPLITS_NARROW: BxdfFlags = BxdfFlags(0);
 
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`RoughMaterial::packet_color`](super::bsdf::RoughMaterial::packet_color)
+    /// Replaces the color that [`BxdfMaterial::packet_color`](super::bsdf::BxdfMaterial::packet_color)
     /// returns. Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
@@ -131,16 +131,16 @@ pub trait Bxdf: Soa + Default {
     }
 
     /// Computes the values that depend on the view direction. `any` are the flags of the packet.
-    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> Self::View;
+    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> Self::View;
 
     /// Value of the wide lobes.
     #[inline(always)]
-    fn wide(&self, _view: &Self::View, _wi: Vec3, _any: BxdfFlags) -> LobeValue {
+    fn wide_lobe_value(&self, _view: &Self::View, _wi: Vec3, _any: BxdfFlags) -> LobeValue {
         LobeValue::ZERO
     }
 
     /// Value of the narrow lobes.
-    fn narrow(&self, view: &Self::View, wi: Vec3, any: BxdfFlags) -> LobeValue;
+    fn narrow_lobe_value(&self, view: &Self::View, wi: Vec3, any: BxdfFlags) -> LobeValue;
 
     /// Pdf in sr⁻¹ of a direction sampled from these lobes. Cosine lobes are around `normal`. `shape` is the
     /// narrow lobes' [`LobeValue::shape`].
@@ -179,7 +179,7 @@ pub trait Bxdf: Soa + Default {
 
 /// Chooses one of two vectors without a branch.
 #[inline(always)]
-pub(super) fn choose(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
+pub(super) fn select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
     let pick = |yes: f32, no: f32| if condition { yes } else { no };
     Vec3::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
 }

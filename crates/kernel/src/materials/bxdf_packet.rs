@@ -1,6 +1,6 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
-use super::bsdf::{BsdfValues, LobeSet, NarrowLobe, ShownLobes, SideSamples, UvRow};
+use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, LobeSet, NarrowLobe, UvPacket};
 use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
 use super::microfacet::rotate_toward_viewer;
 use super::rough_dielectric::DielectricBxdf;
@@ -24,15 +24,15 @@ soa! {
     }
 }
 
-impl From<ShownLobes> for LobeFactors {
+impl From<LobeFilter> for LobeFactors {
     #[inline(always)]
-    fn from(shown: ShownLobes) -> Self {
+    fn from(shown: LobeFilter) -> Self {
         let factor = |is_shown: bool| if is_shown { 1.0 } else { 0.0 };
         match shown {
-            ShownLobes::Of { diffuse, specular } => {
+            LobeFilter::Of { diffuse, specular } => {
                 Self { wide: factor(diffuse), narrow: factor(specular), unit: 0.0 }
             }
-            ShownLobes::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
+            LobeFilter::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
         }
     }
 }
@@ -64,7 +64,7 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
 
 /// Flags in which the compiler knows the value of [`BxdfFlags::NARROW`], so it can remove code from loops.
 #[inline(always)]
-fn with_narrow<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
+fn with_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
     if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
 }
 
@@ -77,18 +77,24 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Sets a surface.
     #[inline(always)]
-    pub fn put(&mut self, i: usize, point: &B::Point, shown: ShownLobes, directions: &SurfaceDirections) {
+    pub fn set_bsdf(
+        &mut self,
+        i: usize,
+        point: &B::Point,
+        shown: LobeFilter,
+        directions: &SurfaceDirections,
+    ) {
         let bsdf = B::new(point, directions.tangent);
         self.any = self.any.union(bsdf.flags());
-        self.shows_all &= shown == ShownLobes::ALL;
-        bsdf.view(directions, self.any).set(&mut self.view, i);
+        self.shows_all &= shown == LobeFilter::ALL;
+        bsdf.compute_view_terms(directions, self.any).set(&mut self.view, i);
         bsdf.set(&mut self.bsdf, i);
         LobeFactors::from(shown).set(&mut self.shown, i);
     }
 
     /// Copies a surface from another packet.
     #[inline(always)]
-    pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
+    pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
         B::get(&other.bsdf, from).set(&mut self.bsdf, i);
         B::View::get(&other.view, from).set(&mut self.view, i);
         LobeFactors::get(&other.shown, from).set(&mut self.shown, i);
@@ -100,11 +106,11 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// the given coordinates replace the color. Later entries of `shown` override earlier ones. Returns a
     /// mask of surfaces that reflect nothing.
     #[inline(always)]
-    pub fn fill(
+    pub fn fill_lanes(
         &mut self,
         point: &B::Point,
-        color: Option<(&Texture, &UvRow)>,
-        shown: &[(u32, ShownLobes)],
+        color: Option<(&Texture, &UvPacket)>,
+        shown: &[(u32, LobeFilter)],
         simd: impl Simd,
     ) -> u32 {
         let bsdf = B::new(point, Vec3::X);
@@ -121,7 +127,7 @@ impl<B: Bxdf> BxdfPacket<B> {
             let of = mask_from_bits(of);
             B::select(&of, &filled, &mut self.bsdf);
             LobeFactors::select(&of, &LobeFactors::from(shown).splat(), &mut self.shown);
-            self.shows_all &= shown == ShownLobes::ALL;
+            self.shows_all &= shown == LobeFilter::ALL;
         }
         self.any = self.any.union(bsdf.flags());
         let mut black = [0; PACKET_SIZE];
@@ -148,7 +154,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         for i in 0..PACKET_SIZE {
             let (normal, wo) = (lane(normals, i), -lane(directions, i));
             let directions = SurfaceDirections { normal, wo, tangent: Vec3::X };
-            B::get(&self.bsdf, i).view(&directions, self.any).set(&mut view, i);
+            B::get(&self.bsdf, i).compute_view_terms(&directions, self.any).set(&mut view, i);
         }
         match of {
             Some(of) => B::View::select(of, &view, &mut self.view),
@@ -174,16 +180,16 @@ impl<B: Bxdf> BxdfPacket<B> {
         if self.has_wide_lobes() {
             for i in 0..PACKET_SIZE {
                 let bsdf = B::get(&self.bsdf, i);
-                let value = bsdf.wide(&B::View::get(&self.view, i), lane(wi, i), self.any);
+                let value = bsdf.wide_lobe_value(&B::View::get(&self.view, i), lane(wi, i), self.any);
                 set_lane(&mut values.wide, i, value.f);
                 values.max[i] = value.max;
             }
         }
         if self.has_narrow_lobes() {
             if self.any.contains(B::SPLITS_NARROW) {
-                self.add_narrow(wi, &mut values, self.any.union(B::SPLITS_NARROW));
+                self.add_narrow_lobes(wi, &mut values, self.any.union(B::SPLITS_NARROW));
             } else {
-                self.add_narrow(wi, &mut values, self.any.without(B::SPLITS_NARROW));
+                self.add_narrow_lobes(wi, &mut values, self.any.without(B::SPLITS_NARROW));
             }
         }
         if !self.shows_all {
@@ -200,10 +206,10 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Adds the narrow lobes to `values`.
     #[inline(always)]
-    fn add_narrow(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
+    fn add_narrow_lobes(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
-            let value = bsdf.narrow(&B::View::get(&self.view, i), lane(wi, i), any);
+            let value = bsdf.narrow_lobe_value(&B::View::get(&self.view, i), lane(wi, i), any);
             set_lane(&mut values.narrow, i, value.f);
             values.max[i] += value.max;
             values.shape[i] = value.shape;
@@ -229,7 +235,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         wi: &Vec3x16,
         values: &BsdfValues,
     ) -> F32x16 {
-        let any = with_narrow::<NARROW>(self.any);
+        let any = with_narrow_flag::<NARROW>(self.any);
         let mut pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -258,7 +264,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
-        let any = with_narrow::<NARROW>(self.any);
+        let any = with_narrow_flag::<NARROW>(self.any);
         let mut wi = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -277,7 +283,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Mask of surfaces that have a narrow lobe, even if it is not shown.
     #[inline(always)]
-    pub fn narrow_lobes(&self) -> u32 {
+    pub fn narrow_lobe_mask(&self) -> u32 {
         let mut narrow = 0;
         for i in 0..PACKET_SIZE {
             narrow |= u32::from(self.flags(i).contains(BxdfFlags::NARROW)) << i;
@@ -297,12 +303,12 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine raised to the power
     /// `exponent`.
     #[inline(always)]
-    pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
+    pub fn mask_narrower_than(&self, of: u32, exponent: f32) -> u32 {
         let mut narrow = 0;
         for i in 0..PACKET_SIZE {
             narrow |= u32::from(B::get(&self.bsdf, i).exponent() >= exponent) << i;
         }
-        narrow & self.narrow_lobes() & of
+        narrow & self.narrow_lobe_mask() & of
     }
 
     /// Returns f of a surface's shown lobes in sr⁻¹ if all of the surface's lobes are constant over all
@@ -310,23 +316,23 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub fn constant_f(&self, i: usize) -> Option<Vec3> {
         let is_constant = B::HAS_CONSTANT_WIDE && !self.flags(i).contains(BxdfFlags::NARROW);
-        is_constant.then(|| self.f_at(i, Vec3::Z)[0])
+        is_constant.then(|| self.lane_f(i, Vec3::Z)[0])
     }
 
     /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes and f of all
     /// lobes.
     #[inline]
-    pub fn f_at(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
+    pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
         let (shown, flags) = (LobeFactors::get(&self.shown, i), self.flags(i));
         let (mut f, mut all) = (Vec3::splat(shown.unit), Vec3::ZERO);
         if flags.contains(BxdfFlags::WIDE) {
-            let wide = bsdf.wide(&view, wi, self.any).f;
+            let wide = bsdf.wide_lobe_value(&view, wi, self.any).f;
             f += wide * shown.wide;
             all += wide;
         }
         if flags.contains(BxdfFlags::NARROW) {
-            let narrow = bsdf.narrow(&view, wi, self.any).f;
+            let narrow = bsdf.narrow_lobe_value(&view, wi, self.any).f;
             f += narrow * shown.narrow;
             all += narrow;
         }
@@ -337,18 +343,24 @@ impl<B: Bxdf> BxdfPacket<B> {
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
     /// Samples a direction on either side of each surface.
     #[inline(always)]
-    pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2]) -> SideSamples {
+    pub fn sample_either_side(&self, choices: &F32x16, u: &[F32x16; 2]) -> DielectricSamplePacket {
         let (mut wi, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
         let (mut pdfs, mut weights) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let bsdf = DielectricBxdf::<THROUGH>::get(&self.bsdf, i);
             let view = Soa::get(&self.view, i);
-            let sample = bsdf.sample_side(&view, choices[i], [u[0][i], u[1][i]]);
+            let sample = bsdf.sample_either_side(&view, choices[i], [u[0][i], u[1][i]]);
             set_lane(&mut wi, i, sample.wi);
             (pdfs[i], weights[i]) = (sample.pdf, sample.weight);
             beyond[i] = if sample.is_beyond { TRUE } else { 0 };
         }
-        SideSamples { directions: wi, densities: pdfs, shares: weights, shown: self.shown.narrow, beyond }
+        DielectricSamplePacket {
+            directions: wi,
+            densities: pdfs,
+            shares: weights,
+            shown: self.shown.narrow,
+            beyond,
+        }
     }
 }
 
@@ -357,13 +369,13 @@ impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
 impl<B: Bxdf> BxdfPacket<B> {
     /// [`BxdfPacket::f`].
     #[inline(always)]
-    pub(super) fn call_f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
+    pub(super) fn dispatch_f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
         if B::IS_INLINED { self.f(wi) } else { simd.call(EvaluationKernel { packet: self, wi }) }
     }
 
     /// [`BxdfPacket::pdf`].
     #[inline(always)]
-    pub(super) fn call_pdf(
+    pub(super) fn dispatch_pdf(
         &self,
         lobes: LobeSet,
         normals: &Vec3x16,
@@ -380,7 +392,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// [`BxdfPacket::sample`].
     #[inline(always)]
-    pub(super) fn call_sample(
+    pub(super) fn dispatch_sample(
         &self,
         lobes: LobeSet,
         normals: &Vec3x16,
@@ -397,15 +409,15 @@ impl<B: Bxdf> BxdfPacket<B> {
 }
 
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
-    /// [`BxdfPacket::sample_sides`].
+    /// [`BxdfPacket::sample_either_side`].
     #[inline(always)]
-    pub(super) fn call_sample_sides(
+    pub(super) fn dispatch_sample_either_side(
         &self,
         choices: &F32x16,
         u: &[F32x16; 2],
         simd: impl Simd,
-    ) -> SideSamples {
-        simd.call(SideSamplingKernel { packet: self, choices, u })
+    ) -> DielectricSamplePacket {
+        simd.call(EitherSideSamplingKernel { packet: self, choices, u })
     }
 }
 
@@ -460,18 +472,18 @@ impl<B: Bxdf> SimdKernel for SamplingKernel<'_, B> {
     }
 }
 
-/// Kernel of [`BxdfPacket::sample_sides`].
-struct SideSamplingKernel<'a, const THROUGH: bool> {
+/// Kernel of [`BxdfPacket::sample_either_side`].
+struct EitherSideSamplingKernel<'a, const THROUGH: bool> {
     packet: &'a BxdfPacket<DielectricBxdf<THROUGH>>,
     choices: &'a F32x16,
     u: &'a [F32x16; 2],
 }
 
-impl<const THROUGH: bool> SimdKernel for SideSamplingKernel<'_, THROUGH> {
-    type Output = SideSamples;
+impl<const THROUGH: bool> SimdKernel for EitherSideSamplingKernel<'_, THROUGH> {
+    type Output = DielectricSamplePacket;
 
     #[inline(always)]
-    fn run(self, _: impl Simd) -> SideSamples {
-        self.packet.sample_sides(self.choices, self.u)
+    fn run(self, _: impl Simd) -> DielectricSamplePacket {
+        self.packet.sample_either_side(self.choices, self.u)
     }
 }

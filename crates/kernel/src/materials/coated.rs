@@ -3,21 +3,21 @@
 
 use std::sync::Arc;
 
-use super::bxdfs::Rough;
+use super::bxdfs::NonSpecular;
 use super::footprint::TexturePoint;
 use super::fresnel::dielectric;
-use super::texture::{Color, Texture};
+use super::texture::{ColorParameter, Texture};
 use crate::math::Vec3;
 
 /// A smooth dielectric coat over a base. The base's lobes already account for the coat's transmittance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
     /// Factor applied to the coat's reflection.
-    pub specular: Color,
+    pub specular: ColorParameter,
     /// Index of refraction of the coat. At least 1.
     pub ior: f32,
     /// The surface under the coat.
-    pub base: Rough,
+    pub base: NonSpecular,
 }
 
 impl Coated {
@@ -30,8 +30,8 @@ impl Coated {
 
     /// The factor applied to the coat's reflection. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn specular(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.specular.at(at, lookups)
+    pub fn specular_factor(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.specular.evaluate(at, lookups)
     }
 
     /// All textures of the coat.

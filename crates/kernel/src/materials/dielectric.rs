@@ -2,7 +2,7 @@
 
 use super::footprint::TexturePoint;
 use super::microfacet;
-use super::scalar::Number;
+use super::scalar::ScalarParameter;
 use crate::math::elementary::exp2;
 use crate::math::{DVec3, Vec3};
 
@@ -14,7 +14,7 @@ pub struct Dielectric {
     /// Transmittance per unit length inside the shape, rounded to `f32`.
     pub tint: Vec3,
     /// The square root of α. For smooth glass, it is a constant 0.
-    pub roughness: Number,
+    pub roughness: ScalarParameter,
     /// Absorption in halvings per unit length. If the tint of colored glass were stored in `f32`, it could
     /// underflow in scenes with large units and round to 1 in scenes with small units.
     density: Vec3,
@@ -27,24 +27,25 @@ impl Dielectric {
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
         let density = Vec3::from_array(tint.to_array().map(halvings));
-        Self { ior, tint: tint.as_vec3(), roughness: Number::Constant(0.0), density }
+        Self { ior, tint: tint.as_vec3(), roughness: ScalarParameter::Constant(0.0), density }
     }
 
     /// The same glass with a different surface roughness.
-    pub fn with_roughness(self, roughness: Number) -> Self {
+    pub fn with_roughness(self, roughness: ScalarParameter) -> Self {
         Self { roughness, ..self }
     }
 
     /// Whether the surface is smooth.
     #[inline]
     pub fn is_smooth(&self) -> bool {
-        self.roughness.constant() == Some(0.0)
+        self.roughness.as_constant() == Some(0.0)
     }
 
     /// The surface's α. `None` if it is smooth.
     #[inline]
     pub fn alpha(&self, at: &TexturePoint, lookups: &mut u64) -> Option<f32> {
-        (!self.is_smooth()).then(|| microfacet::alphas(self.roughness.at(at, lookups), 0.0)[0])
+        (!self.is_smooth())
+            .then(|| microfacet::alphas_from_roughness(self.roughness.evaluate(at, lookups), 0.0)[0])
     }
 
     /// Transmittance over `distance` inside the shape (Beer–Lambert law).

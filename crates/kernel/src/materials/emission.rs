@@ -33,10 +33,10 @@ pub struct Emission {
 
 impl Emission {
     /// No emission.
-    pub const NONE: Self = Self::constant(Vec3::ZERO);
+    pub const NONE: Self = Self::from_constant(Vec3::ZERO);
 
     /// Constant emission from the front.
-    pub const fn constant(scale: Vec3) -> Self {
+    pub const fn from_constant(scale: Vec3) -> Self {
         Self { scale, texture: None, sides: EmissionSides::Front, coat: None }
     }
 
@@ -63,7 +63,7 @@ impl Emission {
     /// The radiance at the given texture coordinates, in a direction at the given cosine to the normal.
     /// Counts texture lookups in `lookups`.
     #[inline]
-    pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
+    pub fn radiance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(1.0, |coat| coat.transmittance(at, cosine, lookups));
         let Some(texture) = self.texture.as_ref().filter(|_| self.is_emissive()) else {
             return self.scale * left;

@@ -37,7 +37,7 @@ pub struct SecondUvPoint {
 
 impl TexturePoint {
     /// A point without a footprint.
-    pub fn sharp(uv: DVec2) -> Self {
+    pub fn from_uv(uv: DVec2) -> Self {
         Self { uv, footprint: Footprint::POINT, second: None }
     }
 
@@ -65,7 +65,7 @@ impl Footprint {
     /// the direction. Along the direction, it is longer by a factor of 1 / cosine. `tangents` are ∂p/∂u and
     /// ∂p/∂v. If they are parallel or 0, the footprint is a point.
     #[inline]
-    pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
+    pub fn from_ray_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
         let along =
             (direction - normal * cosine).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
@@ -105,11 +105,11 @@ mod tests {
     #[test]
     fn footprints_stretch_along_the_direction() {
         let tangents = [Vec3::X * 2.0, Vec3::Y * 4.0];
-        let straight = Footprint::of_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
+        let straight = Footprint::from_ray_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
         // A length of 0.5 spans a quarter of u and an eighth of v.
         assert!((straight.major_axis_texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
         assert!((straight.major_axis_texels(Vec2::new(0.0, 100.0)) - 12.5).abs() < 1e-4);
-        let steep = Footprint::of_cone(0.5, Vec3::new(0.0, 0.8, -0.6), Vec3::Z, tangents);
+        let steep = Footprint::from_ray_cone(0.5, Vec3::new(0.0, 0.8, -0.6), Vec3::Z, tangents);
         assert!((steep.major_axis_texels(Vec2::new(0.0, 60.0)) - 12.5).abs() < 1e-4);
         assert!((steep.major_axis_texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
     }
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn oblique_tangents_are_separated() {
         let tangents = [Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
-        let seen = Footprint::of_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
+        let seen = Footprint::from_ray_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
         // Along x, only u changes, by 1/0.8. Along y, v increases by one and u decreases by one.
         assert!((seen.major_axis_texels(Vec2::X) - 1.25).abs() < 1e-6);
         assert!((seen.major_axis_texels(Vec2::Y) - 1.0).abs() < 1e-6);
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn degenerate_tangents_give_a_point() {
         for tangents in [[Vec3::ZERO; 2], [Vec3::X, Vec3::X * 2.0], [Vec3::NAN, Vec3::X]] {
-            assert_eq!(Footprint::of_cone(1.0, Vec3::NEG_Z, Vec3::Z, tangents), Footprint::POINT);
+            assert_eq!(Footprint::from_ray_cone(1.0, Vec3::NEG_Z, Vec3::Z, tangents), Footprint::POINT);
         }
     }
 }

@@ -22,13 +22,13 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
 
 /// [`dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
-pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
+pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
     dielectric_from_cos2(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
 /// [`dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
 #[inline(always)]
-pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
+pub fn dielectric_from_either_side(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
     dielectric_from_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
@@ -104,7 +104,7 @@ mod tests {
         for eta in [1.0_f32, 1.01, 1.5, 2.5, 10.0] {
             for step in 0..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
-                let (exact, found) = (dielectric(cosine, eta).0, dielectric_outside(cosine, eta));
+                let (exact, found) = (dielectric(cosine, eta).0, dielectric_from_outside(cosine, eta));
                 assert!(
                     (exact - found).abs() < 2e-6 || eta == 1.0 && cosine == 0.0,
                     "{eta} {cosine}: {found}"
@@ -119,7 +119,7 @@ mod tests {
             for step in 1..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
                 let (exact, through) = dielectric(cosine, eta);
-                assert!((exact - dielectric_either(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
+                assert!((exact - dielectric_from_either_side(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
                 let Some(beyond) = through else { continue };
                 let there = transmittance([cosine, beyond], [1.0, eta]);
                 assert!((1.0 - exact - there).abs() < 2e-5, "{eta} {cosine}: {there}");

@@ -31,13 +31,13 @@ pub struct LobeAlbedo {
 impl LobeAlbedo {
     /// Evaluates the albedo at μ ≥ 0.
     #[inline]
-    pub fn at(&self, cosine: f32) -> f32 {
-        evaluate(cosine, |number| self.terms[number])
+    pub fn evaluate(&self, cosine: f32) -> f32 {
+        evaluate_polynomial(cosine, |number| self.terms[number])
     }
 
     /// Computes the albedo of a lobe with an isotropic α. `reflectance` maps a cosine to the reflectance of a
     /// facet.
-    pub fn of(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
+    pub fn for_microfacet_lobe(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
         Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
     }
 
@@ -77,7 +77,7 @@ impl LobeAlbedo {
             .map(|(cosine, value)| value - chebyshev_sum(&terms, *cosine));
         terms[0] += missing.fold(0.0, f64::max);
         let fit = Self { terms: to_power_basis(&terms).map(|term| term as f32), mean: 0.0 };
-        Self { mean: cosine_weighted_mean(|cosine| fit.at(cosine as f32).into()) as f32, ..fit }
+        Self { mean: cosine_weighted_mean(|cosine| fit.evaluate(cosine as f32).into()) as f32, ..fit }
     }
 
     /// Interpolates linearly between two albedos.
@@ -100,7 +100,7 @@ pub struct AlbedoTable {
 impl AlbedoTable {
     /// A table for lobes with α = `alpha(roughness)`. It has a single entry if the roughness is constant.
     pub fn new(roughness: Option<f32>, alpha: impl Fn(f32) -> f32, reflectance: impl Fn(f64) -> f64) -> Self {
-        let row = |roughness: f32| LobeAlbedo::of(alpha(roughness).into(), &reflectance);
+        let row = |roughness: f32| LobeAlbedo::for_microfacet_lobe(alpha(roughness).into(), &reflectance);
         let rows = match roughness {
             Some(one) => vec![row(one)],
             None => (0..TABLE_SIZE).map(|i| row(i as f32 / (TABLE_SIZE - 1) as f32)).collect(),
@@ -109,12 +109,12 @@ impl AlbedoTable {
     }
 
     /// A table with a single entry.
-    pub fn single(albedo: LobeAlbedo) -> Self {
+    pub fn from_albedo(albedo: LobeAlbedo) -> Self {
         Self { rows: vec![albedo] }
     }
 
     /// The albedo for a given roughness in [0, 1].
-    pub fn at(&self, roughness: f32) -> LobeAlbedo {
+    pub fn lookup(&self, roughness: f32) -> LobeAlbedo {
         let place = roughness.clamp(0.0, 1.0) * (self.rows.len() - 1) as f32;
         let number = (place as usize).min(self.rows.len().saturating_sub(2));
         let next = self.rows.get(number + 1).unwrap_or(&self.rows[number]);
@@ -124,7 +124,7 @@ impl AlbedoTable {
 
 /// Evaluates the albedo at μ ≥ 0. A function returns the coefficients.
 #[inline(always)]
-pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
+pub fn evaluate_polynomial(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
     let x = 2.0 * t - 1.0;
     let mut sum = term(TERMS - 1);
@@ -141,7 +141,7 @@ fn cosine_weighted_mean(albedo: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Chebyshev polynomials at μ.
-fn chebyshev(cosine: f64) -> [f64; TERMS] {
+fn chebyshev_polynomials(cosine: f64) -> [f64; TERMS] {
     let x = 2.0 * (1.0 + KNEE) * cosine / (cosine + KNEE) - 1.0;
     let mut values = [1.0; TERMS];
     values[1] = x;
@@ -152,7 +152,7 @@ fn chebyshev(cosine: f64) -> [f64; TERMS] {
 }
 
 fn chebyshev_sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
-    chebyshev(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
+    chebyshev_polynomials(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
 /// Least-squares coefficients. Solves the normal equations with Gaussian elimination. The matrix is positive
@@ -160,7 +160,7 @@ fn chebyshev_sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
 fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     let mut rows = [[0.0; TERMS + 1]; TERMS];
     for (&(cosine, value), weight) in nodes.iter().zip(weights) {
-        let basis = chebyshev(cosine);
+        let basis = chebyshev_polynomials(cosine);
         for i in 0..TERMS {
             for j in 0..TERMS {
                 rows[i][j] += weight * weight * basis[i] * basis[j];
@@ -241,7 +241,7 @@ impl VisibleFacets {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let view = DVec3::new(alpha * sine, 0.0, cosine).normalize();
         let (to_eye, second) = (DVec3::new(sine, 0.0, cosine), view.cross(DVec3::Y));
-        Self { alpha, to_eye, view, second, masked: lambda(cosine, alpha) }
+        Self { alpha, to_eye, view, second, masked: smith_lambda(cosine, alpha) }
     }
 
     /// Cosine between a facet and the view direction, and cosine between the reflected direction and the
@@ -259,7 +259,7 @@ impl VisibleFacets {
 
     /// Height of the reflected direction for a point on the chord at x. `part` is the point's position
     /// relative to the chord's center, in units of half the chord's length.
-    fn height(&self, x: f64, part: f64) -> f64 {
+    fn reflected_height(&self, x: f64, part: f64) -> f64 {
         self.reflection_cosines(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
@@ -268,19 +268,19 @@ impl VisibleFacets {
     fn lit_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
-        let heights = parts.map(|part| (part, self.height(x, part)));
+        let heights = parts.map(|part| (part, self.reflected_height(x, part)));
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
     /// The ends of the interval around `lit` on the chord in which facets reflect light above the surface.
     /// Both are relative to the chord's center, in units of half the chord's length.
-    fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
-        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.height(x, part) > 0.0))
+    fn lit_interval(&self, x: f64, lit: f64) -> [f64; 2] {
+        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.reflected_height(x, part) > 0.0))
     }
 }
 
 /// Smith's Λ.
-fn lambda(cosine: f64, alpha: f64) -> f64 {
+fn smith_lambda(cosine: f64, alpha: f64) -> f64 {
     let tangent2 = (1.0 - cosine * cosine).max(0.0) / (cosine * cosine);
     0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
 }
@@ -319,10 +319,11 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     for (turn, by_turn) in quadrature_dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
         let Some(lit) = facets.lit_point(x) else { continue };
-        let [from, to] = facets.ends(x, lit);
+        let [from, to] = facets.lit_interval(x, lit);
         for &(part, by_part) in &along {
             let [between, mirrored] = facets.reflection_cosines(x, chord * (from + (to - from) * part));
-            let left = (1.0 + facets.masked) / (1.0 + facets.masked + lambda(mirrored.max(1e-12), alpha));
+            let left =
+                (1.0 + facets.masked) / (1.0 + facets.masked + smith_lambda(mirrored.max(1e-12), alpha));
             let area = widest * by_turn * chord * chord * (to - from) * by_part;
             sum += area * reflectance(between) * left;
         }
@@ -331,7 +332,7 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
 }
 
 /// Double-precision version of [`crate::materials::fresnel::dielectric`] for light from outside.
-pub fn dielectric(cosine: f64, eta: f64) -> f64 {
+pub fn dielectric_reflectance(cosine: f64, eta: f64) -> f64 {
     let root = (eta * eta - 1.0 + cosine * cosine).sqrt();
     let square = |over: f64, under: f64| if under > 0.0 { (over / under) * (over / under) } else { 0.0 };
     let parallel = square(eta * eta * cosine - root, eta * eta * cosine + root);
@@ -340,7 +341,7 @@ pub fn dielectric(cosine: f64, eta: f64) -> f64 {
 
 /// Effective reflectance kd/(1 − kd·F_dr) of a diffuse base under a coat, for light that has entered the
 /// coat. `returned` is the coat's internal reflectance F_dr.
-pub fn under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
+pub fn reflectance_under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
     diffuse / (Vec3::ONE - diffuse * returned)
 }
 
@@ -354,15 +355,15 @@ mod tests {
         type Reflectance = fn(f64, f64) -> f64;
         let grazing: Reflectance = |cosine, _| (1.0 - cosine).powi(5);
         let normal: Reflectance = |cosine, _| 1.0 - (1.0 - cosine).powi(5);
-        let exact = [1.0, 1.05, 1.33, 1.5, 2.5, 4.0].map(|eta| (dielectric as Reflectance, eta));
+        let exact = [1.0, 1.05, 1.33, 1.5, 2.5, 4.0].map(|eta| (dielectric_reflectance as Reflectance, eta));
         for (reflectance, eta) in exact.into_iter().chain([(grazing, 0.0), (normal, 0.0)]) {
             let reflectance = |cosine: f64| reflectance(cosine, eta);
             for alpha in [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0] {
-                let fit = LobeAlbedo::of(alpha, reflectance);
+                let fit = LobeAlbedo::for_microfacet_lobe(alpha, reflectance);
                 for step in (5..=100_u32).step_by(5) {
                     let cosine = f64::from(step) / 100.0;
                     let exact = integrate_albedo::<24, 48>(cosine, alpha, &reflectance);
-                    let missing = f64::from(fit.at(cosine as f32)) - exact;
+                    let missing = f64::from(fit.evaluate(cosine as f32)) - exact;
                     assert!((-1e-4..8e-4).contains(&missing), "η {eta}, α {alpha}, μ {cosine}: {missing}");
                 }
             }
@@ -381,7 +382,7 @@ mod tests {
             let (sin, cos) = libm::sincos(turn);
             let [between, mirrored] = facets.reflection_cosines(radius * cos, radius * sin);
             if mirrored > 0.0 {
-                let left = (1.0 + facets.masked) / (1.0 + facets.masked + lambda(mirrored, alpha));
+                let left = (1.0 + facets.masked) / (1.0 + facets.masked + smith_lambda(mirrored, alpha));
                 sum += reflectance(between) * left;
             }
         }
@@ -392,7 +393,9 @@ mod tests {
     fn quadrature_matches_brute_force() {
         for alpha in [0.003, 0.1, 0.4, 1.0] {
             for cosine in [0.05, 0.2, 0.6, 1.0] {
-                for (eta, fresnel) in [(1.5, dielectric as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)] {
+                for (eta, fresnel) in
+                    [(1.5, dielectric_reflectance as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)]
+                {
                     let reflectance = |cosine: f64| fresnel(cosine, eta);
                     let found = integrate_albedo::<12, 16>(cosine, alpha, &reflectance);
                     let exact = plain_quadrature(cosine, alpha, reflectance);
@@ -405,23 +408,23 @@ mod tests {
     #[test]
     fn smooth_lobes_match_fresnel() {
         // The expected mean is 2 ∫ F(μ) μ dμ for η = 1.5.
-        let smooth = LobeAlbedo::fit_with_exact_mean(|cosine| dielectric(cosine, 1.5));
+        let smooth = LobeAlbedo::fit_with_exact_mean(|cosine| dielectric_reflectance(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
-        let narrow = LobeAlbedo::of(0.001, |cosine| dielectric(cosine, 1.5));
+        let narrow = LobeAlbedo::for_microfacet_lobe(0.001, |cosine| dielectric_reflectance(cosine, 1.5));
         assert!((narrow.mean - smooth.mean).abs() < 1e-3, "{}", narrow.mean);
     }
 
     #[test]
     fn interpolated_tables_match_single_entries() {
-        let fresnel = |cosine: f64| dielectric(cosine, 1.5);
+        let fresnel = |cosine: f64| dielectric_reflectance(cosine, 1.5);
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
         let table = AlbedoTable::new(None, alpha, fresnel);
         for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {
-            let single = AlbedoTable::new(Some(roughness), alpha, fresnel).at(roughness);
-            let lerp = table.at(roughness);
+            let single = AlbedoTable::new(Some(roughness), alpha, fresnel).lookup(roughness);
+            let lerp = table.lookup(roughness);
             assert!((lerp.mean - single.mean).abs() < 5e-4);
             for cosine in [0.05, 0.1, 0.3, 0.6, 1.0] {
-                let (one, other) = (lerp.at(cosine), single.at(cosine));
+                let (one, other) = (lerp.evaluate(cosine), single.evaluate(cosine));
                 assert!(
                     (one - other).abs() < 2e-3,
                     "roughness {roughness}, μ {cosine}: {one} instead of {other}"

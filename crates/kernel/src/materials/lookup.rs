@@ -1,32 +1,32 @@
-//! Sources of parameter values. A material lists its parameters once, in [`RoughMaterial::point`], for
+//! Sources of parameter values. A material lists its parameters once, in [`BxdfMaterial::point`], for
 //! texture lookups, for renders with white textures, and for finding the textures that it uses.
 //!
-//! [`RoughMaterial::point`]: super::bsdf::RoughMaterial::point
+//! [`BxdfMaterial::point`]: super::bsdf::BxdfMaterial::point
 
 use std::sync::Arc;
 
 use super::footprint::TexturePoint;
-use super::scalar::Number;
-use super::texture::{Color, Texture};
+use super::scalar::ScalarParameter;
+use super::texture::{ColorParameter, Texture};
 use crate::math::Vec3;
 
 /// A source of parameter values for materials that live for `'m`.
 pub trait ParameterLookup<'m> {
     /// The value of a color.
-    fn color(&mut self, color: &'m Color) -> Vec3;
+    fn color(&mut self, color: &'m ColorParameter) -> Vec3;
 
     /// The value of a number.
-    fn number(&mut self, number: &'m Number) -> f32;
+    fn number(&mut self, number: &'m ScalarParameter) -> f32;
 
     /// The value of a number whose neutral value is 0 instead of 1.
     #[inline(always)]
-    fn signed(&mut self, number: &'m Number) -> f32 {
+    fn signed(&mut self, number: &'m ScalarParameter) -> f32 {
         self.number(number)
     }
 
     /// The value of a color that is used only for ambient light.
     #[inline(always)]
-    fn ambient(&mut self, color: &'m Color) -> Vec3 {
+    fn ambient(&mut self, color: &'m ColorParameter) -> Vec3 {
         self.color(color)
     }
 }
@@ -41,13 +41,13 @@ pub struct PointLookup<'a> {
 
 impl ParameterLookup<'_> for PointLookup<'_> {
     #[inline(always)]
-    fn color(&mut self, color: &Color) -> Vec3 {
-        color.at(self.point, self.lookups)
+    fn color(&mut self, color: &ColorParameter) -> Vec3 {
+        color.evaluate(self.point, self.lookups)
     }
 
     #[inline(always)]
-    fn number(&mut self, number: &Number) -> f32 {
-        number.at(self.point, self.lookups)
+    fn number(&mut self, number: &ScalarParameter) -> f32 {
+        number.evaluate(self.point, self.lookups)
     }
 }
 
@@ -56,18 +56,18 @@ pub struct WhiteLookup;
 
 impl ParameterLookup<'_> for WhiteLookup {
     #[inline(always)]
-    fn color(&mut self, color: &Color) -> Vec3 {
-        color.constant().unwrap_or(Vec3::ONE)
+    fn color(&mut self, color: &ColorParameter) -> Vec3 {
+        color.as_constant().unwrap_or(Vec3::ONE)
     }
 
     #[inline(always)]
-    fn number(&mut self, number: &Number) -> f32 {
-        number.constant().unwrap_or(1.0)
+    fn number(&mut self, number: &ScalarParameter) -> f32 {
+        number.as_constant().unwrap_or(1.0)
     }
 
     #[inline(always)]
-    fn signed(&mut self, number: &Number) -> f32 {
-        number.constant().unwrap_or(0.0)
+    fn signed(&mut self, number: &ScalarParameter) -> f32 {
+        number.as_constant().unwrap_or(0.0)
     }
 }
 
@@ -81,22 +81,22 @@ pub struct TextureCollector<'m> {
 }
 
 impl<'m> ParameterLookup<'m> for TextureCollector<'m> {
-    fn color(&mut self, color: &'m Color) -> Vec3 {
+    fn color(&mut self, color: &'m ColorParameter) -> Vec3 {
         self.scattering.extend(color.texture());
         WhiteLookup.color(color)
     }
 
-    fn number(&mut self, number: &'m Number) -> f32 {
+    fn number(&mut self, number: &'m ScalarParameter) -> f32 {
         self.scattering.extend(number.texture());
         WhiteLookup.number(number)
     }
 
-    fn signed(&mut self, number: &'m Number) -> f32 {
+    fn signed(&mut self, number: &'m ScalarParameter) -> f32 {
         self.scattering.extend(number.texture());
         WhiteLookup.signed(number)
     }
 
-    fn ambient(&mut self, color: &'m Color) -> Vec3 {
+    fn ambient(&mut self, color: &'m ColorParameter) -> Vec3 {
         self.ambient.extend(color.texture());
         WhiteLookup.color(color)
     }

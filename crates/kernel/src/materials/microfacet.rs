@@ -25,7 +25,7 @@ const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
 #[inline]
-pub fn alphas(roughness: f32, anisotropy: f32) -> [f32; 2] {
+pub fn alphas_from_roughness(roughness: f32, anisotropy: f32) -> [f32; 2] {
     let alpha = roughness * roughness;
     let aspect = (1.0 - 0.9 * anisotropy.abs()).sqrt();
     let [wide, narrow] = [alpha / aspect, alpha * aspect].map(|alpha| alpha.clamp(MIN_ALPHA, 4.0));
@@ -64,7 +64,7 @@ pub struct HalfVector {
 impl HalfVector {
     /// The half vector of a reflection.
     #[inline(always)]
-    pub fn between(normal: Vec3, one: Vec3, other: Vec3) -> Self {
+    pub fn from_reflection(normal: Vec3, one: Vec3, other: Vec3) -> Self {
         let sum = one + other;
         let along = sum.dot(normal);
         Self { squared: sum.length_squared(), along, across: sum - normal * along }
@@ -73,7 +73,11 @@ impl HalfVector {
     /// The half vector of a refraction, up to its sign: the sum of the two directions, each weighted by the
     /// index of refraction on its side (Walter et al. 2007, section 5.3). Also returns this sum.
     #[inline(always)]
-    pub fn refracted(normal: Vec3, [one, other]: [Vec3; 2], [of_one, of_other]: [f32; 2]) -> (Self, Vec3) {
+    pub fn from_refraction(
+        normal: Vec3,
+        [one, other]: [Vec3; 2],
+        [of_one, of_other]: [f32; 2],
+    ) -> (Self, Vec3) {
         let sum = one * of_one + other * of_other;
         let along = sum.dot(normal);
         (Self { squared: sum.length_squared(), along, across: sum - normal * along }, sum)
@@ -87,14 +91,14 @@ impl HalfVector {
 
     /// Isotropic D in sr⁻¹.
     #[inline(always)]
-    pub fn isotropic(&self, alpha: f32) -> f32 {
+    pub fn isotropic_ggx(&self, alpha: f32) -> f32 {
         let squared = alpha * alpha;
         self.distribution(self.across.length_squared() / squared, squared)
     }
 
     /// Anisotropic D in sr⁻¹, with a separate α along each tangent of a frame.
     #[inline(always)]
-    pub fn anisotropic(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
+    pub fn anisotropic_ggx(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
         self.distribution(x * x + y * y, u * v)
     }
@@ -143,7 +147,7 @@ impl SmithTerms {
 
     /// Computes D·G/(4 cosθᵢ cosθₒ) in sr⁻¹ from D. 0 if either direction is below the surface.
     #[inline(always)]
-    pub fn reflected(&self, other: &Self, distribution: f32) -> f32 {
+    pub fn reflection_term(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
         if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
     }
@@ -158,10 +162,10 @@ impl SmithTerms {
 }
 
 impl SmithTerms {
-    /// [`SmithTerms::pdf`], computed from the result of [`SmithTerms::reflected`] instead of D. 0 for
+    /// [`SmithTerms::pdf`], computed from the result of [`SmithTerms::reflection_term`] instead of D. 0 for
     /// directions below the surface.
     #[inline(always)]
-    pub fn pdf_from_reflected(&self, other: &Self, reflected: f32) -> f32 {
+    pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;
         let pdf = reflected * both / (self.cosine + self.slope);
         if self.is_above_surface() & other.is_above_surface() { pdf } else { 0.0 }
@@ -170,7 +174,7 @@ impl SmithTerms {
 
 /// A frame around a normal whose first tangent is along a vector.
 #[inline(always)]
-pub fn frame_along(normal: Vec3, tangent: Vec3) -> Frame {
+pub fn frame_with_tangent(normal: Vec3, tangent: Vec3) -> Frame {
     let plain = Frame::from_normal(normal);
     let across = tangent - normal * normal.dot(tangent);
     let squared = across.length_squared();

@@ -19,7 +19,7 @@ impl Mipmaps {
     ///
     /// # Errors
     /// The first error returned by `halve`.
-    pub fn of<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
+    pub fn build<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
         let mut levels: Vec<Texels> = Vec::new();
         while let last = levels.last().unwrap_or(texels)
             && last.len() > 1
@@ -46,7 +46,7 @@ impl Mipmaps {
 
     /// Memory in bytes that the mip levels of an image of this size need. `has_alpha` is true for images with
     /// alpha.
-    pub fn memory_bytes_of(width: u32, height: u32, has_alpha: bool) -> u64 {
+    pub fn estimate_memory_bytes(width: u32, height: u32, has_alpha: bool) -> u64 {
         let texel_bytes = if has_alpha { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
         while width * height > 1 {
@@ -76,7 +76,7 @@ impl<'a> ImageHalver<'a> {
     }
 
     /// Creates empty storage for the rows of the smaller image.
-    pub fn start(&self) -> TexelData {
+    pub fn empty_rows(&self) -> TexelData {
         let count = self.width as usize * self.height as usize;
         if self.of.has_alpha() {
             TexelData::FloatAlpha(Vec::with_capacity(count))
@@ -108,7 +108,7 @@ impl<'a> ImageHalver<'a> {
     }
 
     /// Assembles the smaller image from its rows.
-    pub fn texels(&self, rows: TexelData) -> Texels {
+    pub fn assemble_image(&self, rows: TexelData) -> Texels {
         Texels { width: self.width, height: self.height, data: rows, unusable: 0 }
     }
 }
@@ -145,9 +145,9 @@ mod tests {
 
     fn halved(of: &Texels) -> Result<Texels, ()> {
         let halving = ImageHalver::new(of);
-        let mut rows = halving.start();
+        let mut rows = halving.empty_rows();
         (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
-        Ok(halving.texels(rows))
+        Ok(halving.assemble_image(rows))
     }
 
     fn image(width: u32, height: u32) -> Texels {
@@ -160,8 +160,8 @@ mod tests {
     fn every_level_preserves_the_mean() {
         for (width, height) in [(1, 1), (2, 2), (64, 32), (5, 3), (7, 1), (13, 64), (100, 37)] {
             let image = image(width, height);
-            let mipmaps = Mipmaps::of(&image, halved).expect("halving succeeds");
-            assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::memory_bytes_of(width, height, false));
+            let mipmaps = Mipmaps::build(&image, halved).expect("halving succeeds");
+            assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::estimate_memory_bytes(width, height, false));
             for number in 1..=mipmaps.count() {
                 let level = mipmaps.level(number).expect("a level");
                 assert_eq!(

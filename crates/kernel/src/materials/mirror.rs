@@ -5,14 +5,14 @@ use std::sync::Arc;
 use super::conductor::ConductorFresnel;
 use super::footprint::TexturePoint;
 use super::lookup::{ParameterLookup, PointLookup, TextureCollector, WhiteLookup};
-use super::texture::{Color, Texture};
+use super::texture::{ColorParameter, Texture};
 use crate::math::Vec3;
 
 /// A perfect mirror.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mirror {
     /// The same reflectance at all angles.
-    Constant(Color),
+    Constant(ColorParameter),
     /// A smooth conductor.
     Conductor(ConductorFresnel),
 }
@@ -23,7 +23,7 @@ impl Mirror {
     #[inline]
     pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::Constant(color) => color.at(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
+            Self::Constant(color) => color.evaluate(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => {
                 let fresnel = fresnel.point(&mut PointLookup { point: at, lookups });
                 tint.map_or(fresnel, |tint| fresnel.tinted(tint)).reflectance(cosine)
@@ -32,9 +32,9 @@ impl Mirror {
     }
 
     /// [`Mirror::reflectance`] with white textures.
-    pub fn with_white_textures(&self, cosine: f32) -> Vec3 {
+    pub fn untextured_reflectance(&self, cosine: f32) -> Vec3 {
         match self {
-            Self::Constant(color) => color.constant().unwrap_or(Vec3::ONE),
+            Self::Constant(color) => color.as_constant().unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => fresnel.point(&mut WhiteLookup).reflectance(cosine),
         }
     }
@@ -66,9 +66,9 @@ mod tests {
 
     #[test]
     fn tint_scales_schlick_metals_but_not_eta_k() {
-        let (at, half) = (TexturePoint::sharp(DVec2::ZERO), Some(Vec3::splat(0.5)));
+        let (at, half) = (TexturePoint::from_uv(DVec2::ZERO), Some(Vec3::splat(0.5)));
         let gray = |mirror: &Mirror, cosine: f32, tint| mirror.reflectance(cosine, tint, &at, &mut 0).x;
-        let color = |reflectance: f32| Color::Constant(Vec3::splat(reflectance));
+        let color = |reflectance: f32| ColorParameter::Constant(Vec3::splat(reflectance));
         let even = Mirror::Constant(color(0.8));
         assert_eq!([gray(&even, 0.1, None), gray(&even, 0.1, half)], [0.8, 0.4]);
         // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ with F0 = 0.4.
@@ -80,9 +80,9 @@ mod tests {
 
     #[test]
     fn extreme_metal_indices_conserve_energy() {
-        let at = TexturePoint::sharp(DVec2::ZERO);
+        let at = TexturePoint::from_uv(DVec2::ZERO);
         for (eta, k) in [(1e-30_f32, 0.0_f32), (1e30, 0.0), (0.0, 1e38), (f32::MAX, f32::MAX), (5e9, 5e9)] {
-            let [eta, k] = [eta, k].map(|part| Color::Constant(Vec3::splat(part)));
+            let [eta, k] = [eta, k].map(|part| ColorParameter::Constant(Vec3::splat(part)));
             let metal = Mirror::Conductor(ConductorFresnel::Index { eta, k });
             for cosine in [0.01, 0.5, 1.0] {
                 let part = metal.reflectance(cosine, None, &at, &mut 0).x;

@@ -32,7 +32,7 @@ pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use normal_perturbation::{Bump, NormalPerturbation};
 pub use opacity::Opacity;
-pub use scalar::{Channel, Number, PixelValue};
+pub use scalar::{Channel, ChannelSelector, ScalarParameter};
 pub use thin_dielectric::ThinDielectric;
 
 use std::sync::Arc;
@@ -56,7 +56,7 @@ pub struct Material {
 impl Material {
     /// Whether any material property depends on texture coordinates or tangents.
     pub fn is_textured(&self) -> bool {
-        self.normal_perturbation.is_some() || self.bsdf.has_direction() || !self.textures().is_empty()
+        self.normal_perturbation.is_some() || self.bsdf.is_anisotropic() || !self.textures().is_empty()
     }
 
     /// Whether light may pass through the surface undeflected, because the surface is a thin pane or is
@@ -65,7 +65,7 @@ impl Material {
     pub fn has_null_interaction(&self) -> bool {
         let is_pane = match &self.bsdf {
             Bsdf::ThinDielectric(_) => true,
-            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => false,
+            Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => false,
         };
         is_pane || self.opacity.is_some()
     }
@@ -73,13 +73,13 @@ impl Material {
     /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.
     /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
-        let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
+        let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups));
         let through = match &self.bsdf {
             Bsdf::ThinDielectric(pane) => {
-                let tint = pane.tint.at(at, lookups).min(Vec3::ONE);
+                let tint = pane.tint.evaluate(at, lookups).min(Vec3::ONE);
                 tint * color * (1.0 - pane.reflectance(cosine))
             }
-            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => Vec3::ZERO,
+            Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => Vec3::ZERO,
         };
         through * there + Vec3::splat(1.0 - there)
     }
@@ -92,7 +92,7 @@ impl Material {
     /// All textures except those of a coat over an emitting surface.
     fn textures(&self) -> Vec<&Arc<Texture>> {
         let mut textures: Vec<_> = match &self.bsdf {
-            Bsdf::Rough(rough) => rough.textures().collect(),
+            Bsdf::NonSpecular(rough) => rough.textures().collect(),
             Bsdf::Mirror(mirror) => mirror.textures().collect(),
             Bsdf::Coated(coated) => coated.textures().chain(coated.base.textures()).collect(),
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
@@ -109,7 +109,7 @@ impl Material {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
     /// A surface without δ lobes.
-    Rough(Rough),
+    NonSpecular(NonSpecular),
     /// A perfect mirror.
     Mirror(Mirror),
     /// A smooth or rough dielectric.
@@ -125,7 +125,7 @@ impl Bsdf {
     #[inline]
     pub fn has_delta(&self) -> bool {
         match self {
-            Self::Rough(_) => false,
+            Self::NonSpecular(_) => false,
             Self::Dielectric(glass) => glass.is_smooth(),
             Self::Mirror(_) | Self::ThinDielectric(_) | Self::Coated(_) => true,
         }
@@ -134,45 +134,45 @@ impl Bsdf {
     /// Whether the surface has non-δ lobes, which light sampling can reach.
     #[inline]
     pub fn has_non_delta_lobes(&self) -> bool {
-        self.rough().is_some()
+        self.non_specular().is_some()
     }
 
     /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
-    pub fn has_direction(&self) -> bool {
-        self.rough().is_some_and(Rough::has_direction)
+    pub fn is_anisotropic(&self) -> bool {
+        self.non_specular().is_some_and(NonSpecular::is_anisotropic)
     }
 
     /// The non-δ lobes. `None` if there are none.
     #[inline]
-    pub fn rough(&self) -> Option<&Rough> {
+    pub fn non_specular(&self) -> Option<&NonSpecular> {
         match self {
-            Self::Rough(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
+            Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
             Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
         }
     }
 
     /// The dielectric that fills the shape. `None` for other materials.
-    pub fn glass(&self) -> Option<&Dielectric> {
+    pub fn as_dielectric(&self) -> Option<&Dielectric> {
         match self {
             Self::Dielectric(glass) => Some(glass),
-            Self::Rough(_) | Self::Mirror(_) | Self::Coated(_) | Self::ThinDielectric(_) => None,
+            Self::NonSpecular(_) | Self::Mirror(_) | Self::Coated(_) | Self::ThinDielectric(_) => None,
         }
     }
 
     /// Whether the surface also scatters light to the other side.
     pub fn is_transmissive(&self) -> bool {
-        self.rough().is_some_and(Rough::is_transmissive)
+        self.non_specular().is_some_and(NonSpecular::is_transmissive)
     }
 
     /// The surface's main color. Counts texture lookups in `lookups`.
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::Rough(rough) => rough.albedo(at, lookups),
+            Self::NonSpecular(rough) => rough.albedo(at, lookups),
             Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Dielectric(glass) => glass.tint,
-            Self::ThinDielectric(pane) => pane.tint.at(at, lookups),
+            Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
             Self::Coated(coated) => coated.base.albedo(at, lookups),
         }
     }

@@ -24,7 +24,7 @@ impl NormalMap {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
         let slope = self.texture.unmirrored_slopes(at, mapped.truncate() * self.strength);
         let [dpdu, dpdv] = self.texture.texture_tangents(self.texture.tangents(at, [dpdu, dpdv]));
-        let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
+        let (tangent, bitangent) = orthogonalize_tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
     }
@@ -32,7 +32,7 @@ impl NormalMap {
 
 /// Unit tangents along u and v, perpendicular to the normal. Mirrored parameterizations keep their
 /// handedness.
-fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
+fn orthogonalize_tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
     let Some(tangent) = (dpdu - normal * normal.dot(dpdu)).try_normalize() else {
         let frame = Frame::from_normal(normal);
         return (frame.s, frame.t);
@@ -51,7 +51,7 @@ mod tests {
     use crate::math::{DVec2, Vec2};
 
     fn middle() -> TexturePoint {
-        TexturePoint::sharp(DVec2::ZERO)
+        TexturePoint::from_uv(DVec2::ZERO)
     }
 
     fn map(normal: Vec3) -> NormalMap {
@@ -110,7 +110,7 @@ mod tests {
             let mut map = map(leaning);
             let texture = Arc::make_mut(&mut map.texture);
             (texture.repeat, texture.wrap) = (repeat, wrap);
-            let bent = map.perturb(&TexturePoint::sharp(uv), Vec3::Z, Vec3::X, Vec3::Y);
+            let bent = map.perturb(&TexturePoint::from_uv(uv), Vec3::Z, Vec3::X, Vec3::Y);
             let expected = Vec3::new(0.48 * sides[0], 0.36 * sides[1], 0.8);
             assert!((bent - expected).length() < 1e-6, "{repeat} {wrap:?} {uv}: {bent}");
         }

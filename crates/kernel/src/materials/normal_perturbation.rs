@@ -111,7 +111,7 @@ mod tests {
 
     fn bent(normal_perturbation: &NormalPerturbation, normal: Vec3, tangents: [Vec3; 2]) -> (Vec3, u64) {
         let mut lookups = 0;
-        let at = TexturePoint::sharp(DVec2::new(0.5, 0.3));
+        let at = TexturePoint::from_uv(DVec2::new(0.5, 0.3));
         (normal_perturbation.perturb(&at, normal, tangents, &mut lookups), lookups)
     }
 

@@ -1,13 +1,13 @@
 //! Opacity of surfaces.
 
 use super::footprint::TexturePoint;
-use super::scalar::Number;
+use super::scalar::ScalarParameter;
 
 /// The probability that a surface exists at a point. If it does not exist, rays pass undeflected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opacity {
     /// The opacity, clamped to [0, 1].
-    pub value: Number,
+    pub value: ScalarParameter,
     /// Opacity threshold, or 0 if there is no threshold. The surface is opaque at and above the threshold,
     /// and fully transparent below it. If there is a threshold, the texture's mip levels contain the fraction
     /// of opaque texels.
@@ -17,26 +17,26 @@ pub struct Opacity {
 impl Opacity {
     /// The opacity at the given texture coordinates, in [0, 1]. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
+    pub fn evaluate(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match &self.value {
-            Number::Texture(texture) if self.cutoff > 0.0 && texture.mipmaps.is_some() => {
+            ScalarParameter::Texture(texture) if self.cutoff > 0.0 && texture.mipmaps.is_some() => {
                 *lookups += 1;
-                texture.coverage(at, self.cutoff)
+                texture.cutoff_coverage(at, self.cutoff)
             }
-            value => self.apply_cutoff(value.at(at, lookups)),
+            value => self.apply_cutoff(value.evaluate(at, lookups)),
         }
     }
 
     /// The opacity, if it is constant.
-    pub fn constant(&self) -> Option<f32> {
-        self.value.constant().map(|value| self.apply_cutoff(value))
+    pub fn as_constant(&self) -> Option<f32> {
+        self.value.as_constant().map(|value| self.apply_cutoff(value))
     }
 
     /// The mean opacity. For a texture with a cutoff, this is estimated as the texture's mean.
     pub fn mean(&self) -> f32 {
         match &self.value {
-            Number::Constant(value) => self.apply_cutoff(*value),
-            Number::Texture(texture) => texture.mean().x.clamp(0.0, 1.0),
+            ScalarParameter::Constant(value) => self.apply_cutoff(*value),
+            ScalarParameter::Texture(texture) => texture.mean().x.clamp(0.0, 1.0),
         }
     }
 

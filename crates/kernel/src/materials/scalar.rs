@@ -22,14 +22,14 @@ choice! {
 
 /// Value that a scalar texture reads from a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum PixelValue {
+pub enum ChannelSelector {
     /// The luminance of the pixel.
     Luminance,
     /// One channel.
     Channel(Channel),
     /// The alpha, or the luminance for images without an alpha channel.
     Opacity,
-    /// [`PixelValue::Opacity`] for an image that the material does not also use as a color. If alpha is 1
+    /// [`ChannelSelector::Opacity`] for an image that the material does not also use as a color. If alpha is 1
     /// everywhere and all pixels are gray, the luminance is used as the opacity.
     Mask {
         /// Whether the luminance is also used if some pixels are not gray.
@@ -39,16 +39,16 @@ pub enum PixelValue {
 
 /// A scalar parameter, constant or textured.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Number {
+pub enum ScalarParameter {
     /// A constant value.
     Constant(f32),
     /// A texture. Each of its channels contains the value.
     Texture(Arc<Texture>),
 }
 
-impl Number {
+impl ScalarParameter {
     /// The constant value, or `None` for a texture.
-    pub fn constant(&self) -> Option<f32> {
+    pub fn as_constant(&self) -> Option<f32> {
         match self {
             Self::Constant(number) => Some(*number),
             Self::Texture(_) => None,
@@ -65,7 +65,7 @@ impl Number {
 
     /// The value at the given texture coordinates. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
+    pub fn evaluate(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match self {
             Self::Constant(number) => *number,
             Self::Texture(texture) => {

@@ -38,12 +38,12 @@ impl Texels {
     /// Linear value at column `x` and row `y` from the top. Both must be in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
-        self.at(y as usize * self.width as usize + x as usize)
+        self.linear_value(y as usize * self.width as usize + x as usize)
     }
 
     /// Linear value at a texel index.
     #[inline]
-    pub fn at(&self, place: usize) -> Vec3 {
+    pub fn linear_value(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
             TexelData::Linear8(bytes) => linear_from_bytes(bytes[place]),
@@ -76,7 +76,7 @@ impl Texels {
                 linear_from_bytes([red, green, blue])
             }
             TexelData::FloatAlpha(floats) => unpremultiply(floats[place]),
-            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => self.at(place),
+            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => self.linear_value(place),
         }
     }
 
@@ -89,13 +89,13 @@ impl Texels {
             }
             TexelData::FloatAlpha(floats) => return floats[place],
         };
-        (self.at(place) * weight).extend(weight)
+        (self.linear_value(place) * weight).extend(weight)
     }
 
     /// Applies a threshold to the red channel. The result is 1 where the channel is at least `least`,
     /// otherwise 0.
     pub fn threshold(&self, least: f32) -> Self {
-        let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
+        let texel = |place: usize| [if self.linear_value(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
         Self { data, unusable: 0, ..*self }
     }
@@ -150,7 +150,7 @@ impl Texels {
     /// Linear values of all texels.
     pub fn into_linear(self) -> Vec<Vec3> {
         if self.has_alpha() {
-            return (0..self.len()).map(|place| self.at(place)).collect();
+            return (0..self.len()).map(|place| self.linear_value(place)).collect();
         }
         match self.data {
             TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),

@@ -70,11 +70,11 @@ impl ScaleAndOffset {
 
     /// A scale without an offset. `None` if the scale is 1.
     pub fn new(gain: Vec3) -> Option<Self> {
-        Self::with_base(gain, Vec3::ZERO)
+        Self::with_offset(gain, Vec3::ZERO)
     }
 
     /// A scale and an offset. `None` for the identity.
-    pub fn with_base(gain: Vec3, base: Vec3) -> Option<Self> {
+    pub fn with_offset(gain: Vec3, base: Vec3) -> Option<Self> {
         (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
     }
 
@@ -120,20 +120,20 @@ impl UvTransform {
 
     /// Transforms a point.
     #[inline]
-    fn point(&self, at: DVec2) -> DVec2 {
-        self.vector(at) + self.offset
+    fn transform_point(&self, at: DVec2) -> DVec2 {
+        self.transform_vector(at) + self.offset
     }
 
     /// Transforms a vector.
     #[inline]
-    fn vector(&self, by: DVec2) -> DVec2 {
+    fn transform_vector(&self, by: DVec2) -> DVec2 {
         let (sin, cos) = self.turn;
         DVec2::new(by.x * cos - by.y * sin, by.x * sin + by.y * cos)
     }
 
     /// The vector that transforms to `moved`.
     #[inline]
-    pub fn inverse_vector(&self, moved: DVec2) -> DVec2 {
+    pub fn inverse_transform_vector(&self, moved: DVec2) -> DVec2 {
         let (sin, cos) = self.turn;
         DVec2::new(moved.x * cos + moved.y * sin, moved.y * cos - moved.x * sin)
     }
@@ -142,7 +142,7 @@ impl UvTransform {
     fn transform_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
-            let moved = self.point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
+            let moved = self.transform_point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
             (row[0][i], row[1][i]) = (moved.x, moved.y);
         }
         row
@@ -151,16 +151,16 @@ impl UvTransform {
 
 /// A color parameter, constant or textured.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Color {
+pub enum ColorParameter {
     /// A constant color.
     Constant(Vec3),
     /// A color texture.
     Texture(Arc<Texture>),
 }
 
-impl Color {
+impl ColorParameter {
     /// The constant color, or `None` for a texture.
-    pub fn constant(&self) -> Option<Vec3> {
+    pub fn as_constant(&self) -> Option<Vec3> {
         match self {
             Self::Constant(color) => Some(*color),
             Self::Texture(_) => None,
@@ -176,7 +176,7 @@ impl Color {
     }
 
     /// The color at the given texture coordinates. Counts texture lookups in `lookups`.
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn evaluate(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
             Self::Texture(texture) => {
@@ -213,7 +213,7 @@ impl Texture {
     fn tile_coordinates(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
-        moved.point(moved.second_uv_point(at).map_or(at.uv, |second| second.uv) * repeat)
+        moved.transform_point(moved.second_uv_point(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
     /// The UV set used for lookups.
@@ -246,7 +246,7 @@ impl Texture {
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
         // Rotate the gradient from image coordinates back to surface coordinates.
         let slopes = changes.as_dvec2() / steps;
-        let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.inverse_vector(slopes));
+        let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.inverse_transform_vector(slopes));
         slopes.as_vec2() * self.repeat
     }
 
@@ -265,7 +265,7 @@ impl Texture {
         let sides = self.repeat.signum();
         let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
         [DVec2::X, DVec2::Y].map(|axis| {
-            let by = moved.inverse_vector(axis).as_vec2() / self.repeat;
+            let by = moved.inverse_transform_vector(axis).as_vec2() / self.repeat;
             dpdu * by.x + dpdv * by.y
         })
     }
@@ -274,7 +274,7 @@ impl Texture {
     pub fn texels_per_unit(&self) -> [f64; 2] {
         let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
         let Some(moved) = &self.moved else { return (size * repeat).abs().to_array() };
-        let along = |axis: DVec2| (moved.vector(axis * repeat) * size).length();
+        let along = |axis: DVec2| (moved.transform_vector(axis * repeat) * size).length();
         [along(DVec2::X), along(DVec2::Y)]
     }
 
@@ -282,8 +282,8 @@ impl Texture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
-            None => self.repeated_packet(uv, self.repeat.as_dvec2()),
-            Some(moved) => self.transformed_packet(moved, uv),
+            None => self.lookup_repeated_packet(uv, self.repeat.as_dvec2()),
+            Some(moved) => self.lookup_transformed_packet(moved, uv),
         };
         if let Some(factor) = self.factor {
             let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
@@ -297,13 +297,13 @@ impl Texture {
     /// [`Texture::lookup_packet`] for textures that have a transform.
     #[cold]
     #[inline(never)]
-    fn transformed_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.repeated_packet(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
+    fn lookup_transformed_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
+        self.lookup_repeated_packet(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, size(&self.texels));
         let folded = [self.wrap.fold_packet(&uv[0], repeat.x), self.wrap.fold_packet(&uv[1], repeat.y)];
         let extent = extent(texels);
@@ -311,7 +311,7 @@ impl Texture {
         let (shift, count) = match self.filter {
             TextureFilter::Nearest => (0.0, 1),
             TextureFilter::Bilinear | TextureFilter::Mipmap if texels.has_alpha() => {
-                return self.weighted_packet(&folded);
+                return self.bilinear_packet_with_alpha(&folded);
             }
             TextureFilter::Bilinear | TextureFilter::Mipmap => (0.5, 4),
         };
@@ -322,12 +322,12 @@ impl Texture {
                 part[axis][i] = x - x.floor();
             }
         }
-        let columns = self.wrap.index_packet(&first[0], 0, extent[0]);
-        let rows = self.wrap.index_packet(&first[1], 0, extent[1]);
+        let columns = self.wrap.wrap_index_packet(&first[0], 0, extent[0]);
+        let rows = self.wrap.wrap_index_packet(&first[1], 0, extent[1]);
         let mut around = [texel_indices(&columns, &rows, extent); 4];
         if count == 4 {
-            let right = self.wrap.index_packet(&first[0], 1, extent[0]);
-            let upper = self.wrap.index_packet(&first[1], 1, extent[1]);
+            let right = self.wrap.wrap_index_packet(&first[0], 1, extent[0]);
+            let upper = self.wrap.wrap_index_packet(&first[1], 1, extent[1]);
             around[1] = texel_indices(&right, &rows, extent);
             around[2] = texel_indices(&columns, &upper, extent);
             around[3] = texel_indices(&right, &upper, extent);
@@ -374,8 +374,9 @@ impl Texture {
             Some(moved) => {
                 let size = size(&self.texels);
                 let footprint = moved.second_uv_point(at).map_or(&at.footprint, |second| &second.footprint);
-                footprint
-                    .major_axis_length(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
+                footprint.major_axis_length(|axis| {
+                    moved.transform_vector((axis * self.repeat).as_dvec2()).as_vec2() * size
+                })
             }
         };
         if texels > 1.0 { log2(texels) } else { 0.0 }
@@ -385,7 +386,7 @@ impl Texture {
         let (size, extent) = (size(&self.texels), extent(&self.texels));
         let column = self.wrap.wrap_index(floor(u * size.x), extent[0]);
         let row = self.wrap.wrap_index(floor(v * size.y), extent[1]);
-        self.texels.at(texel_index(column, row, extent))
+        self.texels.linear_value(texel_index(column, row, extent))
     }
 
     /// Interpolates between the two levels around `level`.
@@ -416,7 +417,7 @@ impl Texture {
 
     /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
     /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
-    pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
+    pub fn cutoff_coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tile_coordinates(at);
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
@@ -435,7 +436,7 @@ impl Texture {
     /// Bilinear lookups of texels with alpha, for a packet.
     #[cold]
     #[inline(never)]
-    fn weighted_packet(&self, folded: &[F32x16; 2]) -> Vec3x16 {
+    fn bilinear_packet_with_alpha(&self, folded: &[F32x16; 2]) -> Vec3x16 {
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
@@ -448,7 +449,7 @@ impl Texture {
     #[cold]
     #[inline(never)]
     fn bilinear_premultiplied(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
-        let (places, [fx, fy]) = self.corners(texels, folded);
+        let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
         let corners = places.map(|place| texels.premultiplied(place));
         corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
     }
@@ -457,7 +458,7 @@ impl Texture {
         if texels.has_alpha() {
             return unpremultiply(self.bilinear_premultiplied(texels, folded));
         }
-        let (places, [fx, fy]) = self.corners(texels, folded);
+        let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
         let corners = texels.gather(&places);
         let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
         lower.lerp(upper, fy)
@@ -465,7 +466,7 @@ impl Texture {
 
     /// Indices of the four nearest texels, and the interpolation weights.
     #[inline(always)]
-    fn corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
+    fn bilinear_corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
         let (size, extent) = (size(texels), extent(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let first = [floor(x), floor(y)];
@@ -538,7 +539,7 @@ impl Wrap {
 
     /// Wraps `numbers` + `more` with [`Wrap::wrap_index`].
     #[inline(always)]
-    fn index_packet(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
+    fn wrap_index_packet(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
@@ -612,7 +613,7 @@ mod tests {
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
-        numbered(TextureFilter::Bilinear, wrap).lookup(&TexturePoint::sharp(Vec2::new(u, v).as_dvec2())).x
+        numbered(TextureFilter::Bilinear, wrap).lookup(&TexturePoint::from_uv(Vec2::new(u, v).as_dvec2())).x
     }
 
     #[test]
@@ -635,13 +636,14 @@ mod tests {
         assert!((bilinear(Wrap::Clamp, 9.0, 9.0) - 3.0).abs() < 1e-6);
         let mut repeated = numbered(TextureFilter::Nearest, Wrap::Repeat);
         repeated.repeat = Vec2::new(2.0, 1.0);
-        assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.6, 0.1))).x, 0.0);
-        assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.4, 0.1))).x, 1.0);
+        assert_eq!(repeated.lookup(&TexturePoint::from_uv(DVec2::new(0.6, 0.1))).x, 0.0);
+        assert_eq!(repeated.lookup(&TexturePoint::from_uv(DVec2::new(0.4, 0.1))).x, 1.0);
     }
 
     #[test]
     fn coordinates_repeat_then_rotate_then_translate() {
-        let at = |texture: &Texture, u: f64, v: f64| texture.lookup(&TexturePoint::sharp(DVec2::new(u, v))).x;
+        let at =
+            |texture: &Texture, u: f64, v: f64| texture.lookup(&TexturePoint::from_uv(DVec2::new(u, v))).x;
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.repeat = Vec2::new(2.0, 1.0);
         texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
@@ -663,7 +665,8 @@ mod tests {
             footprint: Footprint::POINT,
             tangents: [Vec3::Y * 2.0, Vec3::NEG_X],
         };
-        let at = TexturePoint { second: Some(Box::new(second)), ..TexturePoint::sharp(DVec2::new(0.1, 0.1)) };
+        let at =
+            TexturePoint { second: Some(Box::new(second)), ..TexturePoint::from_uv(DVec2::new(0.1, 0.1)) };
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         let first = [Vec3::X, Vec3::Y];
         assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (0.0, first));
@@ -683,7 +686,7 @@ mod tests {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
         let texture = Texture { factor: ScaleAndOffset::new(factor), ..plain.clone() };
-        let at = TexturePoint::sharp(DVec2::new(0.3, 0.6));
+        let at = TexturePoint::from_uv(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
         let uv = [[0.3; PACKET_SIZE], [0.6; PACKET_SIZE]];
@@ -698,15 +701,15 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.texels = texels;
         for (base, gain, expected) in [(-0.5, 1.0, 0.25), (1.0, -2.0, 0.5), (-2.0, 1.0, 0.0)] {
-            texture.factor = ScaleAndOffset::with_base(Vec3::splat(gain), Vec3::splat(base));
+            texture.factor = ScaleAndOffset::with_offset(Vec3::splat(gain), Vec3::splat(base));
             assert_eq!(texture.mean(), Vec3::splat(expected), "{base} {gain}");
-            let at = TexturePoint::sharp(DVec2::new(0.1, 0.5));
+            let at = TexturePoint::from_uv(DVec2::new(0.1, 0.5));
             assert_eq!(texture.lookup(&at), Vec3::splat(f32::max(base, 0.0)), "{base} {gain}");
         }
         let black = TexelData::Float(vec![Vec3::ZERO; 2]);
         texture.texels = Arc::new(Texels { width: 2, height: 1, data: black, unusable: 0 });
         for (base, is_black) in [(-0.5, true), (0.0, true), (1.0, false)] {
-            texture.factor = ScaleAndOffset::with_base(Vec3::ONE, Vec3::splat(base));
+            texture.factor = ScaleAndOffset::with_offset(Vec3::ONE, Vec3::splat(base));
             assert_eq!(texture.is_black(), is_black, "{base}");
         }
     }
@@ -716,7 +719,7 @@ mod tests {
         // Near the center, values increase by 1 per texel to the right and by 2 per texel upward. Relative to
         // the image size, the slopes are 2 and 4.
         let mut texture = numbered(TextureFilter::Bilinear, Wrap::Repeat);
-        let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::sharp(DVec2::new(u, v)));
+        let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::from_uv(DVec2::new(u, v)));
         assert_eq!(at(&texture, 0.5, 0.5), Vec2::new(2.0, 4.0));
         texture.repeat = Vec2::new(2.0, -3.0);
         assert_eq!(at(&texture, 0.25, -0.5), Vec2::new(4.0, -12.0));
@@ -739,7 +742,7 @@ mod tests {
                 {
                     assert!(
                         (0.0..=3.0).contains(
-                            &texture.lookup(&TexturePoint::sharp(Vec2::new(bad, bad).as_dvec2())).x
+                            &texture.lookup(&TexturePoint::from_uv(Vec2::new(bad, bad).as_dvec2())).x
                         ),
                         "{filter:?} {wrap:?} {bad}"
                     );
@@ -782,7 +785,7 @@ mod tests {
                             let v = std::array::from_fn(|i| number(first + 5 * i));
                             let row = texture.lookup_packet(&[u, v]);
                             for i in 0..PACKET_SIZE {
-                                let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(u[i], v[i])));
+                                let alone = texture.lookup(&TexturePoint::from_uv(DVec2::new(u[i], v[i])));
                                 assert_eq!(lane(&row, i), alone, "{filter:?} {wrap:?} {} {}", u[i], v[i]);
                             }
                         }
@@ -796,11 +799,11 @@ mod tests {
     fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
-            let mut rows = halving.start();
+            let mut rows = halving.empty_rows();
             (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
-            Ok(halving.texels(rows))
+            Ok(halving.assemble_image(rows))
         };
-        Mipmaps::of(image, halved).ok().map(Arc::new)
+        Mipmaps::build(image, halved).ok().map(Arc::new)
     }
 
     /// Creates a clamped texture from a row of texels.
@@ -820,7 +823,7 @@ mod tests {
             for filter in [TextureFilter::Bilinear, TextureFilter::Mipmap] {
                 let texture = row(2, data.clone(), filter);
                 for u in [0.3, 0.5, 0.7, 0.9] {
-                    let color = texture.lookup(&TexturePoint::sharp(DVec2::new(u, 0.5)));
+                    let color = texture.lookup(&TexturePoint::from_uv(DVec2::new(u, 0.5)));
                     assert!((color - Vec3::Y).length() < 1e-6, "{data:?} {filter:?} {u}: {color}");
                 }
                 for level in [0.5, 1.0] {
@@ -833,13 +836,14 @@ mod tests {
             let uv = [std::array::from_fn(|i| i as f64 / 15.0), [0.5; PACKET_SIZE]];
             let lanes = texture.lookup_packet(&uv);
             for i in 0..PACKET_SIZE {
-                let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(uv[0][i], 0.5)));
+                let alone = texture.lookup(&TexturePoint::from_uv(DVec2::new(uv[0][i], 0.5)));
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }
         }
         // Partial alpha also weights the colors.
         let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
-        let color = row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::sharp(DVec2::new(0.5, 0.5)));
+        let color =
+            row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::from_uv(DVec2::new(0.5, 0.5)));
         assert!((color - Vec3::new(0.2, 0.8, 0.0)).length() < 1e-6, "{color}");
     }
 
@@ -850,19 +854,19 @@ mod tests {
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
         texture.mipmaps = levels(&texture.texels.threshold(0.5));
         let at = |u: f64, width: f32| {
-            let footprint = Footprint::of_cone(width, Vec3::Z, Vec3::Z, [Vec3::X, Vec3::Y]);
-            TexturePoint { footprint, ..TexturePoint::sharp(DVec2::new(u, 0.5)) }
+            let footprint = Footprint::from_ray_cone(width, Vec3::Z, Vec3::Z, [Vec3::X, Vec3::Y]);
+            TexturePoint { footprint, ..TexturePoint::from_uv(DVec2::new(u, 0.5)) }
         };
         for u in [0.1, 0.3, 0.9] {
-            let coverage = texture.coverage(&at(u, 1e3), 0.5);
+            let coverage = texture.cutoff_coverage(&at(u, 1e3), 0.5);
             assert!((coverage - 0.4).abs() < 1e-6, "{coverage}");
         }
         // In the original image, coverage is 0 or 1.
         for (u, expected) in [(0.05, 1.0), (0.25, 0.0), (0.35, 0.0), (0.55, 1.0)] {
-            assert_eq!(texture.coverage(&at(u, 0.0), 0.5), expected, "{u}");
+            assert_eq!(texture.cutoff_coverage(&at(u, 0.0), 0.5), expected, "{u}");
         }
         // Coverage is continuous between the original image and its first mip level.
-        let near = [1.0 + 1e-4, 1.0].map(|texels| texture.coverage(&at(0.05, texels * 0.1), 0.5));
+        let near = [1.0 + 1e-4, 1.0].map(|texels| texture.cutoff_coverage(&at(0.05, texels * 0.1), 0.5));
         assert!((near[0] - near[1]).abs() < 1e-2, "{near:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Evicts values cached for earlier scenes.
 
 use super::Engine;
-use crate::cache::first_request_that_fits;
+use crate::cache::oldest_request_to_keep;
 
 /// Memory limit for cached files and trees that the current scene does not need.
 const MAX_SPARE_BYTES: usize = 256 << 20;
@@ -16,7 +16,7 @@ impl Engine {
         let meshes = self.meshes.eviction_candidates();
         let candidates =
             meshes.chain(self.textures.eviction_candidates()).chain(self.accel.eviction_candidates());
-        let first = first_request_that_fits(candidates, MAX_SPARE_BYTES);
+        let first = oldest_request_to_keep(candidates, MAX_SPARE_BYTES);
         self.meshes.evict_unused_before(first);
         self.textures.evict_unused_before(first);
         self.accel.evict_unused_before(first);

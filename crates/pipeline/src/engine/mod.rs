@@ -18,50 +18,52 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-pub(super) use self::orders::{Interruption, PendingOrders, RequestContext};
+pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
 use self::outcome::Outcome;
-pub use self::outcome::{Rendered, Unrendered};
+pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
-use self::own::{OwnImage, needed_textures, own_image_plan};
+use self::own::{SavedSceneImage, saved_scene_plan, texture_needs};
 use self::unfinished::LastValidScene;
-use super::assembly::{KeyedWorld, RequestCamera, world};
+use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{Memo, NamedCache};
-use super::inputs::Inputs;
+use super::inputs::ProtectedInputs;
 use super::keys;
 use super::memory::MemoryEstimate;
 use super::model::ModelView;
-use super::plan::{OutputNameSource, Plan, plan, thread_count};
+use super::plan::{OutputNameSource, RenderPlan, resolve_plan, thread_count};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, WriteMode};
 use super::queries::{Query, QueryContext};
 use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
-use super::render::first_picture::CoarseImages;
+use super::render::first_picture::CoarseImageRenderer;
 use super::render::layers;
 use super::render::preview::PreviewTarget;
 use super::render::scheduler::RenderStageInputs;
 use super::render::share::Shard;
 use super::report::finish::{RequestResults, make_report};
-use super::settings::{AdjustableSettings, Overrides, View};
-use super::sink::Sink;
-use super::stages::accel::{AccelCache, accel};
-use super::stages::containers::Containers;
+use super::settings::{AdjustableSettings, Overrides, ViewMode};
+use super::sink::EventSink;
+use super::stages::accel::{AccelCache, build_accel_structures};
+use super::stages::containers::GltfContainers;
 use super::stages::coplanar::warn_about_coplanar_lights;
-use super::stages::glass::glass;
-use super::stages::lights::{SkyMemo, lights};
-use super::stages::meshes::{CachedMesh, MeshName, Meshes, meshes};
-use super::stages::parse::{Parsed, SceneSource, parse};
-use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, photons};
+use super::stages::glass::find_glass_solids;
+use super::stages::lights::{SkyMemo, collect_lights};
+use super::stages::meshes::{CachedMesh, MeshName, Meshes, load_meshes};
+use super::stages::parse::{ParsedScene, SceneSource, parse};
+use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, trace_first_photons};
 use super::stages::render::render;
-use super::stages::textures::{NeededTextures, TextureCache, Textures, add_declared, needed, textures};
+use super::stages::textures::{
+    NeededTextures, TextureCache, Textures, add_unused_textures, find_needed_textures, load_textures,
+};
 use super::stages::write::{Destination, TurntableFrames, WrittenImages, check_targets, write_on_request};
-use super::stages::{FileReadContext, Findings, StageResult, Stop};
+use super::stages::{FileReadContext, Findings, StageResult, StopReason};
 use super::stopwatch::Stopwatch;
-use super::table::StageTable;
+use super::table::StageRunner;
 use super::targets::conflicts;
-use super::trace::{Kernel, Tracer};
+use super::trace::{TileKernel, Tracer};
 use super::warnings::settings_warnings;
-use super::watch::content::{Contents, FileRead, Snapshot};
+use super::watch::content::{FileHashCache, FileRead, Snapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
@@ -70,7 +72,7 @@ use crate::messages::NO_IMAGE;
 use crate::output::LayerImage;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 use crate::system::priority;
 use crate::system::threads::{check_stack_space, core_count, describe_start_failure};
 use crate::world::{CoplanarLight, GlassSolids, TextureNeeds, World};
@@ -78,7 +80,7 @@ use crate::world::{CoplanarLight, GlassSolids, TextureNeeds, World};
 /// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
 pub(super) struct EngineConfig {
-    pub(super) kernel: Kernel,
+    pub(super) kernel: TileKernel,
     /// Maximum film size in bytes.
     pub(super) most_film_bytes: u64,
     /// Niceness of the render threads relative to the thread that starts them.
@@ -94,8 +96,8 @@ impl Default for EngineConfig {
 /// Runs requests and keeps state between them.
 pub(super) struct Engine {
     config: EngineConfig,
-    contents: Arc<Contents>,
-    parsed: Memo<Arc<Parsed>>,
+    contents: Arc<FileHashCache>,
+    parsed: Memo<Arc<ParsedScene>>,
     meshes: NamedCache<MeshName, CachedMesh>,
     bodies: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<CoplanarLight>>,
@@ -109,7 +111,7 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: WrittenImages,
-    own: Option<OwnImage>,
+    own: Option<SavedSceneImage>,
     /// Save count from the newest request with a valid scene.
     saves: u64,
     /// Whether the film of the scene's own image is kept while other images are rendered.
@@ -123,7 +125,7 @@ pub(super) struct Engine {
     /// Layers of the current film.
     layers: Vec<LayerImage>,
     /// Plan of the current film.
-    plan: Option<Plan>,
+    plan: Option<RenderPlan>,
     query_context: Option<QueryContext>,
     /// The last valid scene, with the files it references.
     good: Option<LastValidScene>,
@@ -133,7 +135,7 @@ pub(super) struct Engine {
     /// Assets of the last valid scene, which are watched while the scene file is broken.
     assets: Vec<FileRead>,
     /// All files that must not be written: the files of the last valid scene and all files referenced since.
-    inputs: Inputs,
+    inputs: ProtectedInputs,
     /// Whether the current scene file is invalid, which means that its referenced files are unknown.
     is_broken: bool,
     /// Lock on the checkpoint file, and the checkpoints already reported.
@@ -145,15 +147,15 @@ const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
 #[derive(Clone)]
-struct Ready {
-    parsed: Arc<Parsed>,
-    plan: Plan,
+struct ReadyScene {
+    parsed: Arc<ParsedScene>,
+    plan: RenderPlan,
     world: KeyedWorld,
     /// Key for all surfaces, lights and textures. It does not depend on `origin`.
-    surfaces: Key,
+    surfaces: Fingerprint,
     origin: DVec3,
     /// The film's key.
-    film: Key,
+    film: Fingerprint,
     texels_loaded: u64,
     texture_memory_bytes: u64,
     /// Share of the image that this process renders. `None` for the whole image.
@@ -161,7 +163,7 @@ struct Ready {
 }
 
 impl Engine {
-    pub(super) fn new(config: EngineConfig, contents: Arc<Contents>) -> Self {
+    pub(super) fn new(config: EngineConfig, contents: Arc<FileHashCache>) -> Self {
         Self {
             config,
             contents,
@@ -191,24 +193,29 @@ impl Engine {
             coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
-            inputs: Inputs::default(),
+            inputs: ProtectedInputs::default(),
             is_broken: false,
             checkpoint_lock: RefCell::default(),
         }
     }
 
     /// Runs a request and sends its outcome. If the scene is invalid, renders the last valid one.
-    pub(super) fn request(&mut self, request: &Request, sink: &Sink, context: &RequestContext<'_>) {
+    pub(super) fn handle_request(
+        &mut self,
+        request: &Request,
+        sink: &EventSink,
+        context: &RequestContext<'_>,
+    ) {
         let generation = request.generation;
-        let outcome = self.outcome(request, sink, context);
-        let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
+        let outcome = self.run_request(request, sink, context);
+        let is_broken = matches!(outcome, Err(StopReason::Failed(Failure::Scene(_))));
         sink.send(match outcome {
             Ok(Outcome { report, conflicts, warnings, unchanged }) => {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
-            Err(Stop::Cancelled) => Event::Cancelled { generation },
-            Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
+            Err(StopReason::Cancelled) => Event::Cancelled { generation },
+            Err(StopReason::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {
             self.try_last_valid_scene(request, sink, context);
@@ -216,108 +223,115 @@ impl Engine {
     }
 
     /// Runs a request and returns its outcome.
-    fn outcome(
+    fn run_request(
         &mut self,
         request: &Request,
-        sink: &Sink,
+        sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Outcome, Stop> {
+    ) -> Result<Outcome, StopReason> {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
-        let before = self.shown_image();
-        let outcome = self.run(request, sink, context, &mut findings);
-        if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
+        let before = self.current_image_key();
+        let outcome = self.run_stages(request, sink, context, &mut findings);
+        if let Err(StopReason::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
         }
         // Watched files must not be written.
         self.inputs.add_read(&findings.files);
         match &outcome {
             Ok(_) => self.is_broken = false,
-            Err(Stop::Failed(Failure::Scene(_))) => self.is_broken = true,
-            Err(Stop::Failed(Failure::Work(_)) | Stop::Cancelled) => {}
+            Err(StopReason::Failed(Failure::Scene(_))) => self.is_broken = true,
+            Err(StopReason::Failed(Failure::Work(_)) | StopReason::Cancelled) => {}
         }
         if let Ok(report) = &outcome {
             self.report = Some(report.clone());
-            let is_by_hand = self.written.have_image_by_hand(&self.contents);
+            let is_by_hand = self.written.has_user_written_image(&self.contents);
             if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
                 self.write_report(report, sink, context.writing);
             }
         }
-        self.report_files(&findings, sink);
+        self.report_read_files(&findings, sink);
         // Even if the render was stopped, keep completely read files for later requests.
         let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
         self.end_request(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-        let unchanged = self.shown_image() == before && settled(Stage::Render) && settled(Stage::Write);
+        let unchanged = self.current_image_key() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
         Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
     /// Returns the current image's key and view.
-    fn shown_image(&self) -> (Option<Key>, Option<View>) {
+    fn current_image_key(&self) -> (Option<Fingerprint>, Option<ViewMode>) {
         let view = self.plan.as_ref().map(|plan| plan.settings.view);
         (self.films.current().map(|state| state.key), view)
     }
 
     /// Sends a preview of the current image in another size, outside of a request.
-    pub(super) fn show_preview_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
+    pub(super) fn show_preview_now(
+        &mut self,
+        bounds: Option<PreviewSize>,
+        sink: &EventSink,
+        token: &CancelToken,
+    ) {
         if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
             PreviewTarget { bounds, plan, sink }.show(state, pool, token);
         }
     }
 
     /// Answers a query about the current image, outside of a request.
-    pub(super) fn query(&self, query: &Query, sink: &Sink) {
+    pub(super) fn query(&self, query: &Query, sink: &EventSink) {
         match &self.query_context {
             Some(query_context) => query_context.run(query, self.films.current(), &self.inputs, sink),
             None => query.report_failure(NO_IMAGE, sink),
         }
     }
 
-    fn run(
+    fn run_stages(
         &mut self,
         request: &Request,
-        sink: &Sink,
+        sink: &EventSink,
         context: &RequestContext<'_>,
         findings: &mut Findings,
-    ) -> Result<Report, Stop> {
+    ) -> Result<Report, StopReason> {
         let watch = Stopwatch::start(context.token);
-        let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: false };
+        let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: false };
         // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
-        let mut ready = self.prepare_consistent(request, &mut table, context.token, findings)?;
+        let mut ready = self.prepare_consistent_scene(request, &mut table, context.token, findings)?;
         let photons = self.trace_photons(request, &ready, &mut table, sink, context)?;
-        let share = self.share(&ready.plan, photons);
+        let share = self.assigned_shard(&ready.plan, photons);
         // A share may render fewer samples than the whole image.
         if let Some(share) = &share {
             ready.plan.settings.render.samples = share.samples_per_pixel();
         }
         ready.share = share;
-        self.record_own_share(request, &ready);
-        self.report_own_image(request, ready.film, sink);
+        self.record_saved_scene_shard(request, &ready);
+        self.report_saved_scene_image(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
         // Symbolic links and files may have changed during the render.
         self.check_conflicts(request, &ready.plan, findings, sink)?;
-        let was_own_written = self.is_own_written();
+        let was_own_written = self.is_saved_scene_image_written();
         let written = table.run(Stage::Write, || {
             self.run_write_stage(request, &ready.plan, findings, sink, context.writing)
         });
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
-        self.report_own_image(request, ready.film, sink);
-        let film = own::should_write_own_image(request).then_some(ready.film);
+        self.report_saved_scene_image(request, ready.film, sink);
+        let film = own::should_write_saved_scene_image(request).then_some(ready.film);
         let interruption = || context.orders.interruption();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
-                checkpointer.finish(state, state.traced, is_written || engine.is_own_written());
+                checkpointer.finish(state, state.traced, is_written || engine.is_saved_scene_image_written());
             }
         });
         let is_written = written?;
         let pool = self.thread_pool(ready.plan.threads)?;
-        let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
+        let Some(state) = self.films.current() else {
+            return Err(StopReason::work_failure("the film is missing"));
+        };
         let finished = RequestResults {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
@@ -332,7 +346,7 @@ impl Engine {
         };
         let (stages, seconds) = (table.stages, watch.seconds());
         if let Some(own) = self.own.as_ref().filter(|_| request.own.is_some())
-            && self.is_own_written()
+            && self.is_saved_scene_image_written()
             && !was_own_written
         {
             let finished = RequestResults { plan: &own.plan, is_written: true, ..finished };
@@ -346,17 +360,17 @@ impl Engine {
     fn trace_photons(
         &mut self,
         request: &Request,
-        ready: &Ready,
-        table: &mut StageTable<'_>,
-        sink: &Sink,
+        ready: &ReadyScene,
+        table: &mut StageRunner<'_>,
+        sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Option<Key>, Stop> {
+    ) -> Result<Option<Fingerprint>, StopReason> {
         let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = PhotonContext { world, plan, pool: &pool, token: context.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
-            |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
+            |of_photons| keys::photons_key(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
         let own = RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraChange::default()).viewpoint();
         let query_context = QueryContext {
             own,
@@ -367,12 +381,12 @@ impl Engine {
         };
         let (store, inputs) = (&mut self.photons, &self.inputs);
         let hear = || {
-            context.postpone_write(sink);
+            context.report_postponed_write(sink);
             context.answer_query(&query_context, None, inputs, sink);
         };
         // Show the scene while the first photons are traced.
         let is_new = request.force || self.films.get(ready.film).is_none();
-        let coarse = CoarseImages {
+        let coarse = CoarseImageRenderer {
             tracer: make_tracer(self.config.kernel, &pool, ready, context.token),
             plan,
             is_moved: request.overrides.camera.has_changes(),
@@ -380,7 +394,7 @@ impl Engine {
         };
         let screen = PreviewTarget { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
-        table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
+        table.run(Stage::Photons, || trace_first_photons(asked, key, store, sending, hear, before))?;
         let photons_key =
             plan.settings.effective().photons.filter(|_| plan.settings.gathers_photons()).map(key);
         self.plan = Some(ready.plan.clone());
@@ -390,13 +404,13 @@ impl Engine {
     }
 
     /// Runs [`Self::prepare`] on one consistent version of all files.
-    fn prepare_consistent(
+    fn prepare_consistent_scene(
         &mut self,
         request: &Request,
-        table: &mut StageTable<'_>,
+        table: &mut StageRunner<'_>,
         token: &CancelToken,
         findings: &mut Findings,
-    ) -> Result<Ready, Stop> {
+    ) -> Result<ReadyScene, StopReason> {
         self.read_consistently(token, findings, |engine, contents, findings| {
             table.stages.clear();
             engine.prepare(request, table, (contents, token), findings)
@@ -409,20 +423,20 @@ impl Engine {
         &mut self,
         token: &CancelToken,
         findings: &mut Findings,
-        mut read: impl FnMut(&mut Self, &Snapshot, &mut Findings) -> Result<T, Stop>,
-    ) -> Result<T, Stop> {
+        mut read: impl FnMut(&mut Self, &Snapshot, &mut Findings) -> Result<T, StopReason>,
+    ) -> Result<T, StopReason> {
         for _ in 0..MAX_READS {
-            let contents = Snapshot::of(Arc::clone(&self.contents));
+            let contents = Snapshot::new(Arc::clone(&self.contents));
             let result = read(self, &contents, findings);
             if result.is_err() && !token.is_cancelled() {
                 contents.verify(token)?;
             }
-            if token.is_cancelled() || contents.changed().is_none() {
+            if token.is_cancelled() || contents.changed_file().is_none() {
                 return result;
             }
             findings.reset();
         }
-        Err(Stop::work(
+        Err(StopReason::work_failure(
             "the scene's files keep changing while they are being read; try again once they are complete",
         ))
     }
@@ -431,12 +445,12 @@ impl Engine {
     fn prepare(
         &mut self,
         request: &Request,
-        table: &mut StageTable<'_>,
+        table: &mut StageRunner<'_>,
         (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
-    ) -> Result<Ready, Stop> {
-        let containers = Containers::default();
-        let show = ModelView::of(&request.overrides);
+    ) -> Result<ReadyScene, StopReason> {
+        let containers = GltfContainers::default();
+        let show = ModelView::from_overrides(&request.overrides);
         // Create the thread pool before parsing, because reading a model uses all threads. The thread count
         // does not depend on the scene.
         let pool = self.thread_pool(thread_count(&request.overrides))?;
@@ -444,11 +458,11 @@ impl Engine {
             let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
         })?;
-        let text = parsed.loaded.source.shared_text();
+        let text = parsed.loaded.source.shared_file_text();
         table.sink.send(Event::Text { generation: request.generation, text });
-        let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
-            .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        let own_image_plan = own_image_plan(request, &parsed)?;
+        let plan = resolve_plan(&parsed.loaded.scene, &request.scene, &request.overrides)
+            .map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))?;
+        let own_image_plan = saved_scene_plan(request, &parsed)?;
         self.check_memory(&MemoryEstimate::for_image(&plan), request, (&plan, own_image_plan.as_ref()))?;
         let settings_warnings =
             settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
@@ -466,7 +480,7 @@ impl Engine {
                 photons: scene.photons.enabled,
             },
         });
-        let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
+        let before = std::mem::replace(&mut self.inputs, ProtectedInputs::from_scene(&parsed));
         let looked = self.check_conflicts(request, &plan, findings, table.sink);
         // The current image still shows the previous scene and may still have to be written.
         self.inputs.add(before);
@@ -478,54 +492,57 @@ impl Engine {
         let reading =
             FileReadContext { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
-        let lookups = needed_textures(&plan, own_image_plan.as_ref());
-        let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
-        verify(contents, token)?;
-        let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
+        let lookups = texture_needs(&plan, own_image_plan.as_ref());
+        let (meshes, bodies, textures, needed) =
+            self.load_assets(&parsed, lookups, findings, table, &reading)?;
+        verify_files_unchanged(contents, token)?;
+        let estimate = MemoryEstimate::for_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
         self.check_memory(&estimate, request, (&plan, own_image_plan.as_ref()))?;
-        self.inputs = collect_inputs(&parsed, &meshes, findings);
+        self.inputs = collect_protected_inputs(&parsed, &meshes, findings);
         self.check_conflicts(request, &plan, findings, table.sink)?;
         let (generation, textures, files) = (request.generation, Arc::new(textures), findings.files.clone());
         let good = LastValidScene { generation, parsed, meshes, bodies, textures, needed, files };
-        let ready = self.build(request, &good, (plan, own_image_plan), table, &reading)?;
-        self.note_saves(request.saves);
+        let ready = self.build_world(request, &good, (plan, own_image_plan), table, &reading)?;
+        self.handle_scene_saves(request.saves);
         self.good = Some(good);
         Ok(ready)
     }
 
     /// Builds the trees, lights and world for a loaded scene.
-    fn build(
+    fn build_world(
         &mut self,
         request: &Request,
         good: &LastValidScene,
-        (plan, own): (Plan, Option<Plan>),
-        table: &mut StageTable<'_>,
+        (plan, own): (RenderPlan, Option<RenderPlan>),
+        table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
-    ) -> Result<Ready, Stop> {
+    ) -> Result<ReadyScene, StopReason> {
         let LastValidScene { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
-        let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
-        let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
+        let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera)
+            .rotated_for_turntable(plan.turn);
+        let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter camera is small, so include it in the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
-        let origin = eye.origin();
-        let build = || accel(scene, (&of, origin), meshes, &mut self.accel, reading);
+        let of = keys::fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
+        let origin = eye.coordinate_origin();
+        let build = || build_accel_structures(scene, (&of, origin), meshes, &mut self.accel, reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
-        let gather = || Ok(lights(scene, &of, &built.geometry, textures, memos, reading.token)?);
+        let gather = || Ok(collect_lights(scene, &of, &built.geometry, textures, memos, reading.token)?);
         let lights = table.run(Stage::Lights, gather)?;
-        let surfaces = keys::surfaces(scene, &of, &textures.keys);
+        let surfaces = keys::surfaces_key(scene, &of, &textures.keys);
         let parts = (built, lights, Arc::clone(bodies));
-        let world = world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
+        let world = build_or_reuse_world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
-        let film = keys::render(world.0, &plan.settings, plan.crop);
-        let camera = own::own_image_overrides(request).camera;
+        let film = keys::film_key(world.0, &plan.settings, plan.crop);
+        let camera = own::saved_scene_overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
-        let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).turned(own.turn);
-        let own = OwnImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
-        self.set_own_image(own);
-        Ok(Ready {
+        let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).rotated_for_turntable(own.turn);
+        let own =
+            SavedSceneImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
+        self.set_saved_scene_image(own);
+        Ok(ReadyScene {
             parsed: parsed.clone(),
             plan,
             world,
@@ -539,48 +556,49 @@ impl Engine {
     }
 
     /// Returns the share of the image that this process renders. `None` for the whole image.
-    fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Shard> {
+    fn assigned_shard(&self, plan: &RenderPlan, photons: Option<Fingerprint>) -> Option<Shard> {
         let emits_photons =
             photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::emits_photons);
         plan.shard.map(|shard| Shard::new(shard, emits_photons, plan.settings.render.samples))
     }
 
     /// Loads all files that the scene references. Tries every file before returning an error.
-    fn load(
+    fn load_assets(
         &mut self,
-        parsed: &Parsed,
+        parsed: &ParsedScene,
         lookups: TextureNeeds,
         findings: &mut Findings,
-        table: &mut StageTable<'_>,
+        table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
-    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), Stop> {
+    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), StopReason> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
-        let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
-        let needed = needed(loaded, &found, lookups, cache);
-        let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
+        let found = table.run(Stage::Meshes, || load_meshes(loaded, mesh_cache, findings, reading))?;
+        let needed = find_needed_textures(loaded, &found, lookups, cache);
+        let texels =
+            table.run(Stage::Textures, || load_textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
-        let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
+        let bodies = find_glass_solids(loaded, &found, &mut self.bodies, findings, reading.token)?;
         warn_about_coplanar_lights(parsed, &found, &mut self.coplanar, findings);
         if findings.errors.is_empty() {
-            self.report_files(findings, table.sink);
+            self.report_read_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
             let generation = table.sink.generation;
             table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, bodies, texels, needed))
         } else {
-            Err(Stop::Failed(findings.take_failure()))
+            Err(StopReason::Failed(findings.take_failure()))
         }
     }
 
     fn render(
         &mut self,
         request: &Request,
-        ready: &Ready,
-        photons: Option<Key>,
-        sink: &Sink,
+        ready: &ReadyScene,
+        photons: Option<Fingerprint>,
+        sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<StageResult<RayCounters>, Stop> {
+    ) -> Result<StageResult<RayCounters>, StopReason> {
         let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
@@ -593,7 +611,7 @@ impl Engine {
             Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, is_own, sink };
         let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
-                context.postpone_write(sink);
+                context.report_postponed_write(sink);
             } else if orders.take_write() && write_on_request(state, to, &mut written.borrow_mut()) {
                 remove_outdated_report(plan, to.inputs, sink);
             }
@@ -605,7 +623,7 @@ impl Engine {
         let wanted = plan.layers.as_slice();
         let image_sink = sink.for_progress_range(layers::progress_range(wanted, None));
         let interruption = || orders.interruption();
-        let film = own::should_write_own_image(request).then_some(key);
+        let film = own::should_write_saved_scene_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             let rendering = RenderStageInputs {
                 tracer: make_tracer(engine.config.kernel, &pool, ready, context.token),
@@ -617,7 +635,7 @@ impl Engine {
                 first: request.first,
                 sink: if wanted.is_empty() { sink } else { &image_sink },
                 pulse: &pulse,
-                take_preview: &|| orders.take_preview(),
+                take_preview: &|| orders.take_preview_resize(),
                 is_moved: request.overrides.camera.has_changes(),
                 coarse_rate: &engine.coarse_rate,
                 share: ready.share.clone(),
@@ -637,7 +655,7 @@ impl Engine {
         if ready.share.is_some()
             && let Some(state) = films.current_mut()
         {
-            state.identity = self.own.as_ref().map(OwnImage::identity);
+            state.identity = self.own.as_ref().map(SavedSceneImage::dependencies);
         }
         (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
@@ -648,12 +666,16 @@ impl Engine {
     }
 
     /// Returns the thread pool for a render with `--threads` or the default thread count.
-    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
+    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, StopReason> {
         self.thread_pool_for(threads, true)
     }
 
     /// Returns a pool with `threads` threads, reusing the current pool if it already has that many.
-    fn thread_pool_for(&mut self, threads: usize, has_threads_option: bool) -> Result<Arc<ThreadPool>, Stop> {
+    fn thread_pool_for(
+        &mut self,
+        threads: usize,
+        has_threads_option: bool,
+    ) -> Result<Arc<ThreadPool>, StopReason> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
         }
@@ -661,52 +683,53 @@ impl Engine {
         let name = |index| format!("glimt-{index}");
         let nice = self.config.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
-        let failed =
-            |error: &dyn Display| Stop::work(describe_start_failure(threads, has_threads_option, &error));
+        let failed = |error: &dyn Display| {
+            StopReason::work_failure(describe_start_failure(threads, has_threads_option, &error))
+        };
         check_stack_space(threads).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
         let pool = builder.build().map_err(|error| failed(&error))?;
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 
-    fn report_files(&self, findings: &Findings, sink: &Sink) {
+    fn report_read_files(&self, findings: &Findings, sink: &EventSink) {
         let mut files = findings.files.clone();
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
-        sink.files_read(files, findings.files.len(), findings.begun);
+        sink.send_files_read(files, findings.files.len(), findings.begun);
     }
 
     /// Loads the scene and all files it references, needed or not, for `check`.
-    pub(super) fn read_all(
+    pub(super) fn load_all_assets(
         &mut self,
         path: &Path,
         sets: &[String],
-        sink: &Sink,
+        sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
+    ) -> Result<(Arc<ParsedScene>, Meshes, Textures, Vec<Diagnostic>), Failure> {
         let mut findings = Findings::default();
         let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
-            let containers = Containers::default();
+            let containers = GltfContainers::default();
             let origin = SceneSource { path, sets, show: ModelView::default() };
             let pool = engine.thread_pool_for(core_count(), false)?;
             let read = || parse(origin, (contents, &containers), &mut engine.parsed, findings, token);
             let parsed = pool.install(read)?.value;
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
-            let found = meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
-            let mut wanted = needed(loaded, &found, TextureNeeds::ALL, &engine.textures);
-            add_declared(loaded, &mut wanted.textures);
+            let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
+            let mut wanted = find_needed_textures(loaded, &found, TextureNeeds::ALL, &engine.textures);
+            add_unused_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
-            let texels = textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
-            verify(contents, token)?;
-            glass(loaded, &found, &mut engine.bodies, findings, token)?;
+            let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
+            verify_files_unchanged(contents, token)?;
+            find_glass_solids(loaded, &found, &mut engine.bodies, findings, token)?;
             warn_about_coplanar_lights(&parsed, &found, &mut engine.coplanar, findings);
             let overrides = Overrides::default();
-            let plan = plan(&loaded.scene, path, &overrides)
-                .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+            let plan = resolve_plan(&loaded.scene, path, &overrides)
+                .map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))?;
             findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == OutputNameSource::Scene {
-                let inputs = collect_inputs(&parsed, &found, findings);
+                let inputs = collect_protected_inputs(&parsed, &found, findings);
                 findings.errors.extend(conflicts(&plan, &inputs));
             }
             Ok((parsed, found, texels))
@@ -717,8 +740,8 @@ impl Engine {
                 Ok((parsed, found, texels, findings.warnings))
             }
             Ok(_) => Err(findings.take_failure()),
-            Err(Stop::Failed(failure)) => Err(failure),
-            Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
+            Err(StopReason::Failed(failure)) => Err(failure),
+            Err(StopReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
     }
 }
@@ -727,18 +750,18 @@ impl Engine {
 ///
 /// # Errors
 /// A file has changed, or the token is cancelled.
-fn verify(contents: &Snapshot, token: &CancelToken) -> Result<(), Stop> {
+fn verify_files_unchanged(contents: &Snapshot, token: &CancelToken) -> Result<(), StopReason> {
     contents.verify(token)?;
     let changed =
-        contents.changed().map(|path| format!("{} changed while it was being read", path.display()));
-    changed.map_or(Ok(()), |message| Err(Stop::work(message)))
+        contents.changed_file().map(|path| format!("{} changed while it was being read", path.display()));
+    changed.map_or(Ok(()), |message| Err(StopReason::work_failure(message)))
 }
 
 /// Creates a tracer for a scene, without photons.
 fn make_tracer<'a>(
-    kernel: Kernel,
+    kernel: TileKernel,
     pool: &'a ThreadPool,
-    ready: &'a Ready,
+    ready: &'a ReadyScene,
     token: &'a CancelToken,
 ) -> Tracer<'a> {
     Tracer {
@@ -753,8 +776,8 @@ fn make_tracer<'a>(
 }
 
 /// Collects the files referenced by the scene and all other files that were read.
-fn collect_inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
-    let mut inputs = Inputs::of_scene(parsed);
+fn collect_protected_inputs(parsed: &ParsedScene, meshes: &Meshes, findings: &Findings) -> ProtectedInputs {
+    let mut inputs = ProtectedInputs::from_scene(parsed);
     inputs.add_meshes(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);
     inputs

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 
 use crate::control::CancelToken;
-use crate::inputs::Inputs;
+use crate::inputs::ProtectedInputs;
 use crate::protocol::{Event, PreviewSize};
 use crate::queries::{Query, QueryContext};
 use crate::render::film_state::FilmState;
-use crate::sink::Sink;
+use crate::sink::EventSink;
 
 /// Reasons for interrupting a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,13 +21,13 @@ pub(crate) enum Interruption {
 }
 
 /// Orders that arrive during a request.
-pub(crate) trait PendingOrders {
+pub(crate) trait PendingCommands {
     /// Whether the current image should be written.
     fn wants_write(&self) -> bool;
     /// Like [`Self::wants_write`], but clears the order.
     fn take_write(&self) -> bool;
     /// Takes the pending preview size change.
-    fn take_preview(&self) -> Option<Option<PreviewSize>>;
+    fn take_preview_resize(&self) -> Option<Option<PreviewSize>>;
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<Query>;
     /// Returns the reason for interrupting the render.
@@ -39,7 +39,7 @@ pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
     /// Cancels the write stage, which runs last.
     pub(crate) writing: &'a CancelToken,
-    pub(crate) orders: &'a dyn PendingOrders,
+    pub(crate) orders: &'a dyn PendingCommands,
     /// Whether the front end has already been told that its write order is postponed.
     is_postponed: Cell<bool>,
 }
@@ -48,13 +48,13 @@ impl<'a> RequestContext<'a> {
     pub(crate) fn new(
         token: &'a CancelToken,
         writing: &'a CancelToken,
-        orders: &'a dyn PendingOrders,
+        orders: &'a dyn PendingCommands,
     ) -> Self {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 
     /// Reports, once, that a write order is postponed until every pixel has a sample.
-    pub(super) fn postpone_write(&self, sink: &Sink) {
+    pub(super) fn report_postponed_write(&self, sink: &EventSink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });
         }
@@ -65,8 +65,8 @@ impl<'a> RequestContext<'a> {
         &self,
         query_context: &QueryContext,
         state: Option<&FilmState>,
-        inputs: &Inputs,
-        sink: &Sink,
+        inputs: &ProtectedInputs,
+        sink: &EventSink,
     ) {
         if let Some(query) = self.orders.take_query() {
             query_context.run(&query, state, inputs, sink);

@@ -5,17 +5,17 @@ use std::fmt;
 use std::path::Path;
 
 use super::super::protocol::{Failure, Report, Request};
-use super::super::sink::Sink;
-use super::super::stages::Stop;
+use super::super::sink::EventSink;
+use super::super::stages::StopReason;
 use super::{Engine, RequestContext};
 use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::Key;
-use crate::scene::report::{Style, render};
+use crate::scene::fingerprint::Fingerprint;
+use crate::scene::report::{ReportStyle, render_report};
 
 /// A rendered image.
 #[derive(Clone, Debug)]
-pub struct Rendered {
+pub struct RenderedImage {
     /// Linear radiance, before exposure.
     pub image: RadianceImage,
     /// Report of the request.
@@ -23,23 +23,23 @@ pub struct Rendered {
     /// Likely mistakes in the scene.
     pub warnings: Vec<Diagnostic>,
     /// Key that covers everything that affects the image except the number of samples.
-    pub key: Key,
+    pub key: Fingerprint,
 }
 
 /// Reasons why no image was rendered.
 #[derive(Clone, Debug)]
-pub enum Unrendered {
+pub enum RenderFailure {
     /// The scene is invalid, or the work failed.
     Failed(Failure),
     /// A cancel token stopped the work.
     Cancelled,
 }
 
-impl fmt::Display for Unrendered {
+impl fmt::Display for RenderFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Failed(Failure::Scene(diagnostics)) => {
-                f.write_str(render(diagnostics, COLUMNS, Style::Plain).trim_end())
+                f.write_str(render_report(diagnostics, COLUMNS, ReportStyle::Plain).trim_end())
             }
             Self::Failed(Failure::Work(message)) => f.write_str(message),
             Self::Cancelled => f.write_str("the render was cancelled"),
@@ -47,7 +47,7 @@ impl fmt::Display for Unrendered {
     }
 }
 
-impl Error for Unrendered {}
+impl Error for RenderFailure {}
 
 /// Line width for diagnostics in error messages.
 const COLUMNS: usize = 120;
@@ -71,25 +71,25 @@ impl Engine {
     pub(crate) fn render_image(
         &mut self,
         request: &Request,
-        sink: &Sink,
+        sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Rendered, Unrendered> {
-        match self.outcome(request, sink, context) {
+    ) -> Result<RenderedImage, RenderFailure> {
+        match self.run_request(request, sink, context) {
             // An in-memory image is not written, so there are no conflicts.
             Ok(Outcome { report, conflicts: _, warnings, unchanged: _ }) => {
                 let state = self.films.current();
-                let gone = || Unrendered::Failed(Failure::Work("the film is missing".to_owned()));
+                let gone = || RenderFailure::Failed(Failure::Work("the film is missing".to_owned()));
                 let state = state.ok_or_else(gone)?;
                 let image = state.film.image(Quantity::Radiance);
-                Ok(Rendered { image, report: Box::new(report), warnings, key: state.key })
+                Ok(RenderedImage { image, report: Box::new(report), warnings, key: state.key })
             }
-            Err(Stop::Failed(failure)) => Err(Unrendered::Failed(failure)),
-            Err(Stop::Cancelled) => Err(Unrendered::Cancelled),
+            Err(StopReason::Failed(failure)) => Err(RenderFailure::Failed(failure)),
+            Err(StopReason::Cancelled) => Err(RenderFailure::Cancelled),
         }
     }
 
     /// Whether the last request read the file at a path.
-    pub(crate) fn has_read(&self, path: &Path) -> bool {
+    pub(crate) fn has_read_file(&self, path: &Path) -> bool {
         self.inputs.contain(path)
     }
 }

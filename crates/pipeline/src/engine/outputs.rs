@@ -1,13 +1,13 @@
 //! The engine's output files, and the files it must not overwrite.
 
-use super::super::inputs::Inputs;
-use super::super::plan::Plan;
+use super::super::inputs::ProtectedInputs;
+use super::super::plan::RenderPlan;
 use super::super::protocol::{ImageReport, Report, Request, WriteMode, reasons};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
-use super::super::sink::Sink;
+use super::super::sink::EventSink;
 use super::super::stages::write::{Destination, write_animation, write_if_wanted, write_on_request};
-use super::super::stages::{Findings, StageResult, Stop};
+use super::super::stages::{Findings, StageResult, StopReason};
 use super::super::targets::conflicts;
 use super::Engine;
 use crate::control::CancelToken;
@@ -15,7 +15,7 @@ use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCEN
 use crate::output::OutputError;
 
 /// Removes an existing report that does not describe the plan's image files.
-pub(super) fn remove_outdated_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
+pub(super) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
         sink.write_failed(None, format!("the report describes an earlier image: {error}"));
     }
@@ -28,7 +28,7 @@ impl Engine {
     }
 
     /// Writes the current image, outside of a request.
-    pub(crate) fn write_now(&mut self, sink: &Sink) {
+    pub(crate) fn write_now(&mut self, sink: &EventSink) {
         let (Some(state), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
             return sink.write_failed(None, NO_IMAGE.to_owned());
         };
@@ -59,12 +59,12 @@ impl Engine {
         let written = &mut self.written;
         let is_written = pool.install(|| write_on_request(state, to, written));
         let is_finished = state.is_finished(plan);
-        self.record_own_image_written(is_written && is_finished && self.is_own);
+        self.record_saved_scene_image_written(is_written && is_finished && self.is_own);
         if is_written {
-            self.report_written_image(sink);
+            self.update_report_after_write(sink);
         }
-        if self.is_own_written() {
-            self.remove_own_checkpoint(sink);
+        if self.is_saved_scene_image_written() {
+            self.remove_saved_scene_checkpoint(sink);
         }
     }
 
@@ -76,10 +76,10 @@ impl Engine {
     pub(super) fn check_conflicts(
         &self,
         request: &Request,
-        plan: &Plan,
+        plan: &RenderPlan,
         findings: &mut Findings,
-        sink: &Sink,
-    ) -> Result<(), Stop> {
+        sink: &EventSink,
+    ) -> Result<(), StopReason> {
         let found = conflicts(plan, &self.inputs);
         if found.is_empty() {
             findings.conflicts = found;
@@ -87,7 +87,7 @@ impl Engine {
         }
         if request.write == WriteMode::Must {
             findings.errors.extend(found);
-            return Err(Stop::Failed(findings.take_failure()));
+            return Err(StopReason::Failed(findings.take_failure()));
         }
         if found != findings.conflicts {
             sink.write_conflicts(found.clone());
@@ -98,7 +98,7 @@ impl Engine {
 
     /// Writes the report for an image that was written at the user's request. If the render is unfinished,
     /// removes the outdated report instead.
-    fn report_written_image(&self, sink: &Sink) {
+    fn update_report_after_write(&self, sink: &EventSink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return remove_outdated_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
@@ -109,7 +109,7 @@ impl Engine {
     }
 
     /// Writes a request's report after its image has been written or writing has failed.
-    pub(super) fn write_report(&self, report: &Report, sink: &Sink, token: &CancelToken) {
+    pub(super) fn write_report(&self, report: &Report, sink: &EventSink, token: &CancelToken) {
         let Some(plan) = &self.plan else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
@@ -123,22 +123,24 @@ impl Engine {
     pub(super) fn run_write_stage(
         &mut self,
         request: &Request,
-        plan: &Plan,
+        plan: &RenderPlan,
         findings: &Findings,
-        sink: &Sink,
+        sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<StageResult<bool>, Stop> {
+    ) -> Result<StageResult<bool>, StopReason> {
         if let Some(conflict) = findings.conflicts.first() {
             return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
-            return self.write_own_image(sink, token);
+            return self.write_saved_scene_image(sink, token);
         }
-        if self.written.have_image_by_hand(&self.contents) {
+        if self.written.has_user_written_image(&self.contents) {
             return Ok(StageResult::skipped(false, reasons::OTHER_IMAGE_WRITTEN));
         }
         let pool = self.thread_pool(plan.threads)?;
-        let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
+        let Some(state) = self.films.current() else {
+            return Err(StopReason::work_failure("the film is missing"));
+        };
         let to = Destination {
             plan,
             layers: &self.layers,

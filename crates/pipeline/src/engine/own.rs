@@ -4,36 +4,36 @@
 use std::sync::Arc;
 
 use super::orders::Interruption;
-use super::{Engine, Ready};
+use super::{Engine, ReadyScene};
 use crate::assembly::RequestCamera;
 use crate::control::CancelToken;
 use crate::identity::ImageDependencies;
 use crate::keys;
 use crate::memory::MemoryEstimate;
 use crate::output::part::Dependency;
-use crate::plan::{Plan, plan};
-use crate::protocol::{Failure, OwnImageState, Request, Status, WriteMode, reasons};
+use crate::plan::{RenderPlan, resolve_plan};
+use crate::protocol::{Failure, Request, SavedSceneImageState, Status, WriteMode, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
 use crate::render::film_state::FilmState;
 use crate::render::share::Shard;
 use crate::scene::description::CameraChange;
-use crate::scene::fingerprint::{FingerprintHasher, Key};
-use crate::settings::{Checkpoints, Overrides, Resume};
-use crate::sink::Sink;
-use crate::stages::parse::Parsed;
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
+use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
+use crate::sink::EventSink;
+use crate::stages::parse::ParsedScene;
 use crate::stages::write::{Destination, develop_settings, write_if_wanted};
-use crate::stages::{StageResult, Stop};
+use crate::stages::{StageResult, StopReason};
 use crate::watch::content::FileRead;
 use crate::world::TextureNeeds;
 
 /// The scene's own image for the newest request.
-pub(super) struct OwnImage {
+pub(super) struct SavedSceneImage {
     /// Key of the film.
-    pub(super) film: Key,
+    pub(super) film: Fingerprint,
     /// Key for the finished image and its output files.
-    pub(super) image: Key,
-    parsed: Arc<Parsed>,
-    pub(super) plan: Plan,
+    pub(super) image: Fingerprint,
+    parsed: Arc<ParsedScene>,
+    pub(super) plan: RenderPlan,
     camera: CameraChange,
     /// Files that the image depends on.
     files: Vec<FileRead>,
@@ -41,24 +41,24 @@ pub(super) struct OwnImage {
     pub(super) share: Option<Shard>,
 }
 
-impl OwnImage {
+impl SavedSceneImage {
     /// Computes the keys for the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are
     /// the keys for the surfaces and meshes.
     pub(super) fn new(
-        (parsed, plan, eye): (&Arc<Parsed>, Plan, &RequestCamera),
-        (surfaces, meshes): (&Key, &[Key]),
+        (parsed, plan, eye): (&Arc<ParsedScene>, RenderPlan, &RequestCamera),
+        (surfaces, meshes): (&Fingerprint, &[Fingerprint]),
         (camera, files): (CameraChange, &[FileRead]),
     ) -> Self {
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::referents(&plan.scene, meshes, orbiter.as_deref());
-        let world = keys::world(surfaces, &eye.camera, &of);
-        let film = keys::render(world, &plan.settings, plan.crop);
+        let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
+        let world = keys::world_key(surfaces, &eye.camera, &of);
+        let film = keys::film_key(world, &plan.settings, plan.crop);
         let image = image_key(film, &plan);
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
 
     /// Returns the names and values of everything that affects the image.
-    pub(super) fn identity(&self) -> Vec<Dependency> {
+    pub(super) fn dependencies(&self) -> Vec<Dependency> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
         ImageDependencies { parsed, plan, camera, files, divided }.names_and_values()
@@ -66,21 +66,21 @@ impl OwnImage {
 }
 
 /// Returns the key for a finished image and its output files.
-fn image_key(film: Key, plan: &Plan) -> Key {
+fn image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     let mut key = FingerprintHasher::new("own image");
-    key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
+    key.add_fingerprint(&keys::image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
-        key.choice(*layer);
+        key.add_choice(*layer);
     });
     plan.outputs.iter().for_each(|path| {
-        key.path(path);
+        key.add_path(path);
     });
     key.finish()
 }
 
 impl Engine {
     /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn set_own_image(&mut self, mut own: OwnImage) {
+    pub(super) fn set_saved_scene_image(&mut self, mut own: SavedSceneImage) {
         if self.pins_own {
             self.films.pin(own.film);
         }
@@ -100,61 +100,67 @@ impl Engine {
         &mut self,
         estimate: &MemoryEstimate,
         request: &Request,
-        plans: (&Plan, Option<&Plan>),
-    ) -> Result<(), Stop> {
-        let (plan, bytes) = (plans.0, self.own_film_bytes(request, plans));
-        let all = estimate.clone().with_own_film(bytes).check(plan);
-        self.pins_own = all.is_ok() || !self.is_own_written();
+        plans: (&RenderPlan, Option<&RenderPlan>),
+    ) -> Result<(), StopReason> {
+        let (plan, bytes) = (plans.0, self.saved_scene_film_bytes(request, plans));
+        let all = estimate.clone().with_saved_scene_film(bytes).check(plan);
+        self.pins_own = all.is_ok() || !self.is_saved_scene_image_written();
         let room = if self.pins_own { all? } else { estimate.check(plan)? };
         if !self.pins_own {
             self.films.unpin();
         }
-        self.films.limit(room);
+        self.films.set_byte_limit(room);
         Ok(())
     }
 
     /// Returns the size of the scene's own film in bytes if it is kept in addition to the request's film.
-    fn own_film_bytes(&self, request: &Request, (plan, own_image_plan): (&Plan, Option<&Plan>)) -> u64 {
+    fn saved_scene_film_bytes(
+        &self,
+        request: &Request,
+        (plan, own_image_plan): (&RenderPlan, Option<&RenderPlan>),
+    ) -> u64 {
         let (Some(own), Some(own_image_plan)) = (&self.own, own_image_plan) else { return 0 };
-        let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
-        let is_shared =
-            of(plan) == of(own_image_plan) && request.overrides.camera == own_image_overrides(request).camera;
+        let of = |plan: &RenderPlan| keys::film_key(own.film, &plan.settings, plan.crop);
+        let is_shared = of(plan) == of(own_image_plan)
+            && request.overrides.camera == saved_scene_overrides(request).camera;
         let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
         state.map_or(0, FilmState::memory_bytes)
     }
 
     /// If the scene has been saved since the last request, lets its own image replace an image with keyboard
     /// changes.
-    pub(super) fn note_saves(&mut self, saves: u64) {
+    pub(super) fn handle_scene_saves(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
-            self.written.release();
+            self.written.allow_replacing_all();
         }
     }
 
     /// If the scene's own image is being rendered, records which share of it this process renders.
-    pub(super) fn record_own_share(&mut self, request: &Request, ready: &Ready) {
+    pub(super) fn record_saved_scene_shard(&mut self, request: &Request, ready: &ReadyScene) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
         }
     }
 
     /// Reports the state of the scene's own image while another one is shown.
-    pub(super) fn report_own_image(&self, request: &Request, film: Key, sink: &Sink) {
+    pub(super) fn report_saved_scene_image(&self, request: &Request, film: Fingerprint, sink: &EventSink) {
         let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
-        sink.own_image(match self.films.get(own.film) {
-            _ if self.is_own_written() => OwnImageState::Written,
-            Some(state) if state.has_samples() => OwnImageState::Begun { is_rendering: own.film == film },
-            Some(_) | None => OwnImageState::NotBegun,
+        sink.send_saved_scene_image_state(match self.films.get(own.film) {
+            _ if self.is_saved_scene_image_written() => SavedSceneImageState::Written,
+            Some(state) if state.has_samples() => {
+                SavedSceneImageState::Begun { is_rendering: own.film == film }
+            }
+            Some(_) | None => SavedSceneImageState::NotBegun,
         });
     }
 
     /// Whether the output files contain the current version of the scene's own image.
-    pub(super) fn is_own_written(&self) -> bool {
+    pub(super) fn is_saved_scene_image_written(&self) -> bool {
         self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }
 
     /// Records whether the current plan's output files contain the finished image.
-    pub(super) fn record_own_image_written(&mut self, is_written: bool) {
+    pub(super) fn record_saved_scene_image_written(&mut self, is_written: bool) {
         let own = self.own.as_ref().filter(|_| is_written && self.is_own);
         self.written.own = own.map(|own| own.image);
     }
@@ -162,14 +168,14 @@ impl Engine {
     /// Writes the scene's own image if the current view is based on its finished film.
     ///
     /// # Errors
-    /// Returns [`Stop::Cancelled`] if the token is cancelled.
-    pub(super) fn write_own_image(
+    /// Returns [`StopReason::Cancelled`] if the token is cancelled.
+    pub(super) fn write_saved_scene_image(
         &mut self,
-        sink: &Sink,
+        sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<StageResult<bool>, Stop> {
+    ) -> Result<StageResult<bool>, StopReason> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
-        if self.is_own_written() || self.written.have_image_by_hand(&self.contents) {
+        if self.is_saved_scene_image_written() || self.written.has_user_written_image(&self.contents) {
             return only_shown();
         }
         let (Some(own), Some(state), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
@@ -197,8 +203,8 @@ impl Engine {
     /// passes it a checkpointer.
     pub(super) fn with_checkpointer<T>(
         &self,
-        film: Option<Key>,
-        sink: &Sink,
+        film: Option<Fingerprint>,
+        sink: &EventSink,
         interruption: &dyn Fn() -> Interruption,
         work: impl FnOnce(Option<&Checkpointer<'_>>, &Self) -> T,
     ) -> T {
@@ -207,7 +213,7 @@ impl Engine {
             return work(None, self);
         };
         let finish = develop_settings(&own.plan);
-        let name = || own.identity();
+        let name = || own.dependencies();
         let around = CheckpointContext {
             finish: &finish,
             inputs: &self.inputs,
@@ -220,7 +226,7 @@ impl Engine {
     }
 
     /// Removes the checkpoint of the scene's own image, which has been written.
-    pub(super) fn remove_own_checkpoint(&self, sink: &Sink) {
+    pub(super) fn remove_saved_scene_checkpoint(&self, sink: &EventSink) {
         let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
@@ -231,8 +237,8 @@ impl Engine {
     }
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.
-    pub(crate) fn save_own_checkpoint(&self, sink: &Sink, interruption: Interruption) {
-        let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
+    pub(crate) fn checkpoint_saved_scene_image(&self, sink: &EventSink, interruption: Interruption) {
+        let Some(own) = self.own.as_ref().filter(|_| !self.is_saved_scene_image_written()) else { return };
         let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
         self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
@@ -245,36 +251,39 @@ impl Engine {
 
 /// Whether a plan's render uses checkpoints. The output must be a regular file. In addition, checkpoints must
 /// be enabled, or the render must resume from one.
-fn uses_checkpoints(plan: &Plan) -> bool {
+fn uses_checkpoints(plan: &RenderPlan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
-    let Checkpoints { seconds, resume, .. } = plan.checkpoints;
-    (seconds > 0.0 || resume == Resume::Asked) && is_file
+    let CheckpointSettings { seconds, resume, .. } = plan.checkpoints;
+    (seconds > 0.0 || resume == ResumeMode::Asked) && is_file
 }
 
 /// Returns the plan for the scene's own image if the request shows another one.
 ///
 /// # Errors
-/// Returns the errors from [`plan`].
-pub(super) fn own_image_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
-    let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
+/// Returns the errors from [`resolve_plan`].
+pub(super) fn saved_scene_plan(
+    request: &Request,
+    parsed: &ParsedScene,
+) -> Result<Option<RenderPlan>, StopReason> {
+    let plan = |own: &Overrides| resolve_plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
-    own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
+    own.map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))
 }
 
 /// Returns the textures that a request needs. These include the textures for the scene's own image, because
 /// its film key depends on them.
-pub(super) fn needed_textures(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
-    let shown = plan.settings.lookups();
-    own.map_or(shown, |own| shown.or(own.settings.lookups()))
+pub(super) fn texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> TextureNeeds {
+    let shown = plan.settings.texture_needs();
+    own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }
 
 /// Returns the overrides that apply to the scene's own image.
-pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
+pub(super) fn saved_scene_overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }
 
 /// Whether the scene's own image should be written.
-pub(super) fn should_write_own_image(request: &Request) -> bool {
+pub(super) fn should_write_saved_scene_image(request: &Request) -> bool {
     request.own.is_some() || request.write != WriteMode::No
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc;
 
 use super::*;
 use crate::protocol::{PreviewSlot, WriteMode};
-use crate::session::NoOrders;
+use crate::session::NoPendingCommands;
 use crate::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
 
@@ -41,7 +41,7 @@ impl EngineFixture {
     fn send_unsaved(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 1, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default(), within: None };
         let request = Request {
             generation: 1,
             scene,
@@ -54,7 +54,7 @@ impl EngineFixture {
             first: None,
         };
         let token = CancelToken::new();
-        self.engine.request(&request, &sink, &RequestContext::new(&token, &token, &NoOrders));
+        self.engine.handle_request(&request, &sink, &RequestContext::new(&token, &token, &NoPendingCommands));
         received.try_iter().collect()
     }
 
@@ -197,9 +197,9 @@ fn check_never_mixes_file_versions() {
         let replacement = (scene.clone(), renamed.clone().into_bytes());
         fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
         let events = mpsc::channel().0;
-        let sink = Sink { generation: 1, events, previews: PreviewSlot::default(), within: None };
-        let read = fixture.engine.read_all(&scene, &[], &sink, &CancelToken::new());
+        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default(), within: None };
+        let read = fixture.engine.load_all_assets(&scene, &[], &sink, &CancelToken::new());
         let (parsed, ..) = read.expect("a valid scene");
-        assert_eq!(parsed.loaded.source.text(), renamed);
+        assert_eq!(parsed.loaded.source.file_text(), renamed);
     }
 }

@@ -4,19 +4,19 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::outputs::remove_outdated_report;
-use super::own::{needed_textures, own_image_plan};
+use super::own::{saved_scene_plan, texture_needs};
 use super::{Engine, RequestContext};
 use crate::control::Cancelled;
 use crate::memory::MemoryEstimate;
-use crate::plan::plan;
+use crate::plan::resolve_plan;
 use crate::protocol::{Event, LastValidSceneOutcome, Request, Status};
-use crate::sink::Sink;
-use crate::stages::containers::Containers;
+use crate::sink::EventSink;
+use crate::stages::containers::GltfContainers;
 use crate::stages::meshes::Meshes;
-use crate::stages::parse::Parsed;
-use crate::stages::textures::{NeededTextures, Textures, needed, textures};
-use crate::stages::{FileReadContext, Findings, Stop};
-use crate::table::StageTable;
+use crate::stages::parse::ParsedScene;
+use crate::stages::textures::{NeededTextures, Textures, find_needed_textures, load_textures};
+use crate::stages::{FileReadContext, Findings, StopReason};
+use crate::table::StageRunner;
 use crate::watch::content::{FileRead, Snapshot};
 use crate::world::{GlassSolids, TextureNeeds};
 
@@ -25,7 +25,7 @@ use crate::world::{GlassSolids, TextureNeeds};
 pub(super) struct LastValidScene {
     /// Generation of the request that read the scene.
     pub(super) generation: u64,
-    pub(super) parsed: Arc<Parsed>,
+    pub(super) parsed: Arc<ParsedScene>,
     pub(super) meshes: Meshes,
     pub(super) bodies: Arc<GlassSolids>,
     pub(super) textures: Arc<Textures>,
@@ -37,7 +37,7 @@ pub(super) struct LastValidScene {
 
 impl LastValidScene {
     /// Whether a file other than the scene file has changed since it was read.
-    fn has_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
+    fn have_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
         let loaded = &self.parsed.loaded;
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
         for FileRead { path, content } in &self.files {
@@ -56,14 +56,14 @@ impl Engine {
     pub(super) fn try_last_valid_scene(
         &mut self,
         newest: &Request,
-        sink: &Sink,
+        sink: &EventSink,
         context: &RequestContext<'_>,
     ) {
-        let before = self.shown_image();
+        let before = self.current_image_key();
         // Drop errors from this render, because the failed request has already reported its own.
         let end = match self.render_last_valid_scene(newest, sink, context) {
             Ok(Some(is_reused)) => {
-                LastValidSceneOutcome::Finished { unchanged: is_reused && self.shown_image() == before }
+                LastValidSceneOutcome::Finished { unchanged: is_reused && self.current_image_key() == before }
             }
             Ok(None) | Err(_) => LastValidSceneOutcome::Stopped,
         };
@@ -75,31 +75,31 @@ impl Engine {
     fn render_last_valid_scene(
         &mut self,
         newest: &Request,
-        sink: &Sink,
+        sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Option<bool>, Stop> {
+    ) -> Result<Option<bool>, StopReason> {
         let is_it = |good: &&LastValidScene| good.parsed.loaded.path == newest.scene;
         let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(None) };
         let request = Request { force: false, ..newest.clone() };
         // Plan the request for the last valid scene.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
-        let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
-        let own = own_image_plan(&request, &good.parsed)?;
+        let Ok(plan) = resolve_plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
+        let own = saved_scene_plan(&request, &good.parsed)?;
         // Load the textures needed for another view if their files are still valid.
         let pool = self.thread_pool(plan.threads)?;
-        let snapshot = Snapshot::of(Arc::clone(&self.contents));
-        let containers = Containers::default();
+        let snapshot = Snapshot::new(Arc::clone(&self.contents));
+        let containers = GltfContainers::default();
         let token = context.token;
         let reading =
             FileReadContext { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
-        let lookups = needed_textures(&plan, own.as_ref());
+        let lookups = texture_needs(&plan, own.as_ref());
         let Some(good) = self.load_missing_textures(good, lookups, &reading)? else { return Ok(None) };
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
-        let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, meshes, texture_bytes);
+        let estimate = MemoryEstimate::for_scene(&plan, &plan.scene, meshes, texture_bytes);
         self.check_memory(&estimate, &request, (&plan, own.as_ref()))?;
         // Prepare the scene, reusing unchanged values.
-        let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: true };
-        let ready = self.build(&request, &good, (plan, own), &mut table, &reading)?;
+        let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: true };
+        let ready = self.build_world(&request, &good, (plan, own), &mut table, &reading)?;
         let photons = self.trace_photons(&request, &ready, &mut table, sink, context)?;
         // Render and write.
         let rendered = self.render(&request, &ready, photons, sink, context)?;
@@ -124,20 +124,20 @@ impl Engine {
         good: LastValidScene,
         lookups: TextureNeeds,
         reading: &FileReadContext<'_>,
-    ) -> Result<Option<LastValidScene>, Stop> {
+    ) -> Result<Option<LastValidScene>, StopReason> {
         let loaded = &good.parsed.loaded;
-        let needed = needed(loaded, &good.meshes, lookups, &self.textures);
+        let needed = find_needed_textures(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);
         if needed.textures.iter().all(is_there) {
             return Ok(Some(good));
         }
-        if good.has_changed(reading)? {
+        if good.have_files_changed(reading)? {
             return Ok(None);
         }
         let mut findings = Findings::default();
-        let found = textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
+        let found = load_textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
         reading.contents.verify(reading.token)?;
-        if reading.contents.changed().is_some() {
+        if reading.contents.changed_file().is_some() {
             return Ok(None);
         }
         // A texture is missing here if its file has since become invalid.

@@ -2,7 +2,7 @@
 
 use super::toml::round_significant;
 use crate::math::DVec3;
-use crate::settings::Side;
+use crate::settings::ViewSide;
 use crate::turntable::TurntableFrame;
 
 /// Vertical field of view in degrees.
@@ -25,9 +25,9 @@ pub(super) struct CameraPose {
     pub(super) up: DVec3,
 }
 
-impl Side {
+impl ViewSide {
     /// Direction from the model to the camera, and the image's up vector. The model's front faces +z.
-    fn axes(self) -> (DVec3, DVec3) {
+    fn view_and_up_axes(self) -> (DVec3, DVec3) {
         match self {
             Self::Front => (DVec3::Z, DVec3::Y),
             Self::Back => (DVec3::NEG_Z, DVec3::Y),
@@ -45,10 +45,10 @@ impl Side {
 pub(super) fn frame_model(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],
-    (from, turns): (Side, u32),
+    (from, turns): (ViewSide, u32),
     aspect: f64,
 ) -> CameraPose {
-    let (back, up) = from.axes();
+    let (back, up) = from.view_and_up_axes();
     let middle = (least + greatest) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
     // Move the camera back until every point is inside the frame.
@@ -67,12 +67,12 @@ pub(super) fn frame_model(
     // Drop digits that make no visible difference.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimal_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
 /// Rounds to a multiple of the largest power of ten that does not exceed `step`.
-pub(super) fn round_to_step(value: f64, step: f64) -> f64 {
+pub(super) fn round_to_decimal_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
     // Dividing by a power of ten produces fewer digits than multiplying by its reciprocal.
@@ -116,7 +116,15 @@ mod tests {
     #[test]
     fn corners_fill_the_frame() {
         let bounds = [DVec3::new(-1.0, 2.0, -3.0), DVec3::new(4.0, 3.0, 0.5)];
-        for from in [Side::Front, Side::Back, Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Iso] {
+        for from in [
+            ViewSide::Front,
+            ViewSide::Back,
+            ViewSide::Left,
+            ViewSide::Right,
+            ViewSide::Top,
+            ViewSide::Bottom,
+            ViewSide::Iso,
+        ] {
             for aspect in [0.5, 1.0, 4.0 / 3.0, 3.0] {
                 let corners: Vec<DVec3> = (0..8)
                     .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
@@ -146,24 +154,24 @@ mod tests {
         let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
         let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
         let distance = |turns| {
-            let eye = frame_model(bounds, &corners, (Side::Front, turns), 1.0);
+            let eye = frame_model(bounds, &corners, (ViewSide::Front, turns), 1.0);
             (eye.position - eye.look_at).length()
         };
-        let side = frame_model(bounds, &corners, (Side::Right, 1), 1.0);
+        let side = frame_model(bounds, &corners, (ViewSide::Right, 1), 1.0);
         let of_side = (side.position - side.look_at).length();
         assert!(distance(1) < 0.6 * of_side && distance(4) >= of_side - 1e-3, "{} {of_side}", distance(4));
     }
 
     #[test]
     fn insignificant_digits_are_dropped() {
-        assert_eq!(round_to_step(1.234_567_8, 3e-4), 1.2346);
-        assert_eq!(round_to_step(-12_345.678, 30.0), -12_350.0);
+        assert_eq!(round_to_decimal_step(1.234_567_8, 3e-4), 1.2346);
+        assert_eq!(round_to_decimal_step(-12_345.678, 30.0), -12_350.0);
     }
 
     /// A plane lit only by the sky and the key light has the sky's radiance.
     #[test]
     fn ground_is_as_bright_as_the_sky() {
-        let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
+        let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (ViewSide::Iso, 1), 1.0);
         let direction = key_light_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;

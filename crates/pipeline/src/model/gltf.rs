@@ -4,12 +4,12 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::Path;
 
-use super::frame::{frame_model, round_to_step};
+use super::frame::{frame_model, round_to_decimal_step};
 use super::materials::{MaterialWriter, TextureFile};
 use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
 use super::{
-    CameraPose, FOV, Lighting, ModelText, ModelView, ROUGH, SIZE, UniqueNames, file_name, render,
-    write_camera, write_ground, write_lights,
+    CameraPose, FOV, GeneratedScene, Lighting, ModelView, ROUGH, SIZE, UniqueNames, file_name, write_camera,
+    write_ground, write_lights, write_render_settings,
 };
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
@@ -21,13 +21,13 @@ use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::messages::INVISIBLE_MODEL;
 use crate::scene::keys::endings::MAPS;
-use crate::scene::toml_string;
-use crate::settings::Side;
-use crate::stages::containers::Containers;
+use crate::scene::quote_toml_string;
+use crate::settings::ViewSide;
+use crate::stages::containers::GltfContainers;
 
 /// Storage for the generated scene's meshes and images.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ExportNaming {
+pub(crate) enum ExportStorage {
     /// In the glTF file and the files it references.
     Inside,
     /// In separate files in this folder, next to the scene.
@@ -55,17 +55,17 @@ pub(crate) enum ExportSource {
 /// Converts a glTF file to scene text.
 pub(super) fn scene_text(
     path: &Path,
-    (show, naming): (ModelView, &ExportNaming),
-    containers: &Containers,
+    (show, naming): (ModelView, &ExportStorage),
+    containers: &GltfContainers,
     token: &CancelToken,
-) -> Result<ModelText, AssetError> {
+) -> Result<GeneratedScene, AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
-    let scene = container.scene(token)?;
+    let scene = container.convert_scene(token)?;
     let Some(bounds) = scene.bounds else {
         let reason = "its scene has no visible faces".to_owned();
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     };
-    let mut writer = Writer {
+    let mut writer = SceneWriter {
         container: &container,
         path,
         naming,
@@ -78,23 +78,24 @@ pub(super) fn scene_text(
         companions: container.companions().to_vec(),
     };
     writer.write(&scene, bounds, show);
-    let Writer { toml, assets, images, companions, .. } = writer;
-    let is_fully_transparent = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
+    let SceneWriter { toml, assets, images, companions, .. } = writer;
+    let is_fully_transparent =
+        scene.instances.iter().all(|one| is_fully_transparent(&scene.materials[one.material]));
     let ModelScene { mut notes, .. } = scene;
     match naming {
         // Previews tolerate unreadable images, but imports do not.
-        ExportNaming::Inside => notes.extend(is_fully_transparent.then(|| INVISIBLE_MODEL.to_owned())),
-        ExportNaming::Folder(_) => {
+        ExportStorage::Inside => notes.extend(is_fully_transparent.then(|| INVISIBLE_MODEL.to_owned())),
+        ExportStorage::Folder(_) => {
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
     }
-    Ok(ModelText { text: toml.finish(), hash: container.hash(), companions, notes, assets })
+    Ok(GeneratedScene { text: toml.finish(), hash: container.hash(), companions, notes, assets })
 }
 
-struct Writer<'a> {
+struct SceneWriter<'a> {
     container: &'a GltfFile,
     path: &'a Path,
-    naming: &'a ExportNaming,
+    naming: &'a ExportStorage,
     toml: TomlWriter,
     /// File names already used in the folder.
     files: UniqueNames,
@@ -107,7 +108,7 @@ struct Writer<'a> {
     companions: Vec<Companion>,
 }
 
-impl Writer<'_> {
+impl SceneWriter<'_> {
     fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: ModelView) {
         // Describe the model and its approximations.
         self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
@@ -121,10 +122,10 @@ impl Writer<'_> {
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
-            true => Lighting::Default { is_polished: scene.materials.iter().any(is_polished) },
-            false => Lighting::from_file(irradiance(&scene.lights, bounds)),
+            true => Lighting::Default { is_polished: scene.materials.iter().any(may_cast_caustics) },
+            false => Lighting::from_file(max_irradiance(&scene.lights, bounds)),
         };
-        render(&mut self.toml, size, lighting);
+        write_render_settings(&mut self.toml, size, lighting);
         let eye = match own {
             Some(own) => {
                 let eye = camera_pose(own, bounds);
@@ -135,7 +136,7 @@ impl Writer<'_> {
                 let eye = frame_model(
                     bounds,
                     &scene.outline,
-                    (show.from.unwrap_or(Side::Iso), show.turns),
+                    (show.from.unwrap_or(ViewSide::Iso), show.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
                 write_camera(&mut self.toml, &eye, FOV);
@@ -144,7 +145,7 @@ impl Writer<'_> {
         };
         write_lights(&mut self.toml, &eye, lighting);
         if !scene.lights.is_empty() {
-            self.toml.section("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
+            self.toml.section_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.write_light(light));
         // Write the materials, then the meshes that use them.
@@ -188,20 +189,20 @@ impl Writer<'_> {
     fn write_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UniqueNames) {
         self.toml.table("[[mesh]]");
         if !instance.name.is_empty() {
-            self.toml.key("name", toml_string(&shapes.name(&instance.name, "mesh")));
+            self.toml.key("name", quote_toml_string(&shapes.make_unique(&instance.name, "mesh")));
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
         match self.naming {
-            ExportNaming::Inside => {
-                self.toml.key("file", toml_string(&file_name(self.path)));
+            ExportStorage::Inside => {
+                self.toml.key("file", quote_toml_string(&file_name(self.path)));
                 self.toml.key("part", instance.part.to_string());
             }
-            ExportNaming::Folder(_) => {
+            ExportStorage::Folder(_) => {
                 let name = self.add_asset(ExportSource::Part(instance.part), base, "ply");
-                self.toml.key("file", toml_string(&name));
+                self.toml.key("file", quote_toml_string(&name));
             }
         }
-        self.toml.key("material", toml_string(material));
+        self.toml.key("material", quote_toml_string(material));
         self.write_placement(&instance.placed.linear, instance.placed.translate);
         if !instance.has_normals {
             self.toml.key("smooth", "false");
@@ -239,38 +240,38 @@ impl Writer<'_> {
             return known.clone();
         }
         let folder = match self.naming {
-            ExportNaming::Inside => String::new(),
-            ExportNaming::Folder(folder) => format!("{folder}/"),
+            ExportStorage::Inside => String::new(),
+            ExportStorage::Folder(folder) => format!("{folder}/"),
         };
         let plain: String =
             wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
         let plain = plain.trim_matches('.').chars().take(60).collect::<String>().to_lowercase();
-        let name = format!("{folder}{}.{ending}", self.files.name(&plain, "part"));
+        let name = format!("{folder}{}.{ending}", self.files.make_unique(&plain, "part"));
         self.assets.push(ExportedFile { name: name.clone(), content });
         self.names.insert(content, name.clone());
         name
     }
 }
 
-impl super::materials::ExportFiles for Writer<'_> {
+impl super::materials::SceneExport for SceneWriter<'_> {
     fn toml(&mut self) -> &mut TomlWriter {
         &mut self.toml
     }
 
     fn image_name(&self, image: usize) -> String {
         let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
-        let of_file = || match self.container.image(image) {
+        let of_file = || match self.container.locate_image(image) {
             Ok(ImageBytes::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
             Ok(ImageBytes::Inside(_)) | Err(_) => None,
         };
         name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
     }
 
-    fn image(&mut self, image: usize) -> TextureFile {
+    fn image_file(&mut self, image: usize) -> TextureFile {
         self.images.insert(image);
-        let bytes = self.container.image(image);
+        let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {
-            (ExportNaming::Inside, Ok(ImageBytes::File(file)))
+            (ExportStorage::Inside, Ok(ImageBytes::File(file)))
                 if has_image_extension(&file) && file.is_file() =>
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
@@ -279,13 +280,13 @@ impl super::materials::ExportFiles for Writer<'_> {
             }
             // A file without an image extension is read through the glTF file, so that its format is detected
             // from its content. A missing file is watched until it appears.
-            (ExportNaming::Inside, bytes) => {
+            (ExportStorage::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None, stamp: None });
                 }
                 TextureFile { file: file_name(self.path), image: Some(image) }
             }
-            (ExportNaming::Folder(_), bytes) => {
+            (ExportStorage::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => image_extension(bytes).to_owned(),
                     Ok(ImageBytes::File(path)) => {
@@ -310,7 +311,7 @@ fn has_image_extension(file: &Path) -> bool {
 }
 
 /// Whether a material is fully transparent everywhere.
-fn is_clear(material: &ModelMaterial) -> bool {
+fn is_fully_transparent(material: &ModelMaterial) -> bool {
     let is_clear = match &material.alpha {
         Alpha::Opaque => false,
         Alpha::Mask { value, cutoff } => value.factor.x < *cutoff,
@@ -320,7 +321,7 @@ fn is_clear(material: &ModelMaterial) -> bool {
 }
 
 /// Whether a material may cast caustics. Assumes that a texture may contain any value up to its factor.
-fn is_polished(material: &ModelMaterial) -> bool {
+fn may_cast_caustics(material: &ModelMaterial) -> bool {
     let is_smooth = |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < ROUGH;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
     let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
@@ -329,7 +330,7 @@ fn is_polished(material: &ModelMaterial) -> bool {
 
 /// Upper bound on the total irradiance at the center of a bounding box, assuming normal incidence from all
 /// lights. Distances to lights are clamped to at least a quarter of the box's diagonal.
-fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
+fn max_irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
     let of_light = |light: &ModelLight| {
         let luminance = f64::from(luminance(light.intensity.as_vec3()));
@@ -346,7 +347,7 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
 
 /// Reads the first bytes of a file. Returns `None` if this fails.
 fn first_bytes(path: &Path) -> Option<[u8; 4]> {
-    let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
+    let (mut file, _) = crate::system::file::open_regular_file(path).ok()?.ok()?;
     let mut start = [0; 4];
     file.read_exact(&mut start).ok().map(|()| start)
 }
@@ -373,7 +374,7 @@ fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPos
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimal_step(part, step)));
     let up = if (camera.up - DVec3::Y).length() < 1e-6 || has_no_roll(camera) { DVec3::Y } else { camera.up };
     CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }

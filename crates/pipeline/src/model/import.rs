@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use super::gltf::{ExportNaming, ExportSource};
-use super::{ModelText, ModelView, in_generated_scene};
+use super::gltf::{ExportSource, ExportStorage};
+use super::{GeneratedScene, ModelView, mark_as_generated_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, ignore_progress};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_generated;
-use crate::stages::containers::Containers;
+use crate::stages::containers::GltfContainers;
 use crate::system::threads::core_pool;
 
 /// An imported scene, ready to be written.
 #[derive(Debug)]
-pub struct Imported {
+pub struct ImportedScene {
     /// Scene text. Its paths are relative to the scene file.
     pub text: String,
     /// Files referenced by the text, with paths relative to the scene file.
@@ -37,16 +37,16 @@ pub enum ImportError {
 ///
 /// # Errors
 /// The file is invalid, the machine lacks resources, or the token is cancelled.
-pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported, ImportError> {
+pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<ImportedScene, ImportError> {
     if !is_gltf(path) {
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());
         return Err(ImportError::File(message));
     }
     let pool = core_pool().map_err(ImportError::Work)?;
-    let containers = Containers::default();
-    let naming = ExportNaming::Folder(folder.to_owned());
+    let containers = GltfContainers::default();
+    let naming = ExportStorage::Folder(folder.to_owned());
     let read = || {
-        let ModelText { text, notes, assets, .. } =
+        let GeneratedScene { text, notes, assets, .. } =
             super::gltf::scene_text(path, (ModelView::default(), &naming), &containers, token)?;
         check_scene(path, &containers, token)?;
         let container = containers.open(path, &ignore_progress, token)?;
@@ -54,7 +54,7 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         for asset in assets {
             let bytes = match asset.content {
                 ExportSource::Part(part) => {
-                    write::encode_ply(&container.part(part, &ignore_progress, token)?.mesh)
+                    write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
                 }
                 ExportSource::Image(image) => {
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
@@ -65,7 +65,7 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
             };
             files.push((PathBuf::from(asset.name), bytes));
         }
-        Ok(Imported { text, files, notes })
+        Ok(ImportedScene { text, files, notes })
     };
     pool.install(read).map_err(|error: AssetError| match error {
         AssetError::OutOfMemory { .. } => ImportError::Work(error.to_string()),
@@ -77,9 +77,9 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
 
 /// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` would render, because
 /// the files referenced by that text already exist.
-fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
+fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) -> Result<(), AssetError> {
     let shown =
-        super::gltf::scene_text(path, (ModelView::default(), &ExportNaming::Inside), containers, token)?;
+        super::gltf::scene_text(path, (ModelView::default(), &ExportStorage::Inside), containers, token)?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
     // Ignore errors about file names, because the imported scene uses different ones.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
@@ -87,6 +87,6 @@ fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Res
     Err(AssetError::Malformed {
         path: path.to_owned(),
         line: None,
-        reason: in_generated_scene(first).message,
+        reason: mark_as_generated_scene(first).message,
     })
 }

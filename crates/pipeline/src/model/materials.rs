@@ -6,16 +6,16 @@ use super::UniqueNames;
 use super::toml::{TomlWriter, format_color, format_key, format_number, format_pair};
 use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
-use crate::scene::toml_string;
+use crate::scene::quote_toml_string;
 
 /// Access to the scene text and image files while materials are being written.
-pub(super) trait ExportFiles {
+pub(super) trait SceneExport {
     /// The scene text.
     fn toml(&mut self) -> &mut TomlWriter;
     /// Name of an image, without an extension.
     fn image_name(&self, image: usize) -> String;
     /// The file that contains an image.
-    fn image(&mut self, image: usize) -> TextureFile;
+    fn image_file(&mut self, image: usize) -> TextureFile;
 }
 
 /// A texture's file.
@@ -36,7 +36,7 @@ enum TextureUse {
 }
 
 /// Keys and values of a table.
-type TableKeys = Vec<(&'static str, String)>;
+type TomlEntries = Vec<(&'static str, String)>;
 
 /// Identity of a texture: its image, its use and its other table keys.
 type TextureIdentity = (usize, TextureUse, String);
@@ -48,7 +48,7 @@ pub(super) struct MaterialWriter<'a, F> {
     names: UniqueNames,
 }
 
-impl<F: ExportFiles> MaterialWriter<'_, F> {
+impl<F: SceneExport> MaterialWriter<'_, F> {
     /// Writes the tables and returns the material names.
     pub(super) fn write(scene: &ModelScene, names: &mut UniqueNames, files: &mut F) -> Vec<String> {
         let mut all = MaterialWriter { files, textures: HashMap::new(), names: UniqueNames::default() };
@@ -56,7 +56,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
             .materials
             .iter()
             .map(|material| {
-                let name = names.name(&material.name, "material");
+                let name = names.make_unique(&material.name, "material");
                 all.write_material(material, &name);
                 name
             })
@@ -65,7 +65,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
 
     fn write_material(&mut self, material: &ModelMaterial, name: &str) {
         // Collect the keys first, because texture tables must precede the material's table.
-        let mut keys = TableKeys::new();
+        let mut keys = TomlEntries::new();
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "\"glass\"".to_owned()));
@@ -85,7 +85,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
         keys.iter().for_each(|(key, value)| toml.key(key, value));
     }
 
-    fn write_principled(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
+    fn write_principled(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
         keys.push(("type", "\"principled\"".to_owned()));
         self.push_color(keys, ("color", 0.8), &material.color);
         self.push_number(keys, ("metallic", 0.0), &material.metallic, "b");
@@ -100,7 +100,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
     }
 
     /// Adds the keys that all material types share.
-    fn write_common_keys(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
+    fn write_common_keys(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
@@ -112,7 +112,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
                     } else {
                         format!(", scale = {}", format_color(scale))
                     };
-                    keys.push(("emission", format!("{{ texture = {}{scale} }}", toml_string(&name))));
+                    keys.push(("emission", format!("{{ texture = {}{scale} }}", quote_toml_string(&name))));
                 }
                 None => keys.push(("emission", format_color(emission.factor))),
             }
@@ -122,7 +122,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
         }
         if let Some(normal) = &material.normal {
             let name = self.write_texture(normal, TextureUse::Normals, DVec3::ONE);
-            keys.push(("normal_map", toml_string(&name)));
+            keys.push(("normal_map", quote_toml_string(&name)));
             if material.normal_strength != 1.0 {
                 keys.push(("normal_strength", format_number(material.normal_strength)));
             }
@@ -144,7 +144,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
     }
 
     /// Writes the opacity, which uses the alpha channel of a texture if there is one.
-    fn write_opacity(&mut self, keys: &mut TableKeys, value: &TexturedValue, color: &TexturedValue) {
+    fn write_opacity(&mut self, keys: &mut TomlEntries, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
                 // Without factors, color and alpha can share a texture table.
@@ -155,18 +155,26 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
                     TextureUse::Numbers
                 };
                 let name = self.write_texture(texture, use_, value.factor);
-                keys.push(("opacity", format!("{{ texture = {}, channel = \"a\" }}", toml_string(&name))));
+                keys.push((
+                    "opacity",
+                    format!("{{ texture = {}, channel = \"a\" }}", quote_toml_string(&name)),
+                ));
             }
             None if value.factor != DVec3::ONE => keys.push(("opacity", format_number(value.factor.x))),
             None => {}
         }
     }
 
-    fn push_color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &TexturedValue) {
+    fn push_color(
+        &mut self,
+        keys: &mut TomlEntries,
+        (key, usual): (&'static str, f64),
+        slot: &TexturedValue,
+    ) {
         match &slot.texture {
             Some(texture) => {
                 let name = self.write_texture(texture, TextureUse::Colors, slot.factor);
-                keys.push((key, format!("{{ texture = {} }}", toml_string(&name))));
+                keys.push((key, format!("{{ texture = {} }}", quote_toml_string(&name))));
             }
             None if slot.factor != DVec3::splat(usual) => {
                 let most = if key == "color" { slot.factor.min(DVec3::ONE) } else { slot.factor };
@@ -178,7 +186,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
 
     fn push_number(
         &mut self,
-        keys: &mut TableKeys,
+        keys: &mut TomlEntries,
         (key, usual): (&'static str, f64),
         slot: &TexturedValue,
         channel: &str,
@@ -186,7 +194,10 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
         match &slot.texture {
             Some(texture) => {
                 let name = self.write_texture(texture, TextureUse::Numbers, slot.factor);
-                keys.push((key, format!("{{ texture = {}, channel = \"{channel}\" }}", toml_string(&name))));
+                keys.push((
+                    key,
+                    format!("{{ texture = {}, channel = \"{channel}\" }}", quote_toml_string(&name)),
+                ));
             }
             None if slot.factor.x != usual => keys.push((key, format_number(slot.factor.x))),
             None => {}
@@ -195,7 +206,7 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
 
     /// Returns a texture's name. Writes its table if it is new.
     fn write_texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
-        let mut keys = TableKeys::new();
+        let mut keys = TomlEntries::new();
         if texture.is_nearest {
             keys.push(("filter", "\"nearest\"".to_owned()));
         }
@@ -225,11 +236,11 @@ impl<F: ExportFiles> MaterialWriter<'_, F> {
             return known.clone();
         }
         let wanted = self.files.image_name(texture.image);
-        let name = self.names.name(&wanted, "image");
-        let TextureFile { file, image } = self.files.image(texture.image);
+        let name = self.names.make_unique(&wanted, "image");
+        let TextureFile { file, image } = self.files.image_file(texture.image);
         let toml = self.files.toml();
         toml.table(&format!("[textures.{}]", format_key(&name)));
-        toml.key("file", toml_string(&file));
+        toml.key("file", quote_toml_string(&file));
         if let Some(image) = image {
             toml.key("image", image.to_string());
         }

@@ -12,10 +12,10 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_direction};
-use self::gltf::{ExportNaming, ExportedFile};
+use self::gltf::{ExportStorage, ExportedFile};
 use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
-use super::settings::{Overrides, Side, UpAxis};
-use super::stages::containers::Containers;
+use super::settings::{Overrides, UpAxis, ViewSide};
+use super::stages::containers::GltfContainers;
 use crate::assets::gltf::is_gltf;
 use crate::assets::{AssetError, Companion, FileHash};
 use crate::control::CancelToken;
@@ -26,9 +26,9 @@ use crate::scene::fingerprint::FingerprintHasher;
 /// View of a model, as specified on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelView {
-    /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if the file has no
+    /// Side facing the camera. `None` uses the camera from the file, or [`ViewSide::Iso`] if the file has no
     /// camera.
-    pub(crate) from: Option<Side>,
+    pub(crate) from: Option<ViewSide>,
     /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
     /// Up axis of a mesh file. `None` uses the format's default.
@@ -48,7 +48,7 @@ impl Default for ModelView {
 
 impl ModelView {
     /// Returns the view specified on the command line.
-    pub(crate) fn of(overrides: &Overrides) -> Self {
+    pub(crate) fn from_overrides(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
             (None, None) => None,
             (width, height) => {
@@ -65,22 +65,22 @@ impl ModelView {
     }
 
     /// Adds all fields to a fingerprint.
-    pub(crate) fn add_to(self, key: &mut FingerprintHasher) {
-        key.flag(self.from.is_some());
+    pub(crate) fn add_to_fingerprint(self, key: &mut FingerprintHasher) {
+        key.add_bool(self.from.is_some());
         if let Some(from) = self.from {
-            key.choice(from);
+            key.add_choice(from);
         }
-        key.flag(self.up.is_some());
+        key.add_bool(self.up.is_some());
         if let Some(up) = self.up {
-            key.choice(up);
+            key.add_choice(up);
         }
-        key.f64(self.aspect.unwrap_or_default()).u64(self.turns.into());
+        key.add_f64(self.aspect.unwrap_or_default()).add_u64(self.turns.into());
     }
 }
 
 /// A model's scene text and the files it depends on.
 #[derive(Debug)]
-pub(crate) struct ModelText {
+pub(crate) struct GeneratedScene {
     /// The scene text.
     pub(crate) text: String,
     /// Hash of the model file.
@@ -100,21 +100,21 @@ pub(crate) struct ModelText {
 pub(crate) fn scene_text(
     path: &Path,
     show: ModelView,
-    containers: &Containers,
+    containers: &GltfContainers,
     token: &CancelToken,
-) -> Result<ModelText, AssetError> {
+) -> Result<GeneratedScene, AssetError> {
     if is_gltf(path) {
         if show.up.is_some_and(|up| up != UpAxis::Y) {
             let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();
             return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
         }
-        return gltf::scene_text(path, (show, &ExportNaming::Inside), containers, token);
+        return gltf::scene_text(path, (show, &ExportStorage::Inside), containers, token);
     }
     plain::scene_text(path, show, containers, token)
 }
 
 /// Marks a diagnostic as coming from the generated scene, which is not stored in a file.
-pub(crate) fn in_generated_scene(diagnostic: Diagnostic) -> Diagnostic {
+pub(crate) fn mark_as_generated_scene(diagnostic: Diagnostic) -> Diagnostic {
     Diagnostic {
         message: format!("in the scene generated for this model, {}", diagnostic.message),
         ..diagnostic
@@ -163,7 +163,7 @@ impl Lighting {
     }
 
     /// Radiance of the sky.
-    fn sky(self) -> f64 {
+    fn sky_radiance(self) -> f64 {
         match self {
             Self::Default { .. } => SKY,
             Self::FromFile { exposure } => round_significant(SKY * libm::exp2(-exposure), 3),
@@ -172,7 +172,7 @@ impl Lighting {
 }
 
 /// Writes the `[render]` table.
-fn render(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
+fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
         toml.key("width", width.to_string());
@@ -205,7 +205,7 @@ fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
 /// Writes a sky, plus a key light if the model has no lights.
 fn write_lights(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
-    toml.key("color", format_number(light.sky()));
+    toml.key("color", format_number(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
         toml.table("[[light]]");
         toml.key("type", "\"directional\"");
@@ -227,11 +227,14 @@ fn write_ground(
     if eye.position.y <= height {
         return;
     }
-    let name = names.name("ground", "ground");
+    let name = names.make_unique("ground", "ground");
     toml.table(&format!("[materials.{name}]"));
     toml.key("diffuse", format_number(ground_reflectance()));
     toml.table("[[plane]]");
-    toml.key("point", format_exact_vector(DVec3::new(0.0, frame::round_to_step(height, size * 1e-5), 0.0)));
+    toml.key(
+        "point",
+        format_exact_vector(DVec3::new(0.0, frame::round_to_decimal_step(height, size * 1e-5), 0.0)),
+    );
     toml.key("material", format!("\"{name}\""));
 }
 
@@ -242,7 +245,7 @@ struct UniqueNames(HashSet<String>);
 impl UniqueNames {
     /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
     /// a number.
-    fn name(&mut self, wanted: &str, usual: &str) -> String {
+    fn make_unique(&mut self, wanted: &str, usual: &str) -> String {
         let plain: String = wanted.chars().filter(|c| !c.is_control()).take(100).collect();
         let plain = plain.trim();
         let is_name = plain.parse::<f64>().is_err() && !plain.is_empty();

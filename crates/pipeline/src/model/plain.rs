@@ -7,17 +7,17 @@ use std::path::Path;
 use super::frame::frame_model;
 use super::toml::TomlWriter;
 use super::{
-    FOV, Lighting, ModelText, ModelView, NARROW, ROUGH, SIZE, UniqueNames, file_name, render, write_camera,
-    write_ground, write_lights,
+    FOV, GeneratedScene, Lighting, ModelView, NARROW, ROUGH, SIZE, UniqueNames, file_name, write_camera,
+    write_ground, write_lights, write_render_settings,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::toml_string;
-use crate::settings::{Side, UpAxis};
-use crate::stages::containers::Containers;
+use crate::scene::quote_toml_string;
+use crate::settings::{UpAxis, ViewSide};
+use crate::stages::containers::GltfContainers;
 
 /// Default up axis: z for STL (the CAD and 3D printing convention) and for PLY files exported by Blender, y
 /// for all others.
@@ -58,7 +58,7 @@ impl UpAxis {
 }
 
 /// Whether a material from a mesh file may cast caustics.
-fn is_polished(material: &FileMaterial) -> bool {
+fn may_cast_caustics(material: &FileMaterial) -> bool {
     let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
     match &material.physical {
         Some(own) => {
@@ -85,10 +85,10 @@ fn is_fully_transparent(loaded: &LoadedMesh) -> bool {
 pub(super) fn scene_text(
     path: &Path,
     show: ModelView,
-    containers: &Containers,
+    containers: &GltfContainers,
     token: &CancelToken,
-) -> Result<ModelText, AssetError> {
-    let loaded = containers.mesh((path, None), &ignore_progress, token)?;
+) -> Result<GeneratedScene, AssetError> {
+    let loaded = containers.load_mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds() else {
         return Err(AssetError::Malformed {
             path: path.to_owned(),
@@ -100,11 +100,11 @@ pub(super) fn scene_text(
     let upright = |at: DVec3| up.rotate_upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
-    let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
+    let points: Vec<DVec3> = loaded.mesh.extreme_vertices().into_iter().map(upright).collect();
     let eye = frame_model(
         bounds,
         &points,
-        (show.from.unwrap_or(Side::Iso), show.turns),
+        (show.from.unwrap_or(ViewSide::Iso), show.turns),
         show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
     // Report the file's coordinates as the cause, because the user did not choose the camera position.
@@ -118,20 +118,20 @@ pub(super) fn scene_text(
     }
     let (mut toml, mut names) = (TomlWriter::default(), UniqueNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(is_polished) };
-    render(&mut toml, None, lighting);
+    let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(may_cast_caustics) };
+    write_render_settings(&mut toml, None, lighting);
     write_camera(&mut toml, &eye, FOV);
     write_lights(&mut toml, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
-    let name = names.name("model", "model");
+    let name = names.make_unique("model", "model");
     if needs_material {
         toml.table(&format!("[materials.{name}]"));
         toml.key("type", "\"principled\"");
         toml.key("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
     }
     toml.table("[[mesh]]");
-    toml.key("file", toml_string(&file_name(path)));
+    toml.key("file", quote_toml_string(&file_name(path)));
     if let Some([x, y, z]) = up.rotation() {
         toml.key("rotate", format!("[{x}, {y}, {z}]"));
     }
@@ -152,7 +152,7 @@ pub(super) fn scene_text(
     notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
     containers.store_mesh(path, loaded);
-    Ok(ModelText { text: toml.finish(), hash, companions, notes, assets })
+    Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Writer for concise TOML with short numbers, bare keys and no default values.
 
 use crate::math::{DVec3, Vec2};
-use crate::scene::toml_string;
+use crate::scene::quote_toml_string;
 
 /// TOML text under construction.
 #[derive(Debug, Default)]
@@ -32,7 +32,7 @@ impl TomlWriter {
     }
 
     /// Adds an empty line and a comment.
-    pub(super) fn section(&mut self, text: &str) {
+    pub(super) fn section_comment(&mut self, text: &str) {
         if !self.0.is_empty() && !self.0.ends_with("\n\n") {
             self.0.push('\n');
         }
@@ -112,7 +112,7 @@ pub(super) fn format_color(value: DVec3) -> String {
 pub(super) fn format_key(name: &str) -> String {
     let is_bare =
         !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
-    if is_bare { name.to_owned() } else { toml_string(name) }
+    if is_bare { name.to_owned() } else { quote_toml_string(name) }
 }
 
 #[cfg(test)]

@@ -43,6 +43,6 @@ pub const OTHER_IMAGE_WRITTEN: &str = "w wrote another image";
 pub const RESUMED: &str = "resumed after ";
 
 /// Returns the reason for a render that continued from `samples` samples per pixel.
-pub fn resumed_after(samples: u32) -> String {
+pub fn resume_reason(samples: u32) -> String {
     format!("{RESUMED}{samples} samples")
 }

@@ -1,7 +1,7 @@
 //! Cache for recent films. Switching back to an earlier setting reuses its film.
 
 use super::film_state::FilmState;
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 
 /// Memory limit for all films except the current one.
 const MAX_KEPT_BYTES: u64 = 256 << 20;
@@ -13,7 +13,7 @@ pub(crate) struct FilmCache {
     /// Cached films, least recently used first.
     kept: Vec<FilmState>,
     /// Key of the pinned film, which is kept regardless of its size.
-    pinned: Option<Key>,
+    pinned: Option<Fingerprint>,
     most_kept_bytes: u64,
     /// Number of films created so far.
     made: u64,
@@ -35,12 +35,12 @@ impl FilmCache {
     }
 
     /// Returns the film with this key.
-    pub(crate) fn get(&self, key: Key) -> Option<&FilmState> {
+    pub(crate) fn get(&self, key: Fingerprint) -> Option<&FilmState> {
         self.kept.iter().chain(&self.current).find(|state| state.key == key)
     }
 
     /// Pins the film with this key, replacing any previous pin.
-    pub(crate) fn pin(&mut self, key: Key) {
+    pub(crate) fn pin(&mut self, key: Fingerprint) {
         self.pinned = Some(key);
     }
 
@@ -51,14 +51,14 @@ impl FilmCache {
 
     /// Limits the total size of the cached films, not counting the current and the pinned film. Evicts films
     /// to stay within the limit.
-    pub(crate) fn limit(&mut self, bytes: u64) {
+    pub(crate) fn set_byte_limit(&mut self, bytes: u64) {
         self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);
     }
 
     /// Makes the film with this key the current one if it is cached and usable. Otherwise, there is no
     /// current film. Caches the previous film if there is room.
-    pub(crate) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
+    pub(crate) fn make_current(&mut self, key: Fingerprint, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|state| state.key == key);
             let found = kept.map(|index| self.kept.remove(index));
@@ -141,18 +141,18 @@ mod tests {
 
     use super::*;
     use crate::film::Convergence;
-    use crate::plan::plan;
+    use crate::plan::resolve_plan;
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::tests::loaded_of;
 
-    fn key(name: &str) -> Key {
+    fn key(name: &str) -> Fingerprint {
         FingerprintHasher::new(name).finish()
     }
 
     /// Creates a film with 64×32 pixels and some samples.
     fn state(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
-        let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
+        let plan = resolve_plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
         let mut state =
             FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified, None).expect("a film");
         state.done.fill([1; 2]);
@@ -162,14 +162,14 @@ mod tests {
     fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
-            films.select(key(name), |_| true);
+            films.make_current(key(name), |_| true);
             films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
 
     fn finds(films: &mut FilmCache, name: &str) -> bool {
-        films.select(key(name), |_| true);
+        films.make_current(key(name), |_| true);
         films.current().is_some_and(|current| current.key == key(name))
     }
 
@@ -205,7 +205,7 @@ mod tests {
         films.pin(key("own"));
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
-            films.select(key(name), |_| true);
+            films.make_current(key(name), |_| true);
             films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
@@ -225,7 +225,7 @@ mod tests {
     fn moving_camera_keeps_only_complete_films() {
         for is_whole in [false, true] {
             let mut films = films(&["a"], u64::MAX);
-            films.select(key("b"), |_| true);
+            films.make_current(key("b"), |_| true);
             let passing = || {
                 let mut passing = state("b");
                 passing.is_passing = true;
@@ -233,7 +233,7 @@ mod tests {
                 Ok::<_, ()>(passing)
             };
             films.replace_current(passing).expect("a film");
-            films.select(key("c"), |_| true);
+            films.make_current(key("c"), |_| true);
             assert_eq!(finds(&mut films, "b"), is_whole);
             assert!(finds(&mut films, "a"));
         }
@@ -242,9 +242,9 @@ mod tests {
     #[test]
     fn cached_films_are_dropped_when_out_of_memory() {
         let mut films = films(&["a", "b"], u64::MAX);
-        films.select(key("a"), |_| false);
+        films.make_current(key("a"), |_| false);
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
-        films.select(key("c"), |_| true);
+        films.make_current(key("c"), |_| true);
         let tries = std::cell::Cell::new(0);
         let made = films.replace_current(|| {
             tries.set(tries.get() + 1);

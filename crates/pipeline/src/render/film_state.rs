@@ -11,16 +11,16 @@ use crate::film::{
 };
 use crate::integrators::RayCounters;
 use crate::output::part::Dependency;
-use crate::plan::Plan;
+use crate::plan::RenderPlan;
 use crate::render::noise_goals::SampleGoals;
 use crate::render::share::Shard;
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 use crate::trace::{TileJob, TraceCost};
 
 /// A film with its cache key and render progress.
 #[derive(Debug)]
 pub(crate) struct FilmState {
-    pub(crate) key: Key,
+    pub(crate) key: Fingerprint,
     /// Serial number, assigned by the film cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
@@ -80,14 +80,14 @@ impl FilmState {
     /// # Errors
     /// There is not enough memory for the film.
     pub(crate) fn new(
-        key: Key,
-        plan: &Plan,
+        key: Fingerprint,
+        plan: &RenderPlan,
         most_bytes: u64,
         convergence: Convergence,
         share: Option<Shard>,
     ) -> Result<Self, FilmError> {
         let blocks = match (&share, convergence) {
-            (Some(share), _) => share.sums(),
+            (Some(share), _) => share.sum_order(),
             (None, Convergence::Photons) => SumOrder::Blocked,
             (None, Convergence::Stratified) => SumOrder::Sequential,
         };
@@ -100,8 +100,8 @@ impl FilmState {
         .with_convergence(convergence)
         .with_sum_order(blocks)?;
         let film_cells = film.cell_count();
-        let goals = SampleGoals::none(film_cells);
-        let own = share.as_ref().map(|share| share.tiles(film.tile_count()));
+        let goals = SampleGoals::undecided(film_cells);
+        let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));
         let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
         let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
         let done = (0..film.cell_count()).map(none).collect();
@@ -132,27 +132,27 @@ impl FilmState {
     }
 
     /// Whether this process renders a tile.
-    fn is_own_tile(&self, tile: usize) -> bool {
+    fn is_tile_in_shard(&self, tile: usize) -> bool {
         self.own.as_ref().is_none_or(|own| own[tile])
     }
 
     /// Maps this share's samples to sample indices in the whole image. If the indices are not all
     /// consecutive, returns only the first consecutive range.
-    pub(crate) fn global_samples(&self, samples: Range<u32>) -> Range<u32> {
+    pub(crate) fn to_global_samples(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
-            Some(share) => share.global_samples(samples),
+            Some(share) => share.to_global_samples(samples),
             None => samples,
         }
     }
 
     /// Returns goals that are equal to the film's current sample counts.
     pub(super) fn goals_at_current_samples(&self) -> SampleGoals {
-        SampleGoals { decided: self.done.clone(), ..SampleGoals::none(self.done.len()) }
+        SampleGoals { decided: self.done.clone(), ..SampleGoals::undecided(self.done.len()) }
     }
 
     /// Reads the sample counts from the film.
     pub(super) fn recount_samples(&mut self) {
-        let halves: Vec<_> = self.halves().collect();
+        let halves: Vec<_> = self.cell_halves().collect();
         for (cell, half) in halves {
             self.done[cell][half] = self.film.cell_half_samples(cell, half);
         }
@@ -165,34 +165,38 @@ impl FilmState {
 
     /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
-        self.halves()
+        self.cell_halves()
             .filter(|(cell, _)| self.is_cell_in(part, *cell))
-            .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
+            .all(|(tile, half)| self.done[tile][half] >= self.goals.get(tile, half).min(samples))
     }
 
     /// Whether a plan's image is finished because it has all samples or because the time limit was reached.
-    pub(crate) fn is_finished(&self, plan: &Plan) -> bool {
+    pub(crate) fn is_finished(&self, plan: &RenderPlan) -> bool {
         let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
         self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
     }
 
     /// Whether no pixel has more than `samples` samples.
-    pub(crate) fn has_at_most(&self, samples: u32) -> bool {
-        self.halves().all(|(cell, half)| self.done[cell][half] <= samples)
+    pub(crate) fn has_at_most_samples(&self, samples: u32) -> bool {
+        self.cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
     /// Returns the lowest sample count among pixels that need more samples, limited to `most`.
-    pub(crate) fn samples(&self, most: u32) -> u32 {
-        self.samples_in(None, most)
+    pub(crate) fn min_samples(&self, most: u32) -> u32 {
+        self.min_samples_in(None, most)
     }
 
-    /// Like [`Self::samples`], but only for tiles overlapping `part`. `None` means all tiles.
-    pub(crate) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
+    /// Like [`Self::min_samples`], but only for tiles overlapping `part`. `None` means all tiles.
+    pub(crate) fn min_samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
-            (done < self.goals.of(tile, half).min(most)).then_some(done)
+            (done < self.goals.get(tile, half).min(most)).then_some(done)
         };
-        self.halves().filter(|(cell, _)| self.is_cell_in(part, *cell)).filter_map(of).min().unwrap_or(most)
+        self.cell_halves()
+            .filter(|(cell, _)| self.is_cell_in(part, *cell))
+            .filter_map(of)
+            .min()
+            .unwrap_or(most)
     }
 
     /// Whether a cell's tile overlaps `part`.
@@ -204,18 +208,18 @@ impl FilmState {
 
     /// Whether any pixel has samples.
     pub(crate) fn has_samples(&self) -> bool {
-        self.halves().any(|(cell, half)| self.done[cell][half] > 0)
+        self.cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether every pixel has a sample. Only such an image may replace another one.
     pub(crate) fn covers_all_pixels(&self) -> bool {
-        self.halves().all(|(cell, half)| self.done[cell][half] > 0)
+        self.cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    fn halves(&self) -> impl Iterator<Item = (usize, usize)> {
+    fn cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
         halves.filter(|(cell, half)| {
-            self.is_own_tile(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0
+            self.is_tile_in_shard(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0
         })
     }
 
@@ -238,10 +242,11 @@ impl FilmState {
     /// precede shorter ones, and jobs of equal length are in the film's tile order.
     pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<TileJob> {
         let missing = |cell: usize, half: usize| {
-            self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
+            self.done[cell][half]..self.goals.get(cell, half).min(target(cell, half))
         };
         let mut jobs = Vec::new();
-        let is_wanted = |tile: &&usize| self.is_own_tile(**tile) && self.is_cell_in(part, CELLS * **tile);
+        let is_wanted =
+            |tile: &&usize| self.is_tile_in_shard(**tile) && self.is_cell_in(part, CELLS * **tile);
         for &tile in self.film.tile_order().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
@@ -269,7 +274,7 @@ impl FilmState {
 
     /// Records a finished job and its cost. Returns the job's total sample count over all pixels.
     pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
-        let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
+        let (rays, seconds) = (cost.rays.total_rays(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
             let rect = self.film.cell_rect(cell);
             if let Some(rect) = rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
@@ -301,7 +306,7 @@ impl FilmState {
     }
 
     /// Returns the number of samples rendered so far, summed over all pixels.
-    pub(crate) fn pixel_samples(&self) -> u64 {
+    pub(crate) fn total_pixel_samples(&self) -> u64 {
         self.sum_pixel_samples(|tile, half| self.done[tile][half])
     }
 
@@ -321,7 +326,8 @@ impl FilmState {
     /// same cell. Uses the mean cost for cells without samples.
     pub(crate) fn remaining_cpu_seconds(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
-        let is_there = |cell: &usize| self.is_own_tile(cell / CELLS) && self.film.cell_rect(*cell).is_some();
+        let is_there =
+            |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
             let lacks = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
@@ -345,9 +351,9 @@ impl FilmState {
 
     /// Returns two sample counts: the highest current count and the highest expected final count of any
     /// pixel. These are also the current and final numbers of photon passes.
-    pub(crate) fn photon_passes(&self, most: u32) -> [u32; 2] {
+    pub(crate) fn photon_pass_counts(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
-            self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
+            self.cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
             most_of(&|cell, half| self.done[cell][half]),
@@ -357,11 +363,11 @@ impl FilmState {
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
-        self.halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
+        self.cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
     fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
-        let (goal, expected) = (self.goals.of(cell, half), self.expected.of(cell, half));
+        let (goal, expected) = (self.goals.get(cell, half), self.expected.get(cell, half));
         (if goal < u32::MAX { goal } else { expected }).min(most)
     }
 
@@ -369,7 +375,7 @@ impl FilmState {
         let units = |(cell, half): (usize, usize)| {
             self.film.half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
-        self.halves().map(units).sum()
+        self.cell_halves().map(units).sum()
     }
 }
 
@@ -399,7 +405,7 @@ mod tests {
             seconds: 0.0,
             costs: vec![CellCost::default(); cells],
             pixel_share: PixelOverhead::default(),
-            goals: SampleGoals::none(cells),
+            goals: SampleGoals::undecided(cells),
             expected: ExpectedSamples::unknown(cells),
             base: None,
             previewer: None,
@@ -425,7 +431,7 @@ mod tests {
         let pixels = Pixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
-        state.film.add(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
+        state.film.add_samples(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
         let job = TileJob { tile, pixels, samples };
         state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
     }
@@ -442,8 +448,8 @@ mod tests {
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
-        assert_eq!(state.photon_passes(8), [8, 8]);
-        assert_eq!(state.photon_passes(16), [8, 16]);
+        assert_eq!(state.photon_pass_counts(8), [8, 8]);
+        assert_eq!(state.photon_pass_counts(16), [8, 16]);
     }
 
     #[test]

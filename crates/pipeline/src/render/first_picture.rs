@@ -7,9 +7,9 @@ use super::preview::PreviewTarget;
 use crate::film::range_map::RangeMap;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
-use crate::plan::Plan;
-use crate::scene::description::Render;
-use crate::stages::Stop;
+use crate::plan::RenderPlan;
+use crate::scene::description::RenderOptions;
+use crate::stages::StopReason;
 use crate::trace::{TileJob, Tracer};
 
 /// Time budget for the first image while the camera is moving.
@@ -17,16 +17,16 @@ const MOVING_TIME_BUDGET: Duration = Duration::from_millis(6);
 
 /// Inputs needed to render first images.
 #[derive(Clone, Copy)]
-pub(crate) struct CoarseImages<'a> {
+pub(crate) struct CoarseImageRenderer<'a> {
     pub(crate) tracer: Tracer<'a>,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     /// Whether the camera is being moved.
     pub(crate) is_moved: bool,
     /// Speed at which the most recent first image was rendered, in pixels per second.
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
-impl<'a> CoarseImages<'a> {
+impl<'a> CoarseImageRenderer<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
     /// camera is being moved. Excludes sizes that would take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
@@ -47,7 +47,7 @@ impl<'a> CoarseImages<'a> {
     }
 
     fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
-        let Render { width: full_width, height: full_height, .. } = self.plan.settings.render;
+        let RenderOptions { width: full_width, height: full_height, .. } = self.plan.settings.render;
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         pixels(width, height) * 2 <= pixels(full_width, full_height)
     }
@@ -58,10 +58,10 @@ impl<'a> CoarseImages<'a> {
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),
         tick: impl Fn(),
-    ) -> Result<RadianceImage, Stop> {
+    ) -> Result<RadianceImage, StopReason> {
         let plan = self.plan;
         let full = (plan.settings.render.width, plan.settings.render.height);
-        let render = Render { width, height, ..plan.settings.render };
+        let render = RenderOptions { width, height, ..plan.settings.render };
         let settings = RenderSettings { render, ..plan.settings };
         let whole = Rect { x: 0, y: 0, width, height };
         let rect = plan.crop.map_or(whole, |rect| scale_rect(rect, full, (width, height)));
@@ -73,7 +73,7 @@ impl<'a> CoarseImages<'a> {
             |_, piece| piece,
             |result| {
                 if let Some((_, piece, _)) = result {
-                    picture.put(piece.pixels.rect, &piece.radiance);
+                    picture.set_rect(piece.pixels.rect, &piece.radiance);
                 }
                 tick();
                 true
@@ -88,12 +88,12 @@ impl<'a> CoarseImages<'a> {
     /// would take almost as long as a full pass. Does not change the film. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`Stop::Cancelled`] if the token is cancelled.
+    /// Returns [`StopReason::Cancelled`] if the token is cancelled.
     pub(crate) fn show_without_photons(
         &self,
         screen: PreviewTarget<'_>,
         tick: impl Fn(),
-    ) -> Result<(), Stop> {
+    ) -> Result<(), StopReason> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Skip data views, because they depend on the value range of the whole image or show the photons
         // themselves.

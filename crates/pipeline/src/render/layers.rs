@@ -7,13 +7,13 @@
 use super::film_state::FilmState;
 use super::scheduler::{RenderStageInputs, Scheduler};
 use crate::film::{Convergence, Quantity, RadianceImage};
-use crate::integrators::View;
+use crate::integrators::ViewMode;
 use crate::keys;
 use crate::math::Vec3;
 use crate::output::LayerImage;
 use crate::scene::fingerprint::FingerprintHasher;
 use crate::settings::OutputLayer;
-use crate::stages::Stop;
+use crate::stages::StopReason;
 use crate::stages::photons::PhotonStore;
 use crate::trace::Tracer;
 
@@ -26,7 +26,7 @@ const NUMBER: &[&str] = &["X"];
 /// Source of a layer's values.
 enum LayerSource {
     /// Samples rendered with a view.
-    View(View),
+    View(ViewMode),
     /// Values from the image's film.
     Film(fn(&FilmState) -> RadianceImage),
 }
@@ -34,15 +34,15 @@ enum LayerSource {
 impl OutputLayer {
     fn source(self) -> (LayerSource, &'static [&'static str]) {
         match self {
-            Self::Albedo => (LayerSource::View(View::Albedo), COLOR),
-            Self::Normal => (LayerSource::View(View::Normal), DIRECTION),
-            Self::Depth => (LayerSource::View(View::Depth), DISTANCE),
+            Self::Albedo => (LayerSource::View(ViewMode::Albedo), COLOR),
+            Self::Normal => (LayerSource::View(ViewMode::Normal), DIRECTION),
+            Self::Depth => (LayerSource::View(ViewMode::Depth), DISTANCE),
             Self::Variance => (LayerSource::Film(variance), NUMBER),
             Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
-            Self::Ambient => (LayerSource::View(View::Ambient), COLOR),
-            Self::Diffuse => (LayerSource::View(View::Diffuse), COLOR),
-            Self::Specular => (LayerSource::View(View::Specular), COLOR),
-            Self::Emission => (LayerSource::View(View::Emission), COLOR),
+            Self::Ambient => (LayerSource::View(ViewMode::Ambient), COLOR),
+            Self::Diffuse => (LayerSource::View(ViewMode::Diffuse), COLOR),
+            Self::Specular => (LayerSource::View(ViewMode::Specular), COLOR),
+            Self::Emission => (LayerSource::View(ViewMode::Emission), COLOR),
         }
     }
 
@@ -82,7 +82,7 @@ pub(crate) fn render_layers(
     state: &FilmState,
     rendering: &RenderStageInputs<'_>,
     layers: &[OutputLayer],
-) -> Result<Vec<LayerImage>, Stop> {
+) -> Result<Vec<LayerImage>, StopReason> {
     let mut images = Vec::with_capacity(layers.len());
     for (number, layer) in layers.iter().enumerate() {
         let (source, channels) = layer.source();
@@ -99,26 +99,29 @@ pub(crate) fn render_layers(
 
 /// Renders a view with the same number of samples in each pixel as the image.
 fn render_view(
-    view: View,
+    view: ViewMode,
     picture: &FilmState,
     rendering: &RenderStageInputs<'_>,
     progress: [f64; 2],
-) -> Result<RadianceImage, Stop> {
+) -> Result<RadianceImage, StopReason> {
     let mut plan = rendering.plan.clone();
     plan.settings.view = view;
     // Use the image's sample counts, no matter what ended its render.
     plan.settings.render.error = 0.0;
-    plan.settings.render.samples = picture.film.samples().max;
+    plan.settings.render.samples = picture.film.sample_stats().max;
     plan.time_seconds = None;
     let photons = rendering.photons.filter(|_| plan.settings.gathers_photons());
     let convergence = match photons.is_some_and(PhotonStore::emits_photons) {
         true => Convergence::Photons,
         false => Convergence::Stratified,
     };
-    let key =
-        keys::render(FingerprintHasher::new("layer").key(&picture.key).finish(), &plan.settings, plan.crop);
-    let mut state =
-        FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None).map_err(Stop::work)?;
+    let key = keys::film_key(
+        FingerprintHasher::new("layer").add_fingerprint(&picture.key).finish(),
+        &plan.settings,
+        plan.crop,
+    );
+    let mut state = FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None)
+        .map_err(StopReason::work_failure)?;
     state.goals = picture.goals_at_current_samples();
     let sink = rendering.sink.for_progress_range(progress);
     let rendering = RenderStageInputs {
@@ -137,7 +140,7 @@ fn render_view(
     };
     let signed = |normal: Vec3| if normal == Vec3::ZERO { normal } else { normal * 2.0 - Vec3::ONE };
     let mut scheduler = Scheduler::new(&mut state, &rendering);
-    scheduler.changed = if view == View::Normal { Some(&signed) } else { None };
+    scheduler.changed = if view == ViewMode::Normal { Some(&signed) } else { None };
     scheduler.run()?;
     Ok(state.film.image(Quantity::Radiance))
 }

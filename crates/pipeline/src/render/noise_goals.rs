@@ -7,7 +7,7 @@
 //! worst case, this is a thirtieth of the noise.
 
 use crate::film::{
-    CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES, Prepass, samples_to_reduce_error,
+    BrightnessPrepass, CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES, samples_to_reduce_error,
 };
 
 /// Minimum number of samples for noise estimates.
@@ -34,18 +34,18 @@ pub(crate) struct SampleGoals {
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last evaluated. Tiles are evaluated only once per sample count.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the [`Prepass`]. `None` until noise has been evaluated.
+    /// Mean luminance of the [`BrightnessPrepass`]. `None` until noise has been evaluated.
     pub(super) brightness: Option<f64>,
 }
 
 impl SampleGoals {
     /// Creates undecided goals for `cells` cells.
-    pub(crate) fn none(cells: usize) -> Self {
+    pub(crate) fn undecided(cells: usize) -> Self {
         Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
     }
 
     /// Returns the maximum number of samples for one half of a cell.
-    pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
+    pub(crate) fn get(&self, cell: usize, half: usize) -> u32 {
         self.decided[cell][half]
     }
 
@@ -71,12 +71,12 @@ impl SampleGoals {
     ) -> Option<NoiseMeasurements> {
         let is_time = samples >= LEAST && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
-            self.brightness = Prepass::new(film.crop()).film_mean(film);
+            self.brightness = BrightnessPrepass::new(film.crop()).film_mean_luminance(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = NoiseTarget { error, brightness, convergence: film.convergence() };
         let is_open = |tile: usize| self.judged[tile] < samples && self.is_undecided(tile, done, samples);
-        let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
+        let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
             self.decide(&noise, done, samples, &aim);
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
@@ -130,7 +130,7 @@ impl SampleGoals {
             let of_others = [odd.or(even), even.or(odd)];
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
-                let wanted = aim.samples(&noise);
+                let wanted = aim.samples_to_reach(&noise);
                 // A finished half provides no further information about the other one.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
@@ -159,7 +159,7 @@ pub(crate) struct TileNoise {
 }
 
 impl TileNoise {
-    fn of(film: &Film, tile: usize) -> Self {
+    fn measure(film: &Film, tile: usize) -> Self {
         let noise = |half| {
             let noise = film.tile_noise(tile, half)?;
             // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
@@ -185,7 +185,7 @@ pub(crate) struct NoiseTarget {
 
 impl NoiseTarget {
     /// Returns the number of samples needed for the noise to reach the target.
-    fn samples(&self, noise: &CellHalfNoise) -> u32 {
+    fn samples_to_reach(&self, noise: &CellHalfNoise) -> u32 {
         let relative = self.relative(noise);
         if !(relative > 0.0) {
             return noise.samples;
@@ -197,7 +197,7 @@ impl NoiseTarget {
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
-        let power = noise.power.min(self.convergence.typical_exponent());
+        let power = noise.power.min(self.convergence.typical_variance_exponent());
         samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
@@ -212,24 +212,24 @@ pub(crate) mod tests {
     use super::*;
     use crate::film::{PixelSubset, Pixels, Rect, TileSamples};
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     /// Creates a one-tile film. `halves` contains the mean and spread of each half's samples.
     pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
-        let mut next = unit(3);
+        let mut next = unit_generator(3);
         for (half, (mean, spread)) in halves.into_iter().enumerate() {
             let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
-            film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
+            film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });
         }
         film
     }
 
     fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> SampleGoals {
-        let mut goals = SampleGoals::none(1);
+        let mut goals = SampleGoals::undecided(1);
         goals.decide_goals(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
@@ -238,8 +238,8 @@ pub(crate) mod tests {
     fn each_half_stops_based_on_the_other_half() {
         // The first half is smooth, but the second is noisy.
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.of(0, 1), 16, "the second half should stop because the first has no noise");
-        assert_eq!(goals.of(0, 0), u32::MAX);
+        assert_eq!(goals.get(0, 1), 16, "the second half should stop because the first has no noise");
+        assert_eq!(goals.get(0, 0), u32::MAX);
     }
 
     #[test]
@@ -260,7 +260,7 @@ pub(crate) mod tests {
     fn nothing_is_decided_with_too_few_samples() {
         for (samples, is_open) in [(8, true), (16, false)] {
             let goals = judged([(1.0, 0.0); 2], samples, 0.01);
-            assert_eq!(goals.of(0, 0) == u32::MAX, is_open, "{samples}");
+            assert_eq!(goals.get(0, 0) == u32::MAX, is_open, "{samples}");
         }
     }
 
@@ -269,26 +269,26 @@ pub(crate) mod tests {
         // The standard error is √(1/12/16) = 0.072, or up to 0.082 with so few pixels. Reaching the target
         // takes 24 samples.
         let goals = judged([(1.0, 1.0); 2], 16, 0.08);
-        assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
-        assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
+        assert!((17..=32).contains(&goals.get(0, 0)), "{}", goals.get(0, 0));
+        assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).get(0, 0), u32::MAX);
     }
 
     #[test]
     fn reference_brightness_has_a_minimum() {
         // A bright and a dark tile with equal relative noise.
         let film = Film::new(64, 2, None).expect("a film");
-        let mut next = unit(9);
+        let mut next = unit_generator(9);
         for (tile, mean) in [(0, 1.0), (1, 1e-6)] {
             let rect = Rect { x: 32 * tile, y: 0, width: 32, height: 2 };
             let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
-            film.add(
+            film.add_samples(
                 tile as usize,
                 &TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None },
             );
         }
-        let mut goals = SampleGoals::none(2 * CELLS);
+        let mut goals = SampleGoals::undecided(2 * CELLS);
         goals.decide_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
-        assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
+        assert_eq!((goals.get(0, 0), goals.get(CELLS, 0)), (u32::MAX, 16));
     }
 
     /// Returns the mean over a tile with rare bright samples and an expected value of 1. Each half stops
@@ -296,15 +296,15 @@ pub(crate) mod tests {
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
-        let (mut goals, mut done) = (SampleGoals::none(1), [[0; 2]]);
+        let (mut goals, mut done) = (SampleGoals::undecided(1), [[0; 2]]);
         for target in [16, 32, 64, 128, MOST] {
             for half in 0..2 {
-                let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);
+                let goal = goals.get(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);
                 let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
                 let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
                 let radiance = (0..8 * samples).map(sample).collect();
-                film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
+                film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });
                 done[0][half] += samples;
             }
             goals.decide_goals(&film, &done, target, 0.6);
@@ -314,7 +314,7 @@ pub(crate) mod tests {
 
     #[test]
     fn stopping_on_other_half_is_nearly_unbiased() {
-        let mut next = unit(11);
+        let mut next = unit_generator(11);
         let mut mean_of = |by_own| {
             const TILES: u32 = 20_000;
             let means: Vec<f64> = (0..TILES).map(|_| stopped(&mut next, by_own)).collect();

@@ -7,12 +7,12 @@ use rayon::ThreadPool;
 use super::film_state::FilmState;
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
-use crate::film::tone::{ToneMapping, develop};
+use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 use crate::keys;
-use crate::plan::Plan;
-use crate::protocol::{ImagePosition, PreviewSize, PreviewSource, Section};
-use crate::sink::Sink;
+use crate::plan::RenderPlan;
+use crate::protocol::{ImagePosition, NormalizedRect, PreviewSize, PreviewSource};
+use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for orders.
 const PATIENCE: Duration = Duration::from_millis(4);
@@ -22,8 +22,8 @@ const PATIENCE: Duration = Duration::from_millis(4);
 pub(crate) struct PreviewTarget<'a> {
     /// Maximum size of previews. `None` disables them.
     pub(crate) bounds: Option<PreviewSize>,
-    pub(crate) plan: &'a Plan,
-    pub(crate) sink: &'a Sink,
+    pub(crate) plan: &'a RenderPlan,
+    pub(crate) sink: &'a EventSink,
 }
 
 impl PreviewTarget<'_> {
@@ -56,7 +56,7 @@ impl PreviewTarget<'_> {
             return true;
         }
         update_previewer(state, self.plan.settings.view.quantity(), size);
-        let is_whole = state.previewer.as_ref().is_some_and(Previewer::is_whole);
+        let is_whole = state.previewer.as_ref().is_some_and(Previewer::covers_all_tiles);
         if is_whole {
             self.send_current(state, false);
         }
@@ -67,7 +67,7 @@ impl PreviewTarget<'_> {
         if let Some(previewer) = &state.previewer {
             // The first image contains no sample statistics.
             let base = state.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
-            let image = previewer.picture(base);
+            let image = previewer.build_image(base);
             self.send(state, &image, &self.tone(state, &image, has_time), None);
         }
     }
@@ -78,24 +78,30 @@ impl PreviewTarget<'_> {
         let quantity = self.plan.settings.view.quantity();
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
-        let section = Section::from_pixels(rect, (render.width, render.height));
-        let image = state.film.section(quantity, rect, base);
+        let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
+        let image = state.film.copy_region(quantity, rect, base);
         self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
         true
     }
 
     /// Sends a radiance image that lacks light from photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
-        self.sink.preview_without_photons(develop(image, &self.plan.tone.resolved_for(image)));
+        self.sink.preview_without_photons(tone_map_to_8_bits(image, &self.plan.tone.with_image_range(image)));
     }
 
-    fn send(&self, state: &FilmState, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
+    fn send(
+        &self,
+        state: &FilmState,
+        image: &RadianceImage,
+        tone: &ToneMapping,
+        section: Option<NormalizedRect>,
+    ) {
         let range = tone.range_map.range().map(|range| range.limits());
         let source = PreviewSource {
-            image: keys::image(state.key, self.plan, state.number),
+            image: keys::image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };
-        self.sink.preview(develop(image, tone), range, section, source);
+        self.sink.preview(tone_map_to_8_bits(image, tone), range, section, source);
     }
 
     /// Returns the tone mapping for a preview. Because preview pixels are averages, data views use the value
@@ -107,9 +113,9 @@ impl PreviewTarget<'_> {
         let tone = self.plan.tone;
         let is_known = state.covers_all_pixels() && (has_time || state.film.crop().area() <= QUICK);
         if tone.range_map == RangeMap::None || !is_known {
-            return tone.resolved_for(image);
+            return tone.with_image_range(image);
         }
-        tone.resolved_for(&state.film.image(self.plan.settings.view.quantity()))
+        tone.with_image_range(&state.film.image(self.plan.settings.view.quantity()))
     }
 
     /// Returns the pixels of the 1:1 section, if one was requested.
@@ -131,7 +137,7 @@ impl PreviewTarget<'_> {
 /// Spends a short time on updating the previewer. Returns whether it is now up to date.
 fn update_previewer(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
-    let previewer = state.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
+    let previewer = state.previewer.get_or_insert_with(|| Previewer::with_quantity(quantity, width, height));
     previewer.update(&state.film, Some(Instant::now() + PATIENCE))
 }
 

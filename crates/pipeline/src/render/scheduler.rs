@@ -7,23 +7,23 @@ use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
 use super::film_state::{EarlierWork, FilmState};
-use super::first_picture::CoarseImages;
+use super::first_picture::CoarseImageRenderer;
 use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
 use super::preview::PreviewTarget;
 use super::share::Shard;
 use super::time_budget::next_round;
-use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
+use crate::film::{BrightnessPrepass, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::math::Vec3;
-use crate::plan::Plan;
-use crate::protocol::{PreviewSize, Section};
-use crate::scene::description::Render;
-use crate::sink::Sink;
-use crate::stages::Stop;
+use crate::plan::RenderPlan;
+use crate::protocol::{NormalizedRect, PreviewSize};
+use crate::scene::description::RenderOptions;
+use crate::sink::EventSink;
+use crate::stages::StopReason;
 use crate::stages::photons::{PhotonContext, PhotonStore};
 use crate::stopwatch::PausableClock;
-use crate::trace::{TileJob, Tracer, next_pass};
+use crate::trace::{TileJob, Tracer, next_pass_samples};
 
 /// Minimum time between two progress reports.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
@@ -35,7 +35,7 @@ const PREVIEW_SHARE: u32 = 10;
 /// Inputs of the render stage.
 pub(crate) struct RenderStageInputs<'a> {
     pub(crate) tracer: Tracer<'a>,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
     pub(crate) preview: Option<PreviewSize>,
@@ -43,8 +43,8 @@ pub(crate) struct RenderStageInputs<'a> {
     /// Whether to start with an empty film even if a film is cached.
     pub(crate) force: bool,
     /// Section to render first.
-    pub(crate) first: Option<Section>,
-    pub(crate) sink: &'a Sink,
+    pub(crate) first: Option<NormalizedRect>,
+    pub(crate) sink: &'a EventSink,
     /// Handles orders during the render. Called often. The arguments are the current film and whether every
     /// pixel has a sample.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
@@ -85,7 +85,7 @@ pub(crate) struct Scheduler<'a> {
 
 impl<'a> Scheduler<'a> {
     pub(crate) fn new(state: &'a mut FilmState, rendering: &'a RenderStageInputs<'a>) -> Self {
-        let units = state.pixel_samples();
+        let units = state.total_pixel_samples();
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
         let EarlierWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
@@ -110,12 +110,12 @@ impl<'a> Scheduler<'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// Returns [`Stop::Cancelled`] if the token is cancelled. The film keeps its samples.
-    pub(crate) fn run(&mut self) -> Result<(), Stop> {
+    /// Returns [`StopReason::Cancelled`] if the token is cancelled. The film keeps its samples.
+    pub(crate) fn run(&mut self) -> Result<(), StopReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
         let (traced, seconds) = (self.total_rays(), self.rendered_seconds());
-        if let (Some(checkpointer), Err(Stop::Cancelled)) = (self.rendering.checkpointer, &ran) {
+        if let (Some(checkpointer), Err(StopReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
             self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds);
         }
         self.state.traced = traced;
@@ -136,15 +136,15 @@ impl<'a> Scheduler<'a> {
 
     /// Returns the render time in seconds, including time spent by the process whose checkpoint this render
     /// resumed from.
-    pub(crate) fn seconds(&mut self) -> f64 {
+    pub(crate) fn total_render_seconds(&mut self) -> f64 {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    fn run_passes_to_end(&mut self) -> Result<(), Stop> {
+    fn run_passes_to_end(&mut self) -> Result<(), StopReason> {
         self.report_progress(false);
         if self.is_first {
             if self.state.base.is_none() {
-                self.trace_first_pictures()?;
+                self.trace_coarse_images()?;
             }
             let first = self.priority_rect();
             if first.is_some() {
@@ -154,9 +154,9 @@ impl<'a> Scheduler<'a> {
             self.is_first = false;
             self.state.base = None;
             self.show();
-            self.tick();
+            self.run_due_tasks();
         }
-        let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
             self.render_prepass()?;
         }
@@ -174,16 +174,16 @@ impl<'a> Scheduler<'a> {
 
     /// Returns the pixels to render first.
     fn priority_rect(&self) -> Option<Rect> {
-        let Render { width, height, .. } = self.rendering.plan.settings.render;
+        let RenderOptions { width, height, .. } = self.rendering.plan.settings.render;
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
-    fn render_prepass(&mut self) -> Result<(), Stop> {
+    fn render_prepass(&mut self) -> Result<(), StopReason> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
-        let pilot = Prepass::new(self.state.film.crop());
+        let pilot = BrightnessPrepass::new(self.state.film.crop());
         let job = |number: u64| {
             let (x, y) = pilot.position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
@@ -192,7 +192,7 @@ impl<'a> Scheduler<'a> {
         };
         let jobs: Vec<TileJob> = (0..pilot.count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
-        let keep = |_: &TileJob, samples: TileSamples| Prepass::luminance(samples);
+        let keep = |_: &TileJob, samples: TileSamples| BrightnessPrepass::sample_luminance(samples);
         self.rendering.tracer.run(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;
@@ -200,14 +200,14 @@ impl<'a> Scheduler<'a> {
             }
             true
         })?;
-        self.state.goals.brightness = pilot.mean(|number| luminances[number as usize]);
+        self.state.goals.brightness = pilot.mean_luminance(|number| luminances[number as usize]);
         Ok(())
     }
 
     /// Evaluates the noise of existing samples from a checkpoint or a cancelled request.
     fn decide_goals_from_existing(&mut self, part: Option<Rect>) {
-        let Render { samples, error, .. } = self.rendering.plan.settings.render;
-        let done = self.state.samples_in(part, samples);
+        let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
+        let done = self.state.min_samples_in(part, samples);
         // With fewer samples, no goals are decided.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
@@ -216,8 +216,8 @@ impl<'a> Scheduler<'a> {
 
     /// Runs passes until every pixel in `part` (`None` for all) has `samples` samples or has reached its
     /// goal.
-    fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
-        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+    fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), StopReason> {
+        let RenderOptions { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.decide_goals_from_existing(part);
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
@@ -226,7 +226,7 @@ impl<'a> Scheduler<'a> {
                 continue;
             }
             let pixels = self.state.film.crop().area();
-            let target = next_pass(self.state.samples_in(part, samples), samples, pixels);
+            let target = next_pass_samples(self.state.min_samples_in(part, samples), samples, pixels);
             self.pass(part, target)?;
             if target.is_power_of_two() {
                 self.measure_noise_if_due();
@@ -246,17 +246,17 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders all tiles in `part` that have fewer than `target` samples.
-    fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
+    fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), StopReason> {
         let Some(photons) = self.rendering.photons else {
             return self.render_jobs(part, |_, _| target, None, 0);
         };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
-            let samples = self.state.samples_in(part, target);
+            let samples = self.state.min_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
-            let numbers = self.state.global_samples(at_once);
+            let numbers = self.state.to_global_samples(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons if there is no time left.
-            self.tick();
+            self.run_due_tasks();
             if self.is_over_time {
                 break;
             }
@@ -270,12 +270,17 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Traces photons for these samples while handling orders.
-    fn trace_photons(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
+    fn trace_photons(
+        &mut self,
+        photons: &PhotonStore,
+        samples: Range<u32>,
+    ) -> Result<PhotonMaps, StopReason> {
         let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
         let begin = self.clock.seconds(token.is_paused());
         self.forecast.begin_photons(begin);
-        let maps = photons.maps(samples, PhotonContext { world, plan, pool, token, sink }, || self.tick())?;
+        let maps = photons
+            .maps(samples, PhotonContext { world, plan, pool, token, sink }, || self.run_due_tasks())?;
         self.forecast.end_photons(self.clock.seconds(token.is_paused()));
         Ok(maps)
     }
@@ -285,7 +290,7 @@ impl<'a> Scheduler<'a> {
     /// cells, and with a noise target, which determines the sample placement instead.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let RenderStageInputs { plan, photons, .. } = *self.rendering;
-        let Render { samples, error, .. } = plan.settings.render;
+        let RenderOptions { samples, error, .. } = plan.settings.render;
         if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
             return None;
         }
@@ -293,7 +298,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders both halves of every cell in short steps until they reach their goals.
-    fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
+    fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), StopReason> {
         const STEP: Duration = Duration::from_millis(30);
         /// Number of pixels in half a tile.
         const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
@@ -322,7 +327,7 @@ impl<'a> Scheduler<'a> {
         target: impl Fn(usize, usize) -> u32,
         photons: Option<&PhotonMaps>,
         first: u32,
-    ) -> Result<(), Stop> {
+    ) -> Result<(), StopReason> {
         let jobs = self.state.jobs(part, target);
         let tracer = Tracer { photons, first, ..self.rendering.tracer };
         let film = Arc::clone(&self.state.film);
@@ -331,14 +336,14 @@ impl<'a> Scheduler<'a> {
             if let Some(changed) = changed {
                 samples.radiance.iter_mut().for_each(|sample| *sample = changed(*sample));
             }
-            film.add(job.tile, &samples);
+            film.add_samples(job.tile, &samples);
         };
         tracer.run(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
                 self.units += self.state.record_job(job, &cost);
                 self.rays += cost.rays;
             }
-            self.tick();
+            self.run_due_tasks();
             !self.is_over_time
         })?;
         Ok(())
@@ -346,7 +351,7 @@ impl<'a> Scheduler<'a> {
 
     /// Handles everything that is due between tiles: progress, previews, orders, checkpoints and the time
     /// limit.
-    fn tick(&mut self) {
+    fn run_due_tasks(&mut self) {
         let now = Instant::now();
         if now >= self.next_progress {
             self.next_progress = now + PROGRESS_INTERVAL;
@@ -359,10 +364,10 @@ impl<'a> Scheduler<'a> {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         (self.rendering.pulse)(self.state, !self.is_first);
-        let seconds = self.seconds();
+        let seconds = self.total_render_seconds();
         if let Some(checkpointer) = self.rendering.checkpointer {
             let rendered = self.rendered_seconds();
-            checkpointer.tick(self.state, self.total_rays(), rendered);
+            checkpointer.save_if_due(self.state, self.total_rays(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
@@ -383,15 +388,15 @@ impl<'a> Scheduler<'a> {
         sink.progress(self.forecast.progress(&moment));
     }
 
-    fn first_pictures(&self) -> CoarseImages<'a> {
+    fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {
         let RenderStageInputs { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
-        CoarseImages { tracer, plan, is_moved, rate }
+        CoarseImageRenderer { tracer, plan, is_moved, rate }
     }
 
     /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.
-    fn trace_first_pictures(&mut self) -> Result<(), Stop> {
+    fn trace_coarse_images(&mut self) -> Result<(), StopReason> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
-        let coarse = self.first_pictures();
+        let coarse = self.coarse_image_renderer();
         for size in coarse.sizes(shown) {
             let maps = match self.rendering.photons {
                 Some(photons) => Some(self.trace_photons(photons, 0..1)?),

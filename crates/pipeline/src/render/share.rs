@@ -56,7 +56,7 @@ impl Shard {
 
     /// Maps this share's samples `own` to sample indices in the whole image, stopping at the end of the
     /// block.
-    pub(crate) fn global_samples(&self, own: Range<u32>) -> Range<u32> {
+    pub(crate) fn to_global_samples(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
         let start = block * BLOCK_SIZE + own.start % BLOCK_SIZE;
@@ -64,7 +64,7 @@ impl Shard {
     }
 
     /// Returns the order in which samples are summed.
-    pub(crate) fn sums(&self) -> SumOrder {
+    pub(crate) fn sum_order(&self) -> SumOrder {
         match &self.blocks {
             None => SumOrder::Sequential,
             Some(blocks) => SumOrder::SeparateBlocks(
@@ -84,7 +84,7 @@ impl Shard {
     }
 
     /// Returns, for each of `count` tiles, whether it belongs to this share.
-    pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
+    pub(crate) fn tile_mask(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
         for tile in assignment_order(count as u32).into_iter().skip(place as usize).step_by(of as usize) {
@@ -121,11 +121,11 @@ mod tests {
                     let mut seen = HashSet::new();
                     for index in 1..=count {
                         let share = Shard::new((index, count), has_photons, samples);
-                        let own = share.tiles(tiles);
+                        let own = share.tile_mask(tiles);
                         for tile in (0..tiles).filter(|tile| own[*tile]) {
                             let mut done = 0;
                             while done < share.samples_per_pixel() {
-                                let numbers = share.global_samples(done..share.samples_per_pixel());
+                                let numbers = share.to_global_samples(done..share.samples_per_pixel());
                                 done += numbers.len() as u32;
                                 assert!(numbers.clone().all(|number| seen.insert((tile, number))));
                             }
@@ -146,8 +146,8 @@ mod tests {
         let share = Shard::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
-        assert_eq!(share.sums(), SumOrder::SeparateBlocks(128));
-        assert_eq!(Shard::new((1, 1), true, 40).sums(), SumOrder::SeparateBlocks(2));
+        assert_eq!(share.sum_order(), SumOrder::SeparateBlocks(128));
+        assert_eq!(Shard::new((1, 1), true, 40).sum_order(), SumOrder::SeparateBlocks(2));
         assert_eq!(Shard::new((1, 1), true, 40).block_count(), 3);
     }
 }

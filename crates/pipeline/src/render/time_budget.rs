@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use crate::film::{CELLS, PixelSubset, Pixels, TileSamples};
     use crate::math::Vec3;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     /// Width and height of a cell.
     const SIDE: u32 = crate::film::CELL_SIZE;
@@ -123,13 +123,13 @@ mod tests {
         let rect = film.cell_rect(cell).expect("a cell");
         let pixels = Pixels { rect, part: PixelSubset::Half(half) };
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
-        film.add(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
+        film.add_samples(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }
 
     /// Creates a row of cells. Each half's samples have a mean of about 1 and a spread from `spreads`.
     fn film(spreads: &[[f32; 2]], samples: u32) -> (Film, Vec<[u32; 2]>) {
         let film = Film::new(SIDE * spreads.len() as u32, SIDE, None).expect("a film");
-        let mut next = unit(7);
+        let mut next = unit_generator(7);
         let mut done = vec![[u32::MAX; 2]; film.cell_count()];
         for (cell, spreads) in cells(&film).into_iter().zip(spreads) {
             done[cell] = [samples; 2];
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn placement_based_on_other_half_is_unbiased() {
-        let mut next = unit(13);
+        let mut next = unit_generator(13);
         let mut mean_of = |by_own| {
             const RENDERS: u32 = 1500;
             let means: Vec<f64> = (0..RENDERS).map(|_| rendered(&mut next, by_own)).collect();

@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report};
+use super::{Counters, ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report};
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
-use crate::inputs::Inputs;
+use crate::inputs::ProtectedInputs;
 use crate::integrators::{RayCounters, light_sampling_mode};
 use crate::output::write::{WritePolicy, atomic_guarded};
 use crate::output::{OutputError, json};
-use crate::plan::Plan;
+use crate::plan::RenderPlan;
 use crate::protocol::StageReport;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
-use crate::sink::Sink;
+use crate::sink::EventSink;
 use crate::targets::{OutputTarget, write_guarded};
 use crate::world::World;
 
@@ -21,7 +21,7 @@ use crate::world::World;
 #[derive(Clone, Copy)]
 pub(crate) struct RequestResults<'a> {
     pub(crate) scene: &'a Path,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     pub(crate) world: &'a World,
     pub(crate) state: &'a FilmState,
     pub(crate) films: &'a FilmCache,
@@ -52,16 +52,16 @@ pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport
 /// # Errors
 /// The file cannot be written. The error contains the file name.
 pub(crate) fn write_report(
-    plan: &Plan,
-    inputs: &Inputs,
+    plan: &RenderPlan,
+    inputs: &ProtectedInputs,
     report: &Report,
-    sink: &Sink,
+    sink: &EventSink,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let Some(path) = &plan.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
-    let text = json::file(report).map_err(unwritable)?;
+    let text = json::to_pretty_text(report).map_err(unwritable)?;
     let target = (OutputTarget::for_report(path), None);
     write_guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
 }
@@ -71,7 +71,11 @@ pub(crate) fn write_report(
 ///
 /// # Errors
 /// The file cannot be removed. The error contains the file name.
-pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result<(), OutputError> {
+pub(crate) fn remove_report(
+    plan: &RenderPlan,
+    inputs: &ProtectedInputs,
+    sink: &EventSink,
+) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
     let remove = |guard: &WritePolicy<'_>| {
@@ -84,7 +88,7 @@ pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result
 
 fn image_report(finished: &RequestResults<'_>) -> ImageReport {
     let plan = finished.plan;
-    let samples = finished.state.film.samples();
+    let samples = finished.state.film.sample_stats();
     let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
     let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
     ImageReport {
@@ -108,8 +112,8 @@ fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
     let selection = lights.sampler(light_sampling_mode(settings, are_gathered));
     let (sampled, picks) = match selection {
-        Some(selection) => (LightsSampled::Picked, samples * u64::from(selection.picks.count)),
-        None => (LightsSampled::All, 0),
+        Some(selection) => (LightSelectionMode::Picked, samples * u64::from(selection.picks.count)),
+        None => (LightSelectionMode::All, 0),
     };
     LightsReport {
         count: lights.len() as u64,
@@ -126,7 +130,7 @@ fn data_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
         return None;
     }
     let image = state.film.image(plan.settings.view.quantity());
-    plan.tone.resolved_for(&image).range_map.range().map(|range| range.limits())
+    plan.tone.with_image_range(&image).range_map.range().map(|range| range.limits())
 }
 
 fn count_work(finished: &RequestResults<'_>) -> Counters {
@@ -153,11 +157,11 @@ fn count_work(finished: &RequestResults<'_>) -> Counters {
 
 /// Peak resident memory of the process in bytes. 0 if unknown.
 fn peak_memory_bytes() -> u64 {
-    peak_of_program().unwrap_or_else(peak_of_process)
+    peak_memory_from_proc_status().unwrap_or_else(peak_memory_from_rusage)
 }
 
 /// Peak resident memory of this program, on systems that report it (proc_pid_status(5)).
-fn peak_of_program() -> Option<u64> {
+fn peak_memory_from_proc_status() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?;
     Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
@@ -165,7 +169,7 @@ fn peak_of_program() -> Option<u64> {
 
 /// Peak resident memory of the process. Includes memory used before the process executed this program, which
 /// may be large depending on the parent process.
-fn peak_of_process() -> u64 {
+fn peak_memory_from_rusage() -> u64 {
     use nix::sys::resource::{UsageWho, getrusage};
     // Bytes on macOS, kibibytes elsewhere (getrusage(2)).
     let unit = if cfg!(target_os = "macos") { 1 } else { 1024 };

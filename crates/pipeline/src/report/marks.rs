@@ -16,7 +16,7 @@ pub(crate) struct ReportSignature {
     _image: IgnoredAny,
     #[serde(rename = "settings")]
     _settings: IgnoredAny,
-    stages: Vec<StageMark>,
+    stages: Vec<StageSignature>,
     #[serde(rename = "counters")]
     _counters: IgnoredAny,
     #[serde(rename = "seconds")]
@@ -26,7 +26,7 @@ pub(crate) struct ReportSignature {
 }
 
 #[derive(Deserialize)]
-struct StageMark {
+struct StageSignature {
     name: String,
 }
 

@@ -7,28 +7,28 @@ use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, Meshes};
-use super::{FileReadContext, StageResult, Stop};
+use super::{FileReadContext, StageResult, StopReason};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::description::Scene;
-use crate::scene::fingerprint::{FingerprintContext, Key};
-use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, with_distinct_lights};
+use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
+use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, separate_coincident_emitters};
 
 /// A mesh with distinct lights, and its key.
-type DistinctMesh = (Key, Arc<LoadedMesh>);
+type DistinctMesh = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
-    trees: NamedCache<Key, MeshTree>,
+    trees: NamedCache<Fingerprint, MeshTree>,
     /// Meshes with distinct lights. `None` if the mesh in the file can be used.
-    distinct: NamedCache<Key, Option<Arc<LoadedMesh>>>,
-    geometry: NamedCache<Key, Geometry>,
+    distinct: NamedCache<Fingerprint, Option<Arc<LoadedMesh>>>,
+    geometry: NamedCache<Fingerprint, Geometry>,
     /// Offsets applied to lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
     /// Key of the current tree over all objects.
-    last: Option<Key>,
+    last: Option<Fingerprint>,
 }
 
 impl AccelCache {
@@ -68,30 +68,30 @@ pub(crate) struct AccelResult {
 /// Builds all missing trees, using coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
-/// Returns [`Stop::Cancelled`] if the token is cancelled.
-pub(crate) fn accel(
+/// Returns [`StopReason::Cancelled`] if the token is cancelled.
+pub(crate) fn build_accel_structures(
     scene: &Scene,
     (of, origin): (&FingerprintContext<'_>, DVec3),
     meshes: &Meshes,
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<AccelResult>, Stop> {
-    let distinct = distinct_lights(scene, meshes, cache, reading.token)?;
-    let (meshes, kept) = trees(scene, (meshes, &distinct), cache, reading)?;
-    let lights_key = keys::from(&keys::coplanar(scene, of), origin);
+) -> Result<StageResult<AccelResult>, StopReason> {
+    let distinct = meshes_with_distinct_lights(scene, meshes, cache, reading.token)?;
+    let (meshes, kept) = build_mesh_trees(scene, (meshes, &distinct), cache, reading)?;
+    let lights_key = keys::with_origin(&keys::coplanar_lights_key(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
     let changed = distinct.iter().map(|distinct| distinct.as_ref().map(|(key, _)| *key));
-    let key = keys::geometry(scene, of, (origin, &lifts), changed);
+    let key = keys::geometry_key(scene, of, (origin, &lifts), changed);
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
         let why = if is_last { reasons::UNCHANGED } else { reasons::CACHED };
         return Ok(StageResult::reused(AccelResult { meshes, geometry }, why));
     }
-    let build = || Geometry::with_lifts(scene, &meshes, (origin, lifts), reading.token);
+    let build = || Geometry::from_scene_with_light_lifts(scene, &meshes, (origin, lifts), reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
-    cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
+    cache.geometry.insert(key, key, (geometry.clone(), geometry.top_level_memory_bytes()));
     cache.last = Some(key);
     let built = meshes.len() - kept;
     let value = AccelResult { meshes, geometry };
@@ -105,18 +105,19 @@ pub(crate) fn accel(
 }
 
 /// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
-fn distinct_lights(
+fn meshes_with_distinct_lights(
     scene: &Scene,
     meshes: &Meshes,
     cache: &mut AccelCache,
     token: &CancelToken,
-) -> Result<Vec<Option<DistinctMesh>>, Stop> {
+) -> Result<Vec<Option<DistinctMesh>>, StopReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
-        let key = keys::distinct_lights(&mesh.key, is_emissive);
+        let key = keys::distinct_lights_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
             Some(found) => found,
             None => {
-                let found = Arc::new(with_distinct_lights(&mesh.mesh, is_emissive, token)?.map(Arc::new));
+                let found =
+                    Arc::new(separate_coincident_emitters(&mesh.mesh, is_emissive, token)?.map(Arc::new));
                 let bytes = found.as_ref().as_ref().map_or(0, |distinct| distinct.mesh.memory_bytes());
                 cache.distinct.insert(key, key, (found.clone(), bytes));
                 found
@@ -128,17 +129,17 @@ fn distinct_lights(
 }
 
 /// Returns the trees for all meshes, and how many of them were cached.
-fn trees(
+fn build_mesh_trees(
     scene: &Scene,
     (meshes, distinct): (&Meshes, &[Option<DistinctMesh>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
-) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
+) -> Result<(Vec<Arc<MeshTree>>, usize), StopReason> {
     let mut kept = 0;
     let accel = scene.render.accel;
     let mut trees = Vec::with_capacity(meshes.len());
     for (mesh, distinct) in meshes.iter().zip(distinct) {
-        let key = keys::tree(&mesh.key, accel, distinct.as_ref().map(|(key, _)| *key));
+        let key = keys::mesh_accel_key(&mesh.key, accel, distinct.as_ref().map(|(key, _)| *key));
         let tree = match cache.trees.get(&key, key) {
             Some(tree) => {
                 kept += 1;

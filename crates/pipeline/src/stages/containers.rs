@@ -15,13 +15,13 @@ type SharedContainer = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
 #[derive(Debug, Default)]
-pub(crate) struct Containers {
+pub(crate) struct GltfContainers {
     gltf: Mutex<HashMap<PathBuf, SharedContainer>>,
     /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
 
-impl Containers {
+impl GltfContainers {
     /// Returns a glTF file, opening it if necessary.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Containers {
     }
 
     /// Reads a mesh file, a part of a glTF file, or a whole glTF file as a single mesh.
-    pub(crate) fn mesh(
+    pub(crate) fn load_mesh(
         &self,
         (path, part): (&Path, Option<u32>),
         progress: Progress<'_>,
@@ -58,24 +58,24 @@ impl Containers {
         }
         let container = self.open(path, progress, token)?;
         match part {
-            Some(part) => container.part(part as usize, &ignore_progress, token),
+            Some(part) => container.build_part(part as usize, &ignore_progress, token),
             None => container.merged_scene(token),
         }
     }
 
-    /// Stores a mesh returned by [`Containers::mesh`] for the next call.
+    /// Stores a mesh returned by [`GltfContainers::load_mesh`] for the next call.
     pub(crate) fn store_mesh(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 
     /// Returns the bytes or the path of an image used by a glTF file, plus the glTF file's hash.
-    pub(crate) fn image(
+    pub(crate) fn image_input(
         &self,
         (path, number): (&Path, u32),
         token: &CancelToken,
     ) -> Result<(ImageInput, FileHash), AssetError> {
         let container = self.open(path, &ignore_progress, token)?;
-        let input = match container.image(number as usize)? {
+        let input = match container.locate_image(number as usize)? {
             ImageBytes::Inside(bytes) => ImageInput::Bytes(bytes.into()),
             ImageBytes::File(path) => ImageInput::File(path),
         };

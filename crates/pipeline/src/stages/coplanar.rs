@@ -4,11 +4,11 @@ use super::super::cache::Memo;
 use super::super::keys;
 use super::Findings;
 use super::meshes::Meshes;
-use super::parse::Parsed;
+use super::parse::ParsedScene;
 use crate::assets::LoadedMesh;
 use crate::scene::description::Object;
 use crate::scene::diagnostic::Severity;
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 use crate::world::{self, CoplanarLight, coplanar_lights};
 
 /// Maximum number of lights to warn about for each kind of overlap.
@@ -17,16 +17,19 @@ const MAX_WARNINGS: usize = 10;
 /// Warns about lights that are moved because they are coplanar with another surface, and about lights that
 /// overlap. Reuses the previous search result if shapes and lights are unchanged.
 pub(crate) fn warn_about_coplanar_lights(
-    parsed: &Parsed,
+    parsed: &ParsedScene,
     meshes: &Meshes,
     memo: &mut Memo<Vec<CoplanarLight>>,
     findings: &mut Findings,
 ) {
     let loaded = &parsed.loaded;
     let scene = &loaded.scene;
-    let origin = world::origin(&scene.camera, parsed.orbiter.as_ref());
-    let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::from(&keys::coplanar(scene, &keys::referents(scene, &mesh_keys, None)), origin);
+    let origin = world::choose_scene_origin(&scene.camera, parsed.orbiter.as_ref());
+    let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
+    let key = keys::with_origin(
+        &keys::coplanar_lights_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None)),
+        origin,
+    );
     let found = memo.get(key).cloned().unwrap_or_else(|| {
         let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
         coplanar_lights(scene, &files, origin)
@@ -34,7 +37,7 @@ pub(crate) fn warn_about_coplanar_lights(
     let named = |number: usize| {
         let Object { shape, name, span, .. } = &scene.objects[number];
         let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
-        format!("the {}{name} on line {}", shape.kind(), loaded.line(span))
+        format!("the {}{name} on line {}", shape.kind(), loaded.line_number(span))
     };
     let (lifted, doubled): (Vec<_>, Vec<_>) = found.iter().partition(|pair| pair.lift.is_some());
     let mut warn = |pairs: &[&CoplanarLight], describe: &dyn Fn(usize, usize, &str) -> String, help: &str| {

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::keys;
 use super::meshes::Meshes;
-use super::{Findings, Stop};
+use super::{Findings, StopReason};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::scene::LoadedScene;
-use crate::scene::description::Sheet;
+use crate::scene::description::OpenSurface;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::fingerprint::Key;
+use crate::scene::fingerprint::Fingerprint;
 use crate::world::{GlassSolids, OpenGlass};
 
 /// How open glass affects the image, shown under the object's location.
@@ -21,17 +21,17 @@ const LACKS: &str = "glass refracts where a ray enters and leaves it; rays throu
 /// Finds the glass solids, or reuses them if shapes and materials are unchanged. Warns about open solids.
 ///
 /// # Errors
-/// Returns [`Stop::Cancelled`] if the token is cancelled.
-pub(crate) fn glass(
+/// Returns [`StopReason::Cancelled`] if the token is cancelled.
+pub(crate) fn find_glass_solids(
     loaded: &LoadedScene,
     meshes: &Meshes,
     memo: &mut Memo<Arc<GlassSolids>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Arc<GlassSolids>, Stop> {
+) -> Result<Arc<GlassSolids>, StopReason> {
     let scene = &loaded.scene;
-    let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::glass(scene, &keys::referents(scene, &mesh_keys, None));
+    let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
+    let key = keys::glass_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None));
     let bodies = if let Some(bodies) = memo.get(key) {
         Arc::clone(bodies)
     } else {
@@ -39,8 +39,8 @@ pub(crate) fn glass(
         Arc::new(GlassSolids::find(scene, &files, token)?)
     };
     memo.set(key, Arc::clone(&bodies));
-    findings.warnings.extend(open_glass_warnings(loaded, bodies.open()));
-    findings.warnings.extend(bodies.flat().iter().map(|&object| flat_glass_warning(loaded, object)));
+    findings.warnings.extend(open_glass_warnings(loaded, bodies.open_objects()));
+    findings.warnings.extend(bodies.flat_objects().iter().map(|&object| flat_glass_warning(loaded, object)));
     Ok(bodies)
 }
 
@@ -79,22 +79,24 @@ fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
         return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
     }
     let sheet = |one, several, help| GlassFlaw::Sheet { one, several, help };
-    Some(match shape.sheet()? {
-        Sheet::Quad(_) => sheet(
+    Some(match shape.as_open_surface()? {
+        OpenSurface::Quad(_) => sheet(
             "a glass quad",
             "glass quads",
             "use a thin [[box]] for a pane, or close it with other glass",
         ),
-        Sheet::Triangle(_) => {
+        OpenSurface::Triangle(_) => {
             sheet("a glass triangle", "glass triangles", "use a [[box]], or a closed [[mesh]]")
         }
-        Sheet::Disk { .. } => {
+        OpenSurface::Disk { .. } => {
             sheet("a glass disk", "glass disks", "use a flat [[cylinder]] for a round pane")
         }
-        Sheet::Cylinder { .. } => {
+        OpenSurface::Cylinder { .. } => {
             sheet("an open glass cylinder", "open glass cylinders", "close it with `caps = true`")
         }
-        Sheet::Cone { .. } => sheet("an open glass cone", "open glass cones", "close it with `cap = true`"),
+        OpenSurface::Cone { .. } => {
+            sheet("an open glass cone", "open glass cones", "close it with `cap = true`")
+        }
     })
 }
 
@@ -104,7 +106,7 @@ fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Dia
     let edges: usize = members.iter().map(|open| open.edges).sum();
     let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
     let part = percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
-    let (count, names) = (members.len(), names(loaded, members));
+    let (count, names) = (members.len(), list_object_names(loaded, members));
     let mesh = match (count, &first.name) {
         (1, Some(name)) => format!("glass mesh \"{name}\" is"),
         (1, None) => "glass mesh is".to_owned(),
@@ -137,10 +139,10 @@ fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Dia
 }
 
 /// Lists the first few objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
-fn names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
+fn list_object_names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
-        let line = || format!("line {}", loaded.line(&object.span));
+        let line = || format!("line {}", loaded.line_number(&object.span));
         object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
     };
     // Replacing only one name with "1 more" would not make the list shorter.
@@ -202,7 +204,7 @@ mod tests {
             })
             .collect();
         let token = CancelToken::new();
-        let found = glass(&loaded, &meshes, &mut Memo::default(), &mut findings, &token);
+        let found = find_glass_solids(&loaded, &meshes, &mut Memo::default(), &mut findings, &token);
         assert!(found.is_ok(), "{text}");
         let is_right = |one: &Diagnostic| {
             let place = one.place.as_ref().map(|place| &place.source[place.span.clone()]);

@@ -9,16 +9,16 @@ use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
-use crate::lights::{Lights, SamplingMode};
+use crate::lights::{LightSamplingPurpose, Lights};
 use crate::scene::description::{Scene, TextureRole};
-use crate::scene::fingerprint::{FingerprintContext, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, Geometry, TextureSource};
 
 /// Cache of the environment map's importance distribution, which does not depend on the map's rotation.
 pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
 /// Collects the lights, or reuses them if they are unchanged.
-pub(crate) fn lights(
+pub(crate) fn collect_lights(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     geometry: &Geometry,
@@ -28,23 +28,24 @@ pub(crate) fn lights(
 ) -> Result<StageResult<Arc<Lights>>, Cancelled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = emission_textures(scene).filter_map(|source| textures.key_of.get(&source));
-    let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
-    let key = keys::lights(scene, of, (geometry.origin(), geometry.lifts()), (map, &patterns));
+    let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();
+    let key = keys::lights_key(scene, of, (geometry.origin(), geometry.light_lifts()), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
-    let lights = world::lights(scene, geometry, &textures.images, sky_map(textures, skies), token)?;
+    let lights = world::build_lights(scene, geometry, &textures.images, sky_map(textures, skies), token)?;
     memo.set(key, lights.clone());
     Ok(match lights.len() {
         0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
         1 => StageResult::done(lights, "1 light"),
         count => {
             let are_picked = |receivers| lights.sampler(receivers).is_some();
-            let picked = match (are_picked(SamplingMode::Eye), are_picked(SamplingMode::Paths)) {
-                (true, _) => describe_light_tree("a subset is sampled", &lights),
-                (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
-                (false, false) => String::new(),
-            };
+            let picked =
+                match (are_picked(LightSamplingPurpose::Eye), are_picked(LightSamplingPurpose::Paths)) {
+                    (true, _) => describe_light_tree("a subset is sampled", &lights),
+                    (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
+                    (false, false) => String::new(),
+                };
             StageResult::done(lights, format!("{count} lights{picked}"))
         }
     })
@@ -69,7 +70,7 @@ fn emission_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
             | TextureRole::NormalMap
             | TextureRole::Bump(_) => false,
         });
-        textures.map(|texture| world::material_source(scene, material, texture))
+        textures.map(|texture| world::material_texture_source(scene, material, texture))
     })
 }
 

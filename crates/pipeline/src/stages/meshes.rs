@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 use super::super::cache::NamedCache;
 use super::super::protocol::reasons;
-use super::super::watch::content::{Content, FileRead};
+use super::super::watch::content::{FileContentId, FileRead};
 use super::containers::canonical;
-use super::{FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, Stop, loading_result};
-use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
+use super::{FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, StopReason, loading_result};
+use crate::assets::{AssetError, Companion, DroppedFaces, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, MeshBounds};
 
 /// A mesh file and the other files that it references.
@@ -22,14 +22,14 @@ use crate::scene::{LoadedScene, MeshBounds};
 pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
     /// Key that covers the contents of all files that the mesh depends on.
-    pub(crate) key: Key,
+    pub(crate) key: Fingerprint,
     companions: Vec<FileRead>,
     /// Bounds of the mesh, computed on demand.
     bounds: OnceLock<MeshBounds>,
 }
 
 impl CachedMesh {
-    pub(super) fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
+    pub(super) fn new(mesh: Arc<LoadedMesh>, key: Fingerprint, companions: Vec<FileRead>) -> Self {
         Self { mesh, key, companions, bounds: OnceLock::new() }
     }
 
@@ -45,17 +45,17 @@ pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 ///
 /// # Errors
 /// The token is cancelled, or there is not enough memory.
-pub(crate) fn meshes(
+pub(crate) fn load_meshes(
     loaded: &LoadedScene,
     cache: &mut NamedCache<MeshName, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Meshes>, Stop> {
+) -> Result<StageResult<Meshes>, StopReason> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
         return Ok(StageResult::skipped(Vec::new(), reasons::NO_MESHES));
     }
-    let before: Vec<(Content, Option<Arc<CachedMesh>>)> = files
+    let before: Vec<(FileContentId, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {
             let name = mesh_name(file);
@@ -73,7 +73,7 @@ pub(crate) fn meshes(
             .zip(before)
             .map(|(file, (content, kept))| {
                 let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
-                    reading.containers.mesh((&file.value, file.part), progress, token)
+                    reading.containers.load_mesh((&file.value, file.part), progress, token)
                 };
                 load_one(file, content, kept, reading, load)
             })
@@ -95,8 +95,8 @@ pub(crate) fn meshes(
                 cache.insert(mesh_name(file), file_key(file, content), (mesh.clone(), bytes));
                 mesh
             }
-            Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(StopReason::work_failure(error)),
             Err(error) => {
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);
@@ -117,7 +117,7 @@ pub(crate) fn meshes(
             findings.add_error(loaded, object.span.clone(), message, help);
         }
     }
-    warn_about_missing_parts(loaded, files, &meshes, findings);
+    warn_about_missing_mesh_data(loaded, files, &meshes, findings);
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
         findings.warnings.extend(loaded.lights_facing_away(bounds));
@@ -126,7 +126,7 @@ pub(crate) fn meshes(
 }
 
 /// Warns about objects whose mesh files lack data that the objects need. Skips files that could not be read.
-fn warn_about_missing_parts(
+fn warn_about_missing_mesh_data(
     loaded: &LoadedScene,
     files: &[MeshFile],
     meshes: &[Arc<CachedMesh>],
@@ -142,7 +142,9 @@ fn warn_about_missing_parts(
         let mut warn = |message| findings.add_warning(loaded, object.span.clone(), message);
         if mesh.vertex_colors && read.colors.is_empty() {
             warn(format!("`vertex_colors` has no effect: the vertices of {file} have no colors"));
-        } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
+        } else if let Some(material) =
+            material.filter(|own| mesh.vertex_colors && !own.kind.accepts_vertex_colors())
+        {
             let name = &material.name;
             warn(format!("`vertex_colors` has no effect: material \"{name}\" has no color to multiply"));
         }
@@ -184,7 +186,7 @@ fn mesh_name(file: &MeshFile) -> MeshName {
 /// Loads one file, or returns the cached mesh if the file and all files it references are unchanged.
 fn load_one(
     file: &MeshFile,
-    content: Content,
+    content: FileContentId,
     kept: Option<Arc<CachedMesh>>,
     reading: &FileReadContext<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
@@ -198,7 +200,7 @@ fn load_one(
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let read = || reading.sink.load_asset(&name, |progress| load(path, progress, reading.token));
+    let read = || reading.sink.load_with_progress(&name, |progress| load(path, progress, reading.token));
     let mut loaded = read();
     if let Ok(mesh) = &loaded
         && has_companion_appeared(&mesh.companions, reading)?
@@ -207,15 +209,15 @@ fn load_one(
     }
     let result = match loaded {
         Ok(mesh) => {
-            let content = reading.contents.decoded(path, mesh.hash);
+            let content = reading.contents.record_decoded(path, mesh.hash);
             files[0].content = content;
             let read = |companion| reading.contents.read_companion(companion, reading.token);
             let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             files.extend(companions.iter().cloned());
             let mut key = FingerprintHasher::new("mesh");
-            key.key(&file_key(file, content));
+            key.add_fingerprint(&file_key(file, content));
             for file in &companions {
-                file.content.add_to(key.path(&file.path));
+                file.content.add_to_fingerprint(key.add_path(&file.path));
             }
             Ok((Arc::new(CachedMesh::new(Arc::new(mesh), key.finish(), companions)), false))
         }
@@ -233,7 +235,7 @@ fn has_companion_appeared(
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
         let content = reading.contents.read(&companion.path, reading.token)?;
-        if is_new && matches!(content, Content::Hash(_)) {
+        if is_new && matches!(content, FileContentId::Hash(_)) {
             return Ok(true);
         }
     }
@@ -249,9 +251,11 @@ fn companions(files: &[FileRead], reading: &FileReadContext<'_>) -> Result<Vec<F
     files.iter().map(now).collect()
 }
 
-fn file_key(file: &MeshFile, content: Content) -> Key {
+fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
     let mut key = FingerprintHasher::new("file");
-    content.add_to(key.path(&file.value).index(file.part.map_or(0, |part| part as usize + 1)));
+    content.add_to_fingerprint(
+        key.add_path(&file.value).add_index(file.part.map_or(0, |part| part as usize + 1)),
+    );
     key.finish()
 }
 
@@ -275,14 +279,14 @@ struct MeshWarnings<'a> {
 
 enum MeshWarning {
     /// Dropped faces, and the number of parts that had any.
-    Dropped(Dropped, usize),
+    Dropped(DroppedFaces, usize),
     Message(String),
 }
 
 impl<'a> MeshWarnings<'a> {
     /// Adds a file's warnings. Adds warnings about its materials only if an object uses them.
     fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
-        if mesh.dropped != Dropped::default() {
+        if mesh.dropped != DroppedFaces::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
             match self.all.get_mut(place) {
                 Some((_, MeshWarning::Dropped(all, parts))) => {
@@ -335,7 +339,7 @@ fn add_warnings(loaded: &LoadedScene, warnings: Vec<(&MeshFile, String)>, findin
 }
 
 /// Describes the dropped faces. Returns `None` if none were dropped.
-fn describe_dropped_faces(faces: &Dropped) -> Option<String> {
+fn describe_dropped_faces(faces: &DroppedFaces) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
     };
@@ -349,27 +353,27 @@ fn describe_dropped_faces(faces: &Dropped) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::containers::Containers;
+    use super::super::containers::GltfContainers;
     use super::*;
-    use crate::sink::Sink;
-    use crate::watch::content::{Contents, Snapshot};
+    use crate::sink::EventSink;
+    use crate::watch::content::{FileHashCache, Snapshot};
 
     const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
     /// A folder containing a mesh and its material, and the state needed to load them.
     struct MeshFixture {
         folder: tempfile::TempDir,
-        sink: Sink,
+        sink: EventSink,
         pool: rayon::ThreadPool,
         cache: NamedCache<MeshName, CachedMesh>,
-        contents: Arc<Contents>,
+        contents: Arc<FileHashCache>,
     }
 
     impl MeshFixture {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("a scratch folder");
             let events = std::sync::mpsc::channel().0;
-            let sink = Sink { generation: 0, events, previews: Default::default(), within: None };
+            let sink = EventSink { generation: 0, events, previews: Default::default(), within: None };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
             let fixture = Self { folder, sink, pool, cache: NamedCache::default(), contents: Arc::default() };
             fixture.write("a.obj", OBJ);
@@ -382,12 +386,12 @@ mod tests {
         }
 
         fn snapshot(&self) -> Snapshot {
-            Snapshot::of(self.contents.clone())
+            Snapshot::new(self.contents.clone())
         }
 
-        fn hash(&self, name: &str) -> Content {
+        fn hash(&self, name: &str) -> FileContentId {
             let path = self.folder.path().join(name);
-            Contents::default().read(&path, &CancelToken::new()).expect("not cancelled")
+            FileHashCache::default().read(&path, &CancelToken::new()).expect("not cancelled")
         }
 
         /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
@@ -408,10 +412,11 @@ mod tests {
                 token: &token,
                 contents,
                 pool: &self.pool,
-                containers: &Containers::default(),
+                containers: &GltfContainers::default(),
             };
             let mut findings = Findings::default();
-            let meshes = meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
+            let meshes =
+                load_meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
             (meshes.value, findings)
         }
     }
@@ -488,12 +493,12 @@ mod tests {
         fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");
-        assert_eq!(snapshot.changed(), None);
+        assert_eq!(snapshot.changed_file(), None);
         fixture.cache = NamedCache::default();
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, fixture.hash("a.obj")), "decoded");
         assert_eq!(
-            snapshot.changed(),
+            snapshot.changed_file(),
             Some(fixture.folder.path().join("a.obj")),
             "the request should start again"
         );
@@ -514,7 +519,7 @@ mod tests {
             token: &token,
             contents: &snapshot,
             pool: &fixture.pool,
-            containers: &Containers::default(),
+            containers: &GltfContainers::default(),
         };
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
@@ -541,7 +546,7 @@ mod tests {
             token: &token,
             contents: &snapshot,
             pool: &fixture.pool,
-            containers: &Containers::default(),
+            containers: &GltfContainers::default(),
         };
         let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
@@ -561,7 +566,7 @@ mod tests {
         let (files, other) =
             ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });
         let mesh = |degenerate, warning: &str| LoadedMesh {
-            dropped: Dropped { non_finite: 0, degenerate },
+            dropped: DroppedFaces { non_finite: 0, degenerate },
             warnings: vec![warning.to_owned()],
             ..LoadedMesh::default()
         };
@@ -580,8 +585,8 @@ mod tests {
 
     #[test]
     fn dropped_faces_are_counted() {
-        assert_eq!(describe_dropped_faces(&Dropped::default()), None);
-        let some = Dropped { non_finite: 1, degenerate: 12 };
+        assert_eq!(describe_dropped_faces(&DroppedFaces::default()), None);
+        let some = DroppedFaces { non_finite: 1, degenerate: 12 };
         assert_eq!(
             describe_dropped_faces(&some).as_deref(),
             Some("skipped 1 face with non-finite coordinates and 12 faces without area")

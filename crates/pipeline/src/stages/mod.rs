@@ -20,10 +20,10 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use self::containers::Containers;
+use self::containers::GltfContainers;
 use super::protocol::{Failure, Status, reasons};
-use super::sink::Sink;
-use super::watch::content::{Contents, FileRead, Snapshot};
+use super::sink::EventSink;
+use super::watch::content::{FileHashCache, FileRead, Snapshot};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::LoadedScene;
@@ -31,25 +31,25 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Reasons for ending a request early.
 #[derive(Debug)]
-pub(super) enum Stop {
+pub(super) enum StopReason {
     Cancelled,
     Failed(Failure),
 }
 
-impl From<Cancelled> for Stop {
+impl From<Cancelled> for StopReason {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled
     }
 }
 
-impl Stop {
+impl StopReason {
     #[allow(clippy::needless_pass_by_value, reason = "`map_err` passes ownership")]
-    pub(super) fn work(message: impl ToString) -> Self {
+    pub(super) fn work_failure(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
     /// An error on the command line, which has no location in the scene.
-    pub(super) fn call_error(message: String, help: &str) -> Self {
+    pub(super) fn command_line_error(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
         Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))
@@ -80,11 +80,11 @@ impl<T> StageResult<T> {
 
 /// Inputs shared by the stages that read files.
 pub(super) struct FileReadContext<'a> {
-    pub(super) sink: &'a Sink,
+    pub(super) sink: &'a EventSink,
     pub(super) token: &'a CancelToken,
     pub(super) contents: &'a Snapshot,
     pub(super) pool: &'a ThreadPool,
-    pub(super) containers: &'a Containers,
+    pub(super) containers: &'a GltfContainers,
 }
 
 /// Files, errors and warnings found by a request.
@@ -139,7 +139,7 @@ impl Findings {
         &mut self,
         diagnostics: &[Diagnostic],
         scene: &Path,
-        contents: &Contents,
+        contents: &FileHashCache,
         token: &CancelToken,
     ) {
         let folder = scene.parent().unwrap_or(Path::new(""));

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::model::{self, ModelText, ModelView};
+use super::super::model::{self, GeneratedScene, ModelView};
 use super::super::protocol::{Failure, reasons};
-use super::super::watch::content::{Content, FileRead, Snapshot};
-use super::containers::Containers;
-use super::{Findings, StageResult, Stop};
+use super::super::watch::content::{FileContentId, FileRead, Snapshot};
+use super::containers::GltfContainers;
+use super::{Findings, StageResult, StopReason};
 use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
@@ -19,13 +19,13 @@ use crate::output::held::{self, BackupRecovery};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::is_model;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// A valid scene and the files it references.
 #[derive(Debug)]
-pub(crate) struct Parsed {
+pub(crate) struct ParsedScene {
     pub(crate) loaded: Arc<scene::LoadedScene>,
     pub(crate) orbiter: Option<OrbiterCamera>,
     /// Files that the scene references without the overrides, and the files that those files reference.
@@ -34,7 +34,7 @@ pub(crate) struct Parsed {
     companions: Vec<FileRead>,
     /// Approximations made when the scene for a model was generated.
     notes: Vec<Diagnostic>,
-    orbiter_content: Option<Content>,
+    orbiter_content: Option<FileContentId>,
 }
 
 /// The scene to parse: its path, the overrides and, for a model, the view.
@@ -49,15 +49,15 @@ pub(crate) struct SceneSource<'a> {
 }
 
 /// Generates a scene for a model. Also returns all other files that the generated scene depends on.
-fn model_scene(
+fn generate_model_scene(
     SceneSource { path, sets, show }: SceneSource<'_>,
-    (contents, containers): (&Snapshot, &Containers),
+    (contents, containers): (&Snapshot, &GltfContainers),
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::LoadedScene, ModelText), Stop> {
+) -> Result<(scene::LoadedScene, GeneratedScene), StopReason> {
     let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
-        AssetError::Cancelled(_) => Stop::Cancelled,
-        AssetError::OutOfMemory { .. } => Stop::work(error),
+        AssetError::Cancelled(_) => StopReason::Cancelled,
+        AssetError::OutOfMemory { .. } => StopReason::work_failure(error),
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.read(&path, token) {
@@ -72,14 +72,15 @@ fn model_scene(
     })?;
     let loaded = scene::load_generated(made.text.as_str().into(), path, sets);
     let loaded = loaded.map_err(|errors| {
-        let shown = |one: Diagnostic| if one.path == path { model::in_generated_scene(one) } else { one };
-        Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
+        let shown =
+            |one: Diagnostic| if one.path == path { model::mark_as_generated_scene(one) } else { one };
+        StopReason::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
     })?;
     Ok((loaded, made))
 }
 
-fn scene_error(path: &Path, message: String) -> Stop {
-    Stop::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
+fn scene_error(path: &Path, message: String) -> StopReason {
+    StopReason::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
 }
 
 /// Creates a diagnostic about an entire file.
@@ -93,11 +94,11 @@ fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnost
 /// Returns all errors in the scene file.
 pub(crate) fn parse(
     origin: SceneSource<'_>,
-    (contents, containers): (&Snapshot, &Containers),
-    memo: &mut Memo<Arc<Parsed>>,
+    (contents, containers): (&Snapshot, &GltfContainers),
+    memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<StageResult<Arc<Parsed>>, Stop> {
+) -> Result<StageResult<Arc<ParsedScene>>, StopReason> {
     let SceneSource { path, show, .. } = origin;
     if let BackupRecovery::Differs(held) = held::recover_backup(path) {
         let help =
@@ -115,7 +116,7 @@ pub(crate) fn parse(
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
         };
-        return Err(Stop::Failed(Failure::Scene(vec![file_diagnostic(
+        return Err(StopReason::Failed(Failure::Scene(vec![file_diagnostic(
             Path::new(""),
             Severity::Error,
             message.to_owned(),
@@ -123,7 +124,7 @@ pub(crate) fn parse(
     }
     let key = |content| scene_key(origin, content, is_model);
     // A model's scene depends on several files. All must be unchanged.
-    let is_same = |parsed: &&Arc<Parsed>| {
+    let is_same = |parsed: &&Arc<ParsedScene>| {
         let now =
             |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
         parsed.companions.iter().all(now)
@@ -140,13 +141,13 @@ pub(crate) fn parse(
     };
     findings.replace_read_file(FileRead { path: path.to_owned(), content });
     companions.iter().for_each(|file| findings.add_file(file.clone()));
-    let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
+    let (orbiter, orbiter_content) = read_orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(StageResult::reused(parsed, reasons::UNCHANGED));
     }
     let named = referenced_files(&loaded, token)?;
-    let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
+    let parsed = Arc::new(ParsedScene { loaded, orbiter, named, companions, notes, orbiter_content });
     // Do not cache a scene whose orbiter file could not be read, so that the next request tries again.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key(content), parsed.clone());
@@ -155,24 +156,26 @@ pub(crate) fn parse(
 }
 
 /// A scene, its file's content, the other files it depends on, and the approximations made.
-type ReadScene = (Arc<scene::LoadedScene>, Content, Vec<FileRead>, Vec<Diagnostic>);
+type SceneReadResult = (Arc<scene::LoadedScene>, FileContentId, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read_scene(
     origin: SceneSource<'_>,
-    (contents, containers): (&Snapshot, &Containers),
-    last: Option<&Arc<Parsed>>,
+    (contents, containers): (&Snapshot, &GltfContainers),
+    last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<ReadScene, Stop> {
+) -> Result<SceneReadResult, StopReason> {
     let SceneSource { path, sets, .. } = origin;
     if !is_model(path) {
-        let loaded = scene::load(path, sets)
-            .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name_hint(errors, path, last))))?;
-        let content = contents.decoded(path, *blake3::hash(loaded.source.text().as_bytes()).as_bytes());
+        let loaded = scene::load(path, sets).map_err(|errors| {
+            StopReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
+        })?;
+        let content =
+            contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     }
-    let (loaded, made) = model_scene(origin, (contents, containers), findings, token)?;
-    let content = contents.decoded(path, made.hash);
+    let (loaded, made) = generate_model_scene(origin, (contents, containers), findings, token)?;
+    let content = contents.record_decoded(path, made.hash);
     let companions = made.companions.iter().map(|companion| contents.read_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
     let notes = made.notes.into_iter().map(|note| file_diagnostic(path, Severity::Warning, note)).collect();
@@ -180,32 +183,36 @@ fn read_scene(
 }
 
 /// Returns the key for a scene whose file has this content.
-fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
+fn scene_key(
+    SceneSource { path, sets, show }: SceneSource<'_>,
+    content: FileContentId,
+    is_model: bool,
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("parse");
-    content.add_to(key.path(path));
+    content.add_to_fingerprint(key.add_path(path));
     sets.iter().for_each(|set| {
-        key.text(set);
+        key.add_str(set);
     });
     if is_model {
-        show.add_to(&mut key);
+        show.add_to_fingerprint(&mut key);
     }
     key.finish()
 }
 
 /// If the scene file is missing but another file contains the same text as the last valid scene, adds a hint
 /// to the error.
-fn with_new_name_hint(
+fn add_renamed_file_hint(
     mut errors: Vec<Diagnostic>,
     path: &Path,
-    last: Option<&Arc<Parsed>>,
+    last: Option<&Arc<ParsedScene>>,
 ) -> Vec<Diagnostic> {
     let last = last.filter(|last| last.loaded.path == path);
     if let [error] = &mut errors[..]
-        && scene::is_absence(error)
+        && scene::is_file_not_found(error)
         && let Some(last) = last
-        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.shared_text())
+        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.shared_file_text())
     {
-        let name = visible(&file.to_string_lossy()).into_owned();
+        let name = escape_invisible_chars(&file.to_string_lossy()).into_owned();
         error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));
     }
     errors
@@ -239,16 +246,16 @@ pub fn companion_files<'a>(
     Ok(companions)
 }
 
-type Orbiter = (Option<OrbiterCamera>, Option<Content>);
+type OrbiterReadResult = (Option<OrbiterCamera>, Option<FileContentId>);
 
 /// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
-fn orbiter(
+fn read_orbiter(
     loaded: &scene::LoadedScene,
-    known: Option<&Parsed>,
+    known: Option<&ParsedScene>,
     contents: &Snapshot,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Orbiter, Stop> {
+) -> Result<OrbiterReadResult, StopReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
     let content = contents.read(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
@@ -257,7 +264,7 @@ fn orbiter(
     }
     match load_orbiter(&file.value) {
         Ok((camera, hash)) => {
-            let content = contents.decoded(&file.value, hash);
+            let content = contents.record_decoded(&file.value, hash);
             findings.add_file(FileRead { path: file.value.clone(), content });
             Ok((Some(camera), Some(content)))
         }

@@ -11,16 +11,16 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use rayon::ThreadPool;
 
 use super::super::cache::Memo;
-use super::super::plan::Plan;
+use super::super::plan::RenderPlan;
 use super::super::protocol::{PhotonsReport, reasons};
-use super::super::sink::Sink;
+use super::super::sink::EventSink;
 use super::super::stopwatch::Stopwatch;
 use super::super::trace::TICK;
-use super::{StageResult, Stop};
+use super::{StageResult, StopReason};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons, RenderSettings};
-use crate::scene::description::Render;
-use crate::scene::fingerprint::Key;
+use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
+use crate::scene::description::RenderOptions;
+use crate::scene::fingerprint::Fingerprint;
 use crate::world::World;
 
 /// Memory limit for maps cached for later images.
@@ -40,16 +40,16 @@ pub(crate) type PhotonCache = Memo<PhotonStore>;
 #[derive(Clone, Copy)]
 pub(crate) struct PhotonContext<'a> {
     pub(crate) world: &'a World,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     pub(crate) pool: &'a ThreadPool,
     pub(crate) token: &'a CancelToken,
-    pub(crate) sink: &'a Sink,
+    pub(crate) sink: &'a EventSink,
 }
 
 /// Photons for a scene.
 #[derive(Debug)]
 pub(crate) struct PhotonStore {
-    photons: Photons,
+    photons: PhotonMapper,
     /// Cached passes, starting with the first.
     kept: RefCell<Vec<Arc<PhotonPass>>>,
     /// Photon counts of the current request.
@@ -121,13 +121,13 @@ impl PhotonStore {
         let watch = Stopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.effective();
-        let pass = run_with_ticks(pool, tick, || photons.pass(world, &settings, number, token))?;
+        let pass = run_with_ticks(pool, tick, || photons.trace_pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
         self.sent.set(PhotonCounts {
             passes: sent.passes + 1,
             emitted: sent.emitted + pass.emitted,
-            stored: sent.stored + pass.stored(),
+            stored: sent.stored + pass.photon_count(),
             lookups: sent.lookups + pass.lookups,
             seconds: sent.seconds + watch.seconds(),
             ..sent
@@ -147,9 +147,9 @@ impl PhotonStore {
     /// Reports the photons traced since the stage started, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
         let PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
-        let [caustic, bounced] = self.photons.radii();
+        let [caustic, bounced] = self.photons.initial_radii();
         PhotonsReport {
-            count: self.photons.count(),
+            count: self.photons.photons_per_pass(),
             passes,
             emitted,
             stored,
@@ -189,14 +189,14 @@ fn run_with_ticks<T: Send>(
 ///
 /// # Errors
 /// The token is cancelled, or `before` fails.
-pub(crate) fn photons(
+pub(crate) fn trace_first_photons(
     (enabled, wanted): (bool, Option<bool>),
-    key: impl FnOnce(PhotonSettings) -> Key,
+    key: impl FnOnce(PhotonSettings) -> Fingerprint,
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
-    before: impl FnOnce() -> Result<(), Stop>,
-) -> Result<StageResult<()>, Stop> {
+    before: impl FnOnce() -> Result<(), StopReason>,
+) -> Result<StageResult<()>, StopReason> {
     let settings = sending.plan.settings.effective();
     let skipped = |why: &str| Ok(StageResult::skipped((), why));
     let Some(of_photons) = settings.photons else {
@@ -207,7 +207,7 @@ pub(crate) fn photons(
         };
     };
     if !settings.gathers_photons() {
-        let deeper = Render { max_depth: u32::MAX, ..settings.render };
+        let deeper = RenderOptions { max_depth: u32::MAX, ..settings.render };
         return skipped(match (RenderSettings { render: deeper, ..settings }).gathers_photons() {
             true => reasons::TOO_FEW_BOUNCES,
             false => reasons::NOT_NEEDED_FOR_VIEW,
@@ -225,11 +225,11 @@ pub(crate) fn photons(
     let PhotonContext { world, pool, token, .. } = sending;
     let watch = Stopwatch::start(token);
     let send = |progress: Progress<'_>| {
-        run_with_ticks(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
+        run_with_ticks(pool, &mut tick, || PhotonMapper::new(world, &settings, of_photons, progress, token))
     };
-    let (photons, first) = sending.sink.load_asset("photons", send)?;
+    let (photons, first) = sending.sink.load_with_progress("photons", send)?;
     let seconds = watch.seconds();
-    let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
+    let (passes, emitted, stored, lookups) = (1, first.emitted, first.photon_count(), first.lookups);
     let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let emits_photons = photons.emits_photons();

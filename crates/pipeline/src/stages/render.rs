@@ -5,28 +5,28 @@
 //! is a function of its pixel and index, and each pixel sums its samples in order.
 
 use super::photons::PhotonStore;
-use super::{StageResult, Stop};
+use super::{StageResult, StopReason};
 use crate::film::Convergence;
 use crate::integrators::RayCounters;
 use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::render::scheduler::{RenderStageInputs, Scheduler};
-use crate::scene::description::Render;
-use crate::scene::fingerprint::Key;
+use crate::scene::description::RenderOptions;
+use crate::scene::fingerprint::Fingerprint;
 
 /// Renders the film with this key until it has the requested number of samples or reaches the noise target.
 ///
 /// # Errors
 /// The token is cancelled, or there is not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
-    key: Key,
+    key: Fingerprint,
     films: &mut FilmCache,
     rendering: &RenderStageInputs<'_>,
-) -> Result<StageResult<RayCounters>, Stop> {
-    let Render { samples: wanted, error, .. } = rendering.plan.settings.render;
+) -> Result<StageResult<RayCounters>, StopReason> {
+    let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
+    films.make_current(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::emits_photons) {
             true => Convergence::Photons,
@@ -34,20 +34,22 @@ pub(crate) fn render(
         };
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
-        let empty = films.replace_current(state).map_err(Stop::work)?;
+        let empty = films.replace_current(state).map_err(StopReason::work_failure)?;
         let is_of_use = match rendering.checkpointer.filter(|_| !rendering.force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
         if !is_of_use {
-            films.replace_current(state).map_err(Stop::work)?;
+            films.replace_current(state).map_err(StopReason::work_failure)?;
         }
     }
-    let Some(state) = films.current_mut() else { return Err(Stop::work("the film is missing")) };
+    let Some(state) = films.current_mut() else {
+        return Err(StopReason::work_failure("the film is missing"));
+    };
     let budget = rendering.plan.time_seconds;
     let is_part = state.is_finished_part;
     let finished = state.is_finished(rendering.plan);
-    let had = state.samples(wanted);
+    let had = state.min_samples(wanted);
     let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
@@ -77,6 +79,6 @@ pub(crate) fn render(
             StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }
         (false, 0) => StageResult::done(rays, ""),
-        (false, _) => StageResult::done(rays, reasons::resumed_after(had)),
+        (false, _) => StageResult::done(rays, reasons::resume_reason(had)),
     })
 }

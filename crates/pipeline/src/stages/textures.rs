@@ -11,22 +11,22 @@ use rayon::prelude::*;
 
 use super::super::cache::{EvictionCandidate, NamedCache};
 use super::super::protocol::reasons;
-use super::super::watch::content::{Content, FileRead};
+use super::super::watch::content::{FileContentId, FileRead};
 use super::containers::{ImageInput, canonical};
 use super::meshes::Meshes;
-use super::{FileCounts, FileReadContext, Findings, StageResult, Stop, loading_result};
+use super::{FileCounts, FileReadContext, Findings, StageResult, StopReason, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, coverage, load_embedded, load_hashed,
-    mipmaps, size, size_embedded,
+    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, build_coverage_mipmaps,
+    load_embedded, load_hashed, mipmaps, size, size_embedded,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
-use crate::scene::description::{Channel, Encoding, PixelValue, Scene, TextureRole};
+use crate::scene::description::{Channel, ChannelSelector, Scene, TextureEncoding, TextureRole};
 use crate::scene::diagnostic::Severity;
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, is_model};
 use crate::world::{
     CutoffBits, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source,
@@ -94,13 +94,13 @@ impl TextureCache {
 pub(crate) struct Textures {
     pub(crate) images: Images,
     /// Key of each image.
-    pub(crate) key_of: HashMap<TextureSource, Key>,
+    pub(crate) key_of: HashMap<TextureSource, Fingerprint>,
     /// Key of each texture, in the same order as the needed textures.
-    pub(crate) keys: Vec<Key>,
+    pub(crate) keys: Vec<Fingerprint>,
     /// Keys of the textures used by materials from mesh files.
-    pub(crate) of_files: Vec<Key>,
+    pub(crate) of_files: Vec<Fingerprint>,
     /// The environment map and its key.
-    pub(crate) environment: Option<(Key, Arc<Texels>)>,
+    pub(crate) environment: Option<(Fingerprint, Arc<Texels>)>,
     /// Number of texels that this request read from files.
     pub(crate) texels_loaded: u64,
     /// Bytes used by all images, including their mipmaps.
@@ -119,7 +119,7 @@ pub(crate) struct NeededTextures {
 
 /// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
 /// returns all of them, so that the lights and trees that depend on them can be reused.
-pub(crate) fn needed(
+pub(crate) fn find_needed_textures(
     loaded: &LoadedScene,
     meshes: &Meshes,
     lookups: TextureNeeds,
@@ -138,7 +138,7 @@ pub(crate) fn needed(
 /// An image and all textures that use it.
 struct TextureRequest<'a> {
     name: TextureName,
-    content: Content,
+    content: FileContentId,
     /// The image file that the glTF file references.
     linked: Option<FileRead>,
     kept: CachedTexture,
@@ -156,13 +156,13 @@ struct CachedTexture {
 ///
 /// # Errors
 /// The token is cancelled, or there is not enough memory.
-pub(crate) fn textures(
+pub(crate) fn load_textures(
     loaded: &LoadedScene,
     needed: &NeededTextures,
     cache: &mut TextureCache,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Textures>, Stop> {
+) -> Result<StageResult<Textures>, StopReason> {
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
@@ -173,7 +173,7 @@ pub(crate) fn textures(
         return Ok(StageResult::skipped(textures, why));
     }
     let environment = environment_source(&loaded.scene);
-    let images = images(needed, cache, reading)?;
+    let images = group_by_image(needed, cache, reading)?;
     let assets = load_all(&images, MAX_BYTES, reading);
     let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
@@ -219,8 +219,8 @@ pub(crate) fn textures(
                 let bytes = texels.memory_bytes();
                 cache.texels.insert(image.name, key, (decoded, bytes));
             }
-            Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(StopReason::work_failure(error)),
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
@@ -237,7 +237,7 @@ pub(crate) fn textures(
                             findings.add_error(
                                 loaded,
                                 reference_span(loaded, one),
-                                locate(one, &error),
+                                prefix_mtl_line(one, &error),
                                 &help,
                             );
                         }
@@ -271,7 +271,7 @@ fn substitute_texture(
         let warning = loaded.diagnostic_at(
             reference_span(loaded, one),
             Severity::Warning,
-            locate(one, error),
+            prefix_mtl_line(one, error),
             Some(help),
         );
         if !findings.warnings.contains(&warning) {
@@ -303,7 +303,7 @@ fn substitute_texture(
 }
 
 /// Prefixes a message about an image with the MTL line that references the image.
-fn locate(one: &NeededTexture, message: &impl Display) -> String {
+fn prefix_mtl_line(one: &NeededTexture, message: &impl Display) -> String {
     match &one.statement {
         Some(statement) => format!("{statement}: {message}"),
         None => message.to_string(),
@@ -312,7 +312,7 @@ fn locate(one: &NeededTexture, message: &impl Display) -> String {
 
 /// Adds a warning about an image at the place where the image is referenced.
 fn warn(loaded: &LoadedScene, one: &NeededTexture, message: &str, findings: &mut Findings) {
-    findings.add_warning(loaded, reference_span(loaded, one), locate(one, &message));
+    findings.add_warning(loaded, reference_span(loaded, one), prefix_mtl_line(one, &message));
 }
 
 /// Warns about pixels that are negative, not finite or too large.
@@ -360,7 +360,7 @@ fn warn_about_opaque_alpha(
     texels: &Texels,
     findings: &mut Findings,
 ) {
-    const ALPHA: PixelValue = PixelValue::Channel(Channel::Alpha);
+    const ALPHA: ChannelSelector = ChannelSelector::Channel(Channel::Alpha);
     let is_alpha = |one: &&&NeededTexture| {
         matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, is_srgb: _ })
     };
@@ -385,23 +385,23 @@ impl TextureRequest<'_> {
         &self.asked_by[0].source.path
     }
 
-    fn key(&self) -> Key {
+    fn key(&self) -> Fingerprint {
         let (path, image, encoding, coverage) = &self.name;
         let mut key = FingerprintHasher::new("texture");
-        key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
+        key.add_path(path).add_index(encoding.index()).add_index(image.map_or(0, |image| image as usize + 1));
         if let Some(cutoff) = coverage {
-            key.f32(cutoff.value());
+            key.add_f32(cutoff.value());
         }
-        self.content.add_to(&mut key);
+        self.content.add_to_fingerprint(&mut key);
         if let Some(FileRead { path, content }) = &self.linked {
-            content.add_to(key.path(path));
+            content.add_to_fingerprint(key.add_path(path));
         }
         key.finish()
     }
 }
 
 /// Groups the needed textures by file and encoding, in their original order, and looks up cached data.
-fn images<'a>(
+fn group_by_image<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
     reading: &FileReadContext<'_>,
@@ -445,10 +445,11 @@ fn load_all(
                 (texels.width, texels.height, texels.memory_bytes() as u64)
             }
             // Unreadable images are reported during loading.
-            None => size_of(&image.asked_by[0].source, reading).unwrap_or_default(),
+            None => image_dimensions(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
         let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
-        bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height, is_weighted) } else { 0 }
+        bytes
+            + if image.has_mipmaps() { Mipmaps::estimate_memory_bytes(width, height, is_weighted) } else { 0 }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = memory_limit_errors(&sizes, most_bytes);
@@ -484,7 +485,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if this is a glTF file, of the image file that it references.
-type TextureContents = (Content, Option<FileRead>);
+type TextureContents = (FileContentId, Option<FileRead>);
 
 /// An image and its mipmaps, and whether both came from the cache.
 type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -509,7 +510,7 @@ fn load_one(
             was_kept = false;
             let made = match image.asked_by[0].source.coverage {
                 None => mipmaps(&decoded.texels, reading.token)?,
-                Some(cutoff) => coverage(&decoded.texels, cutoff.value(), reading.token)?,
+                Some(cutoff) => build_coverage_mipmaps(&decoded.texels, cutoff.value(), reading.token)?,
             };
             Some(Arc::new(made))
         }
@@ -530,14 +531,14 @@ fn decode(
     let file = match one.source.image {
         None => image.path().to_owned(),
         Some(number) => {
-            let (input, hash) = reading.containers.image((image.path(), number), token)?;
-            contents.0 = reading.contents.decoded(image.path(), hash);
+            let (input, hash) = reading.containers.image_input((image.path(), number), token)?;
+            contents.0 = reading.contents.record_decoded(image.path(), hash);
             match input {
                 ImageInput::Bytes(bytes) => {
                     let within = EmbeddedImage { path: image.path(), bytes };
                     let load =
                         |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
-                    return reading.sink.load_asset(&one.name, load);
+                    return reading.sink.load_with_progress(&one.name, load);
                 }
                 ImageInput::File(path) => {
                     let content = reading.contents.read(&path, token)?;
@@ -548,8 +549,8 @@ fn decode(
         }
     };
     let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
-    let (texels, hash) = reading.sink.load_asset(&one.name, load)?;
-    let content = reading.contents.decoded(&file, hash);
+    let (texels, hash) = reading.sink.load_with_progress(&one.name, load)?;
+    let content = reading.contents.record_decoded(&file, hash);
     match &mut contents.1 {
         Some(linked) => linked.content = content,
         None => contents.0 = content,
@@ -558,17 +559,22 @@ fn decode(
 }
 
 /// Returns where an image's bytes are stored.
-fn input(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<ImageInput, AssetError> {
+fn image_input(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<ImageInput, AssetError> {
     match source.image {
         None => Ok(ImageInput::File(source.path.clone())),
-        Some(image) => reading.containers.image((&source.path, image), reading.token).map(|(input, _)| input),
+        Some(image) => {
+            reading.containers.image_input((&source.path, image), reading.token).map(|(input, _)| input)
+        }
     }
 }
 
 /// Returns the width, height and memory size of an image.
-fn size_of(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<(u32, u32, u64), AssetError> {
+fn image_dimensions(
+    source: &TextureSource,
+    reading: &FileReadContext<'_>,
+) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
-    match input(source, reading)? {
+    match image_input(source, reading)? {
         ImageInput::File(path) => size(&path, encoding, limits, reading.token),
         ImageInput::Bytes(bytes) => {
             size_embedded(EmbeddedImage { path: &source.path, bytes }, encoding, limits, reading.token)
@@ -577,7 +583,7 @@ fn size_of(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<(u32
 }
 
 /// Adds textures that only `check` loads: unused textures from the scene file, and a black environment map.
-pub(crate) fn add_declared(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
+pub(crate) fn add_unused_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
@@ -585,9 +591,9 @@ pub(crate) fn add_declared(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
             continue;
         }
         let encoding = match texture.encoding {
-            Encoding::Auto => ImageEncoding::Color,
-            Encoding::Srgb => ImageEncoding::Srgb,
-            Encoding::Linear => ImageEncoding::Linear,
+            TextureEncoding::Auto => ImageEncoding::Color,
+            TextureEncoding::Srgb => ImageEncoding::Srgb,
+            TextureEncoding::Linear => ImageEncoding::Linear,
         };
         let (path, image) = (texture.file.value.clone(), texture.image);
         let source = TextureSource { path, image, encoding, coverage: None };
@@ -605,7 +611,7 @@ pub(crate) fn add_declared(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
     }
     let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
     if let Some(file) = environment.filter(|file| known.insert(name(&file.value, None))) {
-        wanted.push(NeededTexture::of_environment(&file.value));
+        wanted.push(NeededTexture::for_environment(&file.value));
     }
 }
 

@@ -5,26 +5,26 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::super::inputs::Inputs;
-use super::super::plan::Plan;
+use super::super::inputs::ProtectedInputs;
+use super::super::plan::RenderPlan;
 use super::super::protocol::{WriteMode, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
-use super::super::sink::Sink;
-use super::super::targets::{OutputTarget, conflicts, protection, write_guarded};
+use super::super::sink::EventSink;
+use super::super::targets::{OutputTarget, conflicts, overwrite_protection, write_guarded};
 use super::super::turntable::TurntableFrame;
-use super::super::watch::content::{Content, Contents};
-use super::{StageResult, Stop};
+use super::super::watch::content::{FileContentId, FileHashCache};
+use super::{StageResult, StopReason};
 use crate::choice::Choice;
 use crate::control::CancelToken;
-use crate::film::tone::develop;
-use crate::film::{Picture, RadianceImage, Rect, SampleStats};
+use crate::film::tone::tone_map_to_8_bits;
+use crate::film::{RadianceImage, Rect, SampleStats, Srgb8Image};
 use crate::integrators::{AovSource, LightAov};
-use crate::output::part::{self, Head, PartKind};
+use crate::output::part::{self, PartHeader, PartKind};
 use crate::output::write::{Durability, SweptFolders, WritePolicy};
 use crate::output::{self, BitDepth, DevelopSettings, Format, LayerImage, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
-use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Metadata key for the scene file.
 const SCENE: &str = "glimt:scene";
@@ -34,11 +34,11 @@ const SCENE: &str = "glimt:scene";
 pub(crate) struct WrittenImages {
     /// For each file, the image key and the file content after the write. Files without a key are written
     /// again.
-    files: HashMap<PathBuf, (Option<Key>, Content)>,
+    files: HashMap<PathBuf, (Option<Fingerprint>, FileContentId)>,
     /// Whether the files contain an image with keyboard changes.
     is_by_hand: bool,
     /// Key of the scene's own image, if all of its output files are up to date.
-    pub(crate) own: Option<Key>,
+    pub(crate) own: Option<Fingerprint>,
     /// Folders from which this write or turntable has already removed temporary files left by killed
     /// processes.
     sweep: SweptFolders,
@@ -49,7 +49,7 @@ impl WrittenImages {
     pub(crate) fn first_foreign_file<'a>(
         &self,
         paths: &'a [PathBuf],
-        contents: &Contents,
+        contents: &FileHashCache,
     ) -> Option<&'a Path> {
         let is_ours =
             |path: &Path| self.files.get(path).is_some_and(|(_, known)| has_content(path, *known, contents));
@@ -64,12 +64,12 @@ impl WrittenImages {
 
     /// Whether a file on disk contains an image with keyboard changes that the user wrote. It is replaced
     /// only after the scene is saved, or when the user writes another image.
-    pub(crate) fn have_image_by_hand(&self, contents: &Contents) -> bool {
+    pub(crate) fn has_user_written_image(&self, contents: &FileHashCache) -> bool {
         self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content(path, *known, contents))
     }
 
     /// Allows the scene's own image to replace any other.
-    pub(crate) fn release(&mut self) {
+    pub(crate) fn allow_replacing_all(&mut self) {
         self.is_by_hand = false;
     }
 
@@ -81,7 +81,7 @@ impl WrittenImages {
 }
 
 /// Whether a file has the given content.
-fn has_content(path: &Path, known: Content, contents: &Contents) -> bool {
+fn has_content(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
     // Use a token that is never cancelled.
     contents.read(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
@@ -89,14 +89,14 @@ fn has_content(path: &Path, known: Content, contents: &Contents) -> bool {
 /// An image's output files, and files that must not be overwritten.
 #[derive(Clone, Copy)]
 pub(crate) struct Destination<'a> {
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     /// Image layers for EXR files.
     pub(crate) layers: &'a [LayerImage],
-    pub(crate) inputs: &'a Inputs,
-    pub(crate) contents: &'a Contents,
+    pub(crate) inputs: &'a ProtectedInputs,
+    pub(crate) contents: &'a FileHashCache,
     /// Whether this is the scene's own image, without keyboard changes.
     pub(crate) is_own: bool,
-    pub(crate) sink: &'a Sink,
+    pub(crate) sink: &'a EventSink,
 }
 
 /// Checks all output files before rendering starts.
@@ -104,14 +104,18 @@ pub(crate) struct Destination<'a> {
 /// # Errors
 /// With [`WriteMode::Must`], returns an error for the first file that cannot be written. Otherwise, reports
 /// failures as events.
-pub(crate) fn check_targets(writing: WriteMode, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
+pub(crate) fn check_targets(
+    writing: WriteMode,
+    plan: &RenderPlan,
+    sink: &EventSink,
+) -> Result<(), StopReason> {
     match writing {
         WriteMode::No => Ok(()),
-        WriteMode::Must => {
-            check_each_target(plan, output::check_target, output::check_path).map_err(Stop::work)
-        }
+        WriteMode::Must => check_each_target(plan, output::check_target, output::check_path)
+            .map_err(StopReason::work_failure),
         WriteMode::Try => {
-            if let Err(error) = check_each_target(plan, output::check_target_read_only, output::inspect_path)
+            if let Err(error) =
+                check_each_target(plan, output::check_target_read_only, output::check_path_read_only)
             {
                 sink.write_failed(None, error.to_string());
             }
@@ -121,7 +125,7 @@ pub(crate) fn check_targets(writing: WriteMode, plan: &Plan, sink: &Sink) -> Res
 }
 
 fn check_each_target(
-    plan: &Plan,
+    plan: &RenderPlan,
     target: impl Fn(&Path) -> Result<Format, OutputError>,
     place: impl Fn(&Path) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
@@ -153,7 +157,7 @@ pub(crate) fn write_if_wanted(
     to: Destination<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
-) -> Result<StageResult<bool>, Stop> {
+) -> Result<StageResult<bool>, StopReason> {
     match writing {
         WriteMode::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
         WriteMode::Try | WriteMode::Must => write(state, to, written, token, writing == WriteMode::Must),
@@ -164,19 +168,19 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// Returns [`Stop::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
+/// Returns [`StopReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
 fn write(
     state: &FilmState,
     to: Destination<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
     is_must: bool,
-) -> Result<StageResult<bool>, Stop> {
+) -> Result<StageResult<bool>, StopReason> {
     let Destination { plan, contents, is_own, sink, .. } = to;
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = SweptFolders::default();
     }
-    let unfinished = (!state.is_finished(plan)).then(|| state.film.samples().into());
+    let unfinished = (!state.is_finished(plan)).then(|| state.film.sample_stats().into());
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
@@ -187,7 +191,7 @@ fn write(
         {
             continue;
         }
-        contents.outputs.begin(path, protection(plan));
+        contents.outputs.begin_write(path, overwrite_protection(plan));
         let wrote = match state.share {
             Some(_) => write_part(state, to, (path, &written.sweep), token),
             None => {
@@ -204,15 +208,15 @@ fn write(
                 // The image is on disk, so ignore cancellation. Record the content before notifying other
                 // programs, which may change the file.
                 let content = contents.read(path, &CancelToken::new())?;
-                contents.outputs.end(path, Some(content));
+                contents.outputs.end_write(path, Some(content));
                 written.files.insert(path.clone(), (Some(key), content));
                 written.is_by_hand = !is_own;
                 sink.image_written(path, bytes, is_own, unfinished);
             }
             Err(error) => {
-                contents.outputs.end(path, None);
+                contents.outputs.end_write(path, None);
                 if matches!(error, OutputError::Cancelled(_)) {
-                    return Err(Stop::Cancelled);
+                    return Err(StopReason::Cancelled);
                 }
                 errors.push((path, error.to_string()));
             }
@@ -227,7 +231,7 @@ fn write(
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
-            if is_must { Err(Stop::work(last)) } else { Ok(StageResult::skipped(false, last)) }
+            if is_must { Err(StopReason::work_failure(last)) } else { Ok(StageResult::skipped(false, last)) }
         }
         (true, 0) => Ok(StageResult::reused(true, reasons::ALREADY_WRITTEN)),
         (true, 1) => Ok(StageResult::done(true, "")),
@@ -255,7 +259,7 @@ pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: 
 
 /// Finished turntable frames, with their sample counts.
 #[derive(Debug, Default)]
-pub(crate) struct TurntableFrames(Vec<(Picture, SampleStats)>);
+pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleStats)>);
 
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
 /// have been written.
@@ -267,12 +271,14 @@ pub(crate) fn write_animation(
     to: Destination<'_>,
     (turn, frames): (TurntableFrame, &mut TurntableFrames),
     token: &CancelToken,
-) -> Result<StageResult<bool>, Stop> {
+) -> Result<StageResult<bool>, StopReason> {
     let Destination { plan, inputs, sink, .. } = to;
     let finish = develop_settings(plan);
     let image = finish.image(&state.film);
     frames.0.truncate(turn.number as usize);
-    frames.0.push((develop(&image, &finish.tone.resolved_for(&image)), state.film.samples()));
+    frames
+        .0
+        .push((tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)), state.film.sample_stats()));
     if !turn.is_last() {
         return Ok(StageResult::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
     }
@@ -293,8 +299,8 @@ pub(crate) fn write_animation(
         };
         match write() {
             Ok(bytes) => sink.image_written(path, bytes, true, None),
-            Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error) => return Err(Stop::work(error)),
+            Err(OutputError::Cancelled(_)) => return Err(StopReason::Cancelled),
+            Err(error) => return Err(StopReason::work_failure(error)),
         }
     }
     Ok(StageResult::done(true, format!("{} frames", frames.len())))
@@ -328,10 +334,10 @@ fn write_part(
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
-    let scene = scene_path::relative(&plan.path, path);
+    let scene = scene_path::relative_to_image(&plan.path, path);
     let references = inputs.relative_paths(&plan.path);
     let head = create_header(PartKind::Part, state, identity, &develop_settings(plan));
-    let head = Head { scene, references, ..head };
+    let head = PartHeader { scene, references, ..head };
     let save = |guard: &WritePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
@@ -340,28 +346,28 @@ fn write_part(
 }
 
 /// Returns the settings for developing and encoding a film.
-pub(crate) fn develop_settings(plan: &Plan) -> DevelopSettings {
+pub(crate) fn develop_settings(plan: &RenderPlan) -> DevelopSettings {
     DevelopSettings {
         quantity: plan.settings.view.quantity(),
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: metadata(plan),
-        is_light: matches!(plan.settings.view.source(), AovSource::Light(LightAov::Radiance(_))),
+        is_light: matches!(plan.settings.view.aov_source(), AovSource::Light(LightAov::Radiance(_))),
     }
 }
 
 /// Like [`develop_settings`], but with the scene's path relative to the image.
-fn develop_settings_for(plan: &Plan, path: &Path) -> DevelopSettings {
+fn develop_settings_for(plan: &RenderPlan, path: &Path) -> DevelopSettings {
     let mut finish = develop_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {
-        *value = scene_path::relative(&plan.path, path);
+        *value = scene_path::relative_to_image(&plan.path, path);
     }
     finish
 }
 
 /// Returns the metadata needed to reproduce an image, except for metadata stored in the film.
-fn metadata(plan: &Plan) -> Vec<(String, String)> {
+fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [
         (SCENE, plan.name.clone()),
@@ -400,14 +406,14 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
     pairs
 }
 
-fn image_file_key(state: &FilmState, plan: &Plan, path: &Path) -> Key {
-    let SampleStats { min, mean, max } = state.film.samples();
+fn image_file_key(state: &FilmState, plan: &RenderPlan, path: &Path) -> Fingerprint {
+    let SampleStats { min, mean, max } = state.film.sample_stats();
     let mut key = FingerprintHasher::new("write");
-    key.key(&state.key).u64(min.into()).f64(mean).u64(max.into());
-    key.choice(plan.settings.view).f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
-    key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
+    key.add_fingerprint(&state.key).add_u64(min.into()).add_f64(mean).add_u64(max.into());
+    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_index(plan.tone.curve as usize);
+    key.add_index(plan.tone.transfer as usize).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
-        key.choice(*layer);
+        key.add_choice(*layer);
     });
-    key.path(path).finish()
+    key.add_path(path).finish()
 }

@@ -1,7 +1,7 @@
 //! Tests for adaptive sampling, which stops tiles early once their noise is low enough.
 
 use super::Bench;
-use crate::protocol::{Section, Stage, reasons};
+use crate::protocol::{NormalizedRect, Stage, reasons};
 
 /// An area light above a floor with a ball. Some tiles contain penumbras, and others have almost no noise.
 const LIT: &str = r#"
@@ -65,7 +65,7 @@ fn image_does_not_depend_on_threads_or_history() {
     pictures.push(bench.picture());
     // Render a region first.
     let mut bench = Bench::new(LIT);
-    bench.first = Some(Section { left: 0.3, top: 0.2, width: 0.3, height: 0.4 });
+    bench.first = Some(NormalizedRect { left: 0.3, top: 0.2, width: 0.3, height: 0.4 });
     bench.done();
     pictures.push(bench.picture());
     assert!(pictures.iter().all(|picture| *picture == pictures[0]));

@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraEdit, ImagePosition, MovedCamera, Picked, SavedCamera};
+use crate::protocol::{CameraSaveResult, ImagePosition, MovedCamera, PickResult, SceneFileEdit};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
 /// Tables that add a mirror and photons to a scene.
@@ -24,7 +24,7 @@ fn camera(bench: &mut Bench) -> Viewpoint {
         _ => None,
     };
     let own = events.iter().find_map(camera).expect("a camera");
-    own.changed(&bench.overrides.camera)
+    own.with_change(&bench.overrides.camera)
 }
 
 #[test]
@@ -98,26 +98,26 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
     }
 }
 
-fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<SavedCamera, String> {
+fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<CameraSaveResult, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
 /// Like [`keep`], but for a camera that was moved starting from `own` instead of the scene's camera.
-fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<SavedCamera, String> {
+fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<CameraSaveResult, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
 }
 
-fn undo(bench: &mut Bench, edit: CameraEdit) -> Result<std::path::PathBuf, String> {
+fn undo(bench: &mut Bench, edit: SceneFileEdit) -> Result<std::path::PathBuf, String> {
     match answer(bench, Command::UndoCamera(edit)) {
         Event::CameraUndone { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
 }
 
-fn pick(bench: &mut Bench, x: f64, y: f64) -> Picked {
+fn pick(bench: &mut Bench, x: f64, y: f64) -> PickResult {
     match answer(bench, Command::Pick(ImagePosition { x, y })) {
         Event::Picked { picked, .. } => *picked,
         other => panic!("{other:?}"),
@@ -162,7 +162,7 @@ fn outdated_camera_is_not_saved() {
     let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
     bench.done();
     let own = bench.own.get().expect("a camera");
-    let moved = own.changed(&CameraChange { fov: None, ..moved() });
+    let moved = own.with_change(&CameraChange { fov: None, ..moved() });
     // The worker reads the edited file before it receives the camera.
     bench.edit("fov = 34", "fov = 20");
     bench.done();

@@ -17,14 +17,14 @@ use std::time::Duration;
 
 use crate::engine::EngineConfig;
 use crate::protocol::{
-    Command, Event, Failure, ImagePosition, LatestPreview, PreviewSize, Report, Request, Section, Stage,
-    Status, WriteMode, reasons,
+    Command, Event, Failure, ImagePosition, LatestPreview, NormalizedRect, PreviewSize, Report, Request,
+    Stage, Status, WriteMode, reasons,
 };
 use crate::scene::LoadedScene;
 use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 use crate::settings::Overrides;
-use crate::trace::Kernel;
+use crate::trace::TileKernel;
 use crate::worker::{Handle, start_with};
 
 /// Loads a scene from text, with a default camera.
@@ -74,7 +74,7 @@ intensity = [10, 10, 10]
 
 pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-pub(super) const KERNEL: Kernel = crate::integrators::render_tile_with_photons;
+pub(super) const KERNEL: TileKernel = crate::integrators::render_tile_with_photons;
 
 pub(crate) struct Bench {
     pub(super) folder: tempfile::TempDir,
@@ -85,7 +85,7 @@ pub(crate) struct Bench {
     pub(super) overrides: Overrides,
     pub(super) preview: Option<PreviewSize>,
     pub(super) force: bool,
-    pub(super) first: Option<Section>,
+    pub(super) first: Option<NormalizedRect>,
     pub(super) writing: WriteMode,
     /// Number of files written so far.
     pub(super) saves: Cell<u64>,
@@ -98,7 +98,7 @@ impl Bench {
         Self::with(scene, KERNEL)
     }
 
-    pub(super) fn with(scene: &str, kernel: Kernel) -> Self {
+    pub(super) fn with(scene: &str, kernel: TileKernel) -> Self {
         Self::with_config(scene, EngineConfig { kernel, ..EngineConfig::default() })
     }
 

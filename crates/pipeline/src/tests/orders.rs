@@ -11,8 +11,8 @@ use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
 use crate::protocol::LastValidSceneOutcome;
-use crate::scene::description::{Integrator, Shadows};
-use crate::settings::View;
+use crate::scene::description::{Integrator, ShadowMode};
+use crate::settings::ViewMode;
 use crate::world::World;
 
 /// Blocks until its token is cancelled.
@@ -214,8 +214,8 @@ fn last_valid_scene_applies_new_overrides() {
     let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
     let changes: [fn(&mut Bench, Pose); 4] = [
         |bench, pose| bench.overrides.camera = CameraChange { pose: Some(pose), ..CameraChange::default() },
-        |bench, _| bench.overrides.view = Some(View::Normal),
-        |bench, _| bench.overrides.shadows = Some(Shadows::Off),
+        |bench, _| bench.overrides.view = Some(ViewMode::Normal),
+        |bench, _| bench.overrides.shadows = Some(ShadowMode::Off),
         |bench, _| bench.overrides.exposure = Some(-2.0),
     ];
     // Test errors in the scene file and in a referenced file.
@@ -264,7 +264,7 @@ fn last_valid_scene_never_mixes_file_versions() {
         let mut bench = Bench::new(SCENE);
         bench.writing = WriteMode::Try;
         // This view needs no textures.
-        bench.overrides.view = Some(View::Depth);
+        bench.overrides.view = Some(ViewMode::Depth);
         bench.done();
         let depth = bench.picture();
         bench.edit("width = 40", "width = = 40");
@@ -306,9 +306,9 @@ fn priority_region_is_rendered_first() {
     let text = wide().replace("width = 640", "width = 256").replace("height = 640", "height = 256");
     let text = text.replace("samples = 4", "samples = 32");
     let mut bench = Bench::with(&text, slow);
-    bench.overrides.view = Some(View::Samples);
+    bench.overrides.view = Some(ViewMode::Samples);
     bench.preview = Some(PreviewSize { width: 256, height: 256, around: None });
-    bench.first = Some(Section { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
+    bench.first = Some(NormalizedRect { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
     let of = bench.send();
     // The corner tile, which is usually rendered last, must be complete before the middle tile.
     loop {
@@ -606,7 +606,7 @@ fn paused_time_is_not_counted() {
 fn reused_image_reports_original_render_time() {
     let mut bench = Bench::with(SCENE, leisurely);
     let (first, _) = bench.done();
-    bench.overrides.shadows = Some(crate::scene::description::Shadows::Off);
+    bench.overrides.shadows = Some(crate::scene::description::ShadowMode::Off);
     bench.done();
     bench.overrides.shadows = None;
     let (again, _) = bench.done();
@@ -651,7 +651,7 @@ fn continued_render_reports_total_time() {
 fn settings_event_includes_scene_values() {
     let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
     bench.overrides.exposure = Some(2.0);
-    bench.overrides.shadows = Some(Shadows::Off);
+    bench.overrides.shadows = Some(ShadowMode::Off);
     bench.overrides.integrator = Some(Integrator::Whitted);
     bench.overrides.photons = Some(true);
     bench.overrides.camera.fov = Some(10.0);
@@ -662,6 +662,6 @@ fn settings_event_includes_scene_values() {
         let shadows = (settings.shadows, own.shadows);
         Some((settings.exposure, *exposure, camera.fov, shadows, own.integrator, own.photons))
     };
-    let shadows = (Shadows::Off, Shadows::Soft);
+    let shadows = (ShadowMode::Off, ShadowMode::Soft);
     assert_eq!(events.iter().find_map(reported), Some((2.0, 0.5, 40.0, shadows, Integrator::Whitted, false)));
 }

@@ -1,9 +1,9 @@
 //! Tests for the scene's own image while the user views another one.
 
 use super::*;
-use crate::protocol::OwnImageState;
-use crate::scene::description::Shadows;
-use crate::settings::{Checkpoints, Resume, View};
+use crate::protocol::SavedSceneImageState;
+use crate::scene::description::ShadowMode;
+use crate::settings::{CheckpointSettings, ResumeMode, ViewMode};
 
 /// A front end whose user views an image other than the scene's own.
 struct ToggledBench(Bench);
@@ -15,7 +15,7 @@ impl ToggledBench {
         Self(bench)
     }
 
-    fn with(kernel: Kernel) -> Self {
+    fn with(kernel: TileKernel) -> Self {
         let mut bench = Bench::with(SCENE, kernel);
         bench.writing = WriteMode::Try;
         Self(bench)
@@ -49,7 +49,7 @@ impl ToggledBench {
 }
 
 fn no_shadows(overrides: &mut Overrides) {
-    overrides.shadows = Some(Shadows::Off);
+    overrides.shadows = Some(ShadowMode::Off);
 }
 
 /// Asserts that a render continued from existing samples.
@@ -59,7 +59,7 @@ fn assert_resumed(report: &Report) {
     assert!(why.starts_with(reasons::RESUMED), "{report:?}");
 }
 
-fn states(events: &[Event]) -> Vec<OwnImageState> {
+fn states(events: &[Event]) -> Vec<SavedSceneImageState> {
     let state = |event: &Event| match event {
         Event::OwnImage { state, .. } => Some(*state),
         _ => None,
@@ -78,12 +78,12 @@ fn viewing_does_not_change_output_files() {
         no_shadows,
         |overrides| overrides.exposure = Some(1.0),
         |overrides| overrides.dof = Some(false),
-        |overrides| overrides.view = Some(View::Normal),
-        |overrides| overrides.view = Some(View::Samples),
+        |overrides| overrides.view = Some(ViewMode::Normal),
+        |overrides| overrides.view = Some(ViewMode::Samples),
     ];
     for change in changes {
         let events = keys.shown(change);
-        assert_eq!(states(&events), [OwnImageState::Written; 2], "{events:?}");
+        assert_eq!(states(&events), [SavedSceneImageState::Written; 2], "{events:?}");
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })));
         assert!(files(&keys) == before);
     }
@@ -104,7 +104,7 @@ fn write_command_saves_the_shown_image() {
     let events = keys.0.until_end(of);
     let by_hand = |event: &Event| matches!(event, Event::Written { is_own: false, .. });
     assert!(events.iter().any(by_hand), "{events:?}");
-    assert_eq!(states(&events).last(), Some(&OwnImageState::Begun { is_rendering: false }));
+    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Begun { is_rendering: false }));
     assert!(keys.0.picture() != own, "without shadows");
     let shadows = || {
         let report = fs::read_to_string(&report).expect("a report");
@@ -149,8 +149,8 @@ fn write_brighter(keys: &mut ToggledBench) -> (u64, Vec<u8>) {
 fn own_render_keeps_an_image_written_on_request() {
     let changes: [fn(&mut Overrides); 4] = [
         |overrides| overrides.exposure = Some(2.0),
-        |overrides| overrides.view = Some(View::Samples),
-        |overrides| overrides.view = Some(View::Normal),
+        |overrides| overrides.view = Some(ViewMode::Samples),
+        |overrides| overrides.view = Some(ViewMode::Normal),
         no_shadows,
     ];
     for change in changes {
@@ -162,7 +162,7 @@ fn own_render_keeps_an_image_written_on_request() {
         let written = keys.0.picture();
         let events = keys.0.until_end(of);
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })), "{events:?}");
-        assert!(matches!(states(&events).last(), Some(OwnImageState::Begun { .. })), "{events:?}");
+        assert!(matches!(states(&events).last(), Some(SavedSceneImageState::Begun { .. })), "{events:?}");
         let (report, _) = keys.0.done();
         assert_eq!(report.image.path, None);
         assert_eq!(report.stages[Stage::Write as usize].why, reasons::OTHER_IMAGE_WRITTEN);
@@ -188,7 +188,7 @@ fn save_replaces_an_image_written_on_request() {
     // The scene's own image shares its film with the preview.
     keys.0.edit("[camera", "[camera] # saved");
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
-    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
     let own = keys.0.picture();
     assert!(own != written);
     // Without a shared film, the saved scene's image is written once the user returns to the scene's
@@ -209,7 +209,7 @@ fn requested_image_is_not_kept_once_removed() {
     let (of, written) = write_brighter(&mut keys);
     fs::rename(keys.0.path("out.ppm"), keys.0.path("bright.ppm")).expect("moved");
     let events = keys.0.until_end(of);
-    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
     assert!(keys.0.picture() != written);
 }
 
@@ -234,7 +234,8 @@ fn failed_write_keeps_the_earlier_image() {
 #[test]
 fn checkpoint_remains_until_own_image_is_written() {
     let mut keys = ToggledBench::with(slow);
-    keys.0.overrides.checkpoints = Checkpoints { seconds: 0.01, resume: Resume::IfSame, are_kept: false };
+    keys.0.overrides.checkpoints =
+        CheckpointSettings { seconds: 0.01, resume: ResumeMode::IfSame, are_kept: false };
     let (of, _) = write_brighter(&mut keys);
     keys.0.until_end(of);
     let path = keys.0.path("out.ppm.checkpoint");
@@ -253,15 +254,15 @@ fn edit_during_another_view_keeps_old_image() {
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
-    assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::NotBegun; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::NotBegun; 2]);
     assert!(keys.0.picture() == old);
     // After the edit is reverted and a comment added, the image is up to date again.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
-    assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::Written; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::Written; 2]);
     // Saving the shown settings in the scene makes this the scene's own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
     assert!(keys.0.picture() != old);
 }
 
@@ -286,7 +287,7 @@ fn slow(
     samples: std::ops::Range<u32>,
     token: &crate::control::CancelToken,
 ) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Cancelled> {
-    if samples.start > 1 && settings.render.shadows == Shadows::Soft {
+    if samples.start > 1 && settings.render.shadows == ShadowMode::Soft {
         std::thread::sleep(Duration::from_millis(20));
     }
     KERNEL(photons, world, settings, pixels, samples, token)
@@ -316,7 +317,7 @@ fn interrupted_own_render_resumes() {
     let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events), [OwnImageState::Begun { is_rendering: false }; 2]);
+    assert_eq!(states(&events), [SavedSceneImageState::Begun { is_rendering: false }; 2]);
     assert!(!keys.0.path("out.ppm").exists());
     let (report, _) = keys.0.done();
     assert_resumed(&report);
@@ -328,7 +329,10 @@ fn own_image_is_written_despite_exposure_change() {
     let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
-    assert_eq!(states(&events), [OwnImageState::Begun { is_rendering: true }, OwnImageState::Written]);
+    assert_eq!(
+        states(&events),
+        [SavedSceneImageState::Begun { is_rendering: true }, SavedSceneImageState::Written]
+    );
     let picture = keys.0.picture();
     let (report, _) = keys.0.done();
     assert_statuses(&report, "rrrrrsrr");
@@ -337,7 +341,7 @@ fn own_image_is_written_despite_exposure_change() {
 
 #[test]
 fn own_checkpoint_is_saved_during_another_view() {
-    let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
+    let checkpoints = CheckpointSettings { seconds: 60.0, resume: ResumeMode::IfSame, are_kept: false };
     for (end, is_kept) in [(Command::Suspend, true), (Command::Quit, false)] {
         let mut keys = ToggledBench::with(slow);
         keys.0.overrides.checkpoints = checkpoints;
@@ -456,7 +460,7 @@ fn own_film_may_be_dropped_once_written() {
         keys.0.overrides.memory = Some(estimate_memory(&keys, &keys.0.overrides) + more);
         keys.0.done();
         let own = keys.0.picture();
-        assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::Written; 2]);
+        assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::Written; 2]);
         assert!(keys.0.picture() == own);
         let (report, _) = keys.0.done();
         assert_statuses(&report, if stays { "rrrrrsrr" } else { "rrrrrsdr" });

@@ -2,7 +2,7 @@
 
 use super::orders::slow;
 use super::*;
-use crate::settings::View;
+use crate::settings::ViewMode;
 
 #[test]
 fn preview_size_change_does_not_render() {
@@ -80,7 +80,7 @@ fn previews_identify_their_image() {
         bench.edit(from, to);
         assert!(source(&mut bench) != before, "{to}");
     }
-    bench.overrides.view = Some(View::Normal);
+    bench.overrides.view = Some(ViewMode::Normal);
     assert!(source(&mut bench) != own);
 }
 
@@ -136,7 +136,7 @@ fn preview_size_change_does_not_interrupt() {
 #[test]
 fn preview_and_image_share_the_depth_range() {
     let mut bench = Bench::new(SCENE);
-    bench.overrides.view = Some(View::Depth);
+    bench.overrides.view = Some(ViewMode::Depth);
     for (width, around) in [(7, None), (40, None), (6, Some(ImagePosition { x: 0.5, y: 0.5 }))] {
         bench.preview = Some(PreviewSize { width, height: 30, around });
         let (report, _) = bench.done();

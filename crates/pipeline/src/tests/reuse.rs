@@ -1,8 +1,8 @@
 //! Tests for reuse: which stages rerun after an edit, and which files are reported.
 
 use super::*;
-use crate::integrators::View;
-use crate::scene::description::{Accel, Shadows};
+use crate::integrators::ViewMode;
+use crate::scene::description::{Accel, ShadowMode};
 
 #[test]
 fn edits_rerun_only_dependent_stages() {
@@ -202,7 +202,7 @@ fn image_never_uses_unhashed_bytes() {
                 bench.done();
                 bench.write(name, old);
             }
-            let contents = bench.worker.contents();
+            let contents = bench.worker.file_hashes();
             let replacements = || contents.replacements.lock().expect("not poisoned");
             replacements().insert(bench.path(name), (bench.path(name), new.clone().into()));
             let shown = image(&mut bench);
@@ -238,7 +238,7 @@ fn files_replaced_while_others_load_are_read_again() {
     // Replace the scene after it has been read, while its texture is being read.
     let mut bench = Bench::new(SCENE);
     let replacement = (bench.path("scene.toml"), new.into_bytes());
-    let contents = bench.worker.contents();
+    let contents = bench.worker.file_hashes();
     contents.replacements.lock().expect("not poisoned").insert(bench.path("skin.ppm"), replacement);
     assert!(image(&mut bench) == new_image);
 }
@@ -251,7 +251,7 @@ fn files_replaced_before_an_error_are_read_again() {
     std::fs::rename(bench.path("skin.ppm"), bench.path("new.ppm")).expect("renamed");
     bench.write("skin.ppm", "P6\n");
     let replacement = (bench.path("scene.toml"), new.into_bytes());
-    let contents = bench.worker.contents();
+    let contents = bench.worker.file_hashes();
     contents.replacements.lock().expect("not poisoned").insert(bench.path("one.obj"), replacement);
     bench.done();
     // An error in unchanged files is reported.
@@ -273,7 +273,8 @@ fn unchanged_files_are_hashed_once() {
     // The output is new after the first request.
     for expected in [&["one.obj", "out.ppm", "scene.toml", "skin.ppm"][..], &["one.mtl", "out.ppm"], &[]] {
         bench.done();
-        let mut hashed = std::mem::take(&mut *bench.worker.contents().hashed.lock().expect("not poisoned"));
+        let mut hashed =
+            std::mem::take(&mut *bench.worker.file_hashes().hashed.lock().expect("not poisoned"));
         hashed.sort_unstable();
         let expected: Vec<_> = expected.iter().map(|name| bench.path(name)).collect();
         // The output has a recent timestamp until two seconds have passed.
@@ -287,7 +288,7 @@ fn toggling_a_setting_back_reuses_the_film() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let soft = bench.picture();
-    bench.overrides.shadows = Some(Shadows::Off);
+    bench.overrides.shadows = Some(ShadowMode::Off);
     let (report, _) = bench.done();
     assert_eq!(report.stages[Stage::Render as usize].status, Status::Done);
     assert_eq!(report.counters.films, 2);
@@ -633,7 +634,7 @@ fn sample_and_error_views_reuse_the_film() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let beauty = bench.picture();
-    for view in [View::Samples, View::Error] {
+    for view in [ViewMode::Samples, ViewMode::Error] {
         bench.overrides.view = Some(view);
         let report = bench.done().0;
         assert_statuses(&report, "rrrrrsrd");

@@ -1,7 +1,7 @@
 //! Tests for switching between scenes, and for changing one of several textures.
 
 use super::*;
-use crate::settings::View;
+use crate::settings::ViewMode;
 
 #[test]
 fn switching_back_reuses_trees_and_textures() {
@@ -70,7 +70,7 @@ const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfi
 const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
 
 /// Creates a bench for this view with the files used by [`BUMPY`].
-fn bumpy(scene: &str, view: View) -> Bench {
+fn bumpy(scene: &str, view: ViewMode) -> Bench {
     let mut bench = Bench::new(scene);
     bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
     bench.write("glow.ppm", "P6\n3 1\n255\nabcabcabc");
@@ -80,7 +80,7 @@ fn bumpy(scene: &str, view: View) -> Bench {
 }
 
 /// Renders a new scene. Returns the textures stage's status and reason, and the number of texels loaded.
-fn textures_of(scene: &str, view: View) -> (char, String, u64) {
+fn textures_of(scene: &str, view: ViewMode) -> (char, String, u64) {
     let report = bumpy(scene, view).done().0;
     let stage = &report.stages[Stage::Textures as usize];
     let status = statuses(&report).chars().nth(Stage::Textures as usize).expect("a stage");
@@ -94,25 +94,32 @@ fn view_loads_only_the_textures_it_needs() {
     let textures = |status, why: &str, texels| (status, why.to_owned(), texels);
     let nothing = textures('s', reasons::NOT_NEEDED_FOR_VIEW, 0);
     // These scenes have no photons and no ambient light.
-    for view in [View::Depth, View::Uv, View::Barycentric, View::Photons, View::Ambient] {
+    for view in [ViewMode::Depth, ViewMode::Uv, ViewMode::Barycentric, ViewMode::Photons, ViewMode::Ambient] {
         assert_eq!(textures_of(bumpy, view), nothing, "{view:?}");
     }
-    for view in [View::Normal, View::Shadow, View::Emission] {
+    for view in [ViewMode::Normal, ViewMode::Shadow, ViewMode::Emission] {
         assert_eq!(textures_of(SCENE, view), nothing, "{view:?}");
     }
-    assert_eq!(textures_of(bumpy, View::Normal), textures('d', "1 loaded, 3 not needed", 2));
-    assert_eq!(textures_of(bumpy, View::Albedo), textures('d', "1 loaded, 3 not needed", 1));
+    assert_eq!(textures_of(bumpy, ViewMode::Normal), textures('d', "1 loaded, 3 not needed", 2));
+    assert_eq!(textures_of(bumpy, ViewMode::Albedo), textures('d', "1 loaded, 3 not needed", 1));
     // The `shadow` view depends on emission but not on reflectance.
-    assert_eq!(textures_of(bumpy, View::Shadow), textures('d', "2 loaded, 2 not needed", 5));
-    assert_eq!(textures_of(bumpy, View::Emission), textures('d', "1 loaded, 3 not needed", 3));
-    assert_eq!(textures_of(&ambient(bumpy), View::Ambient), textures('d', "1 loaded, 3 not needed", 1));
+    assert_eq!(textures_of(bumpy, ViewMode::Shadow), textures('d', "2 loaded, 2 not needed", 5));
+    assert_eq!(textures_of(bumpy, ViewMode::Emission), textures('d', "1 loaded, 3 not needed", 3));
+    assert_eq!(textures_of(&ambient(bumpy), ViewMode::Ambient), textures('d', "1 loaded, 3 not needed", 1));
     // The `bounds` view draws boxes over the image, and a lobe's color affects how often the lobe is sampled.
-    for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
+    for view in [
+        ViewMode::Beauty,
+        ViewMode::Diffuse,
+        ViewMode::Specular,
+        ViewMode::Bounds,
+        ViewMode::Cost,
+        ViewMode::Error,
+    ] {
         assert_eq!(textures_of(bumpy, view), textures('d', "4 loaded", 10), "{view:?}");
     }
     let photons = &format!("{bumpy}[photons]\nenabled = true\ncount = 100\n");
-    assert_eq!(textures_of(photons, View::Photons), textures('d', "4 loaded", 10));
-    for view in [View::Emission, View::Albedo] {
+    assert_eq!(textures_of(photons, ViewMode::Photons), textures('d', "4 loaded", 10));
+    for view in [ViewMode::Emission, ViewMode::Albedo] {
         assert_eq!(textures_of(photons, view), textures_of(bumpy, view), "{view:?}");
     }
 }
@@ -121,11 +128,11 @@ fn view_loads_only_the_textures_it_needs() {
 fn view_does_not_look_up_unneeded_textures() {
     let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     for (view, scene) in [
-        (View::Shadow, SCENE.to_owned()),
-        (View::Emission, SCENE.to_owned()),
-        (View::Emission, ambient(SCENE)),
-        (View::Ambient, SCENE.to_owned()),
-        (View::Photons, SCENE.to_owned()),
+        (ViewMode::Shadow, SCENE.to_owned()),
+        (ViewMode::Emission, SCENE.to_owned()),
+        (ViewMode::Emission, ambient(SCENE)),
+        (ViewMode::Ambient, SCENE.to_owned()),
+        (ViewMode::Photons, SCENE.to_owned()),
     ] {
         let mut bench = Bench::new(&scene);
         bench.overrides.view = Some(view);
@@ -133,7 +140,7 @@ fn view_does_not_look_up_unneeded_textures() {
         assert_eq!((counters.texels_loaded, counters.texture_lookups), (0, 0), "{view:?}");
     }
     let mut bench = Bench::new(&ambient(SCENE));
-    bench.overrides.view = Some(View::Ambient);
+    bench.overrides.view = Some(ViewMode::Ambient);
     let counters = bench.done().0.counters;
     assert!(counters.texels_loaded == 1 && counters.texture_lookups > 0, "{counters:?}");
 }
@@ -141,9 +148,15 @@ fn view_does_not_look_up_unneeded_textures() {
 #[test]
 fn unneeded_textures_do_not_change_a_view() {
     let bumpy_scene = format!("{SCENE}{BUMPY}").replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
-    for view in
-        [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
-    {
+    for view in [
+        ViewMode::Normal,
+        ViewMode::Depth,
+        ViewMode::Uv,
+        ViewMode::Shadow,
+        ViewMode::Albedo,
+        ViewMode::Ambient,
+        ViewMode::Emission,
+    ] {
         for scene in [SCENE, &bumpy_scene] {
             // A black texel reflects nothing, but the view must still show incoming light.
             let bench = |view| {
@@ -155,7 +168,7 @@ fn unneeded_textures_do_not_change_a_view() {
             without.done();
             // Textures for the beauty view remain loaded so that lights and trees that depend on them can be
             // reused.
-            let mut with = bench(View::Beauty);
+            let mut with = bench(ViewMode::Beauty);
             with.done();
             with.overrides.view = Some(view);
             let report = with.done().0;

@@ -10,7 +10,7 @@ use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::protocol::CheckpointUpdate;
-use crate::settings::Checkpoints;
+use crate::settings::CheckpointSettings;
 use crate::turntable::TurntableFrame;
 use crate::world::World;
 
@@ -98,7 +98,7 @@ fn watched_files_cannot_be_written() {
     let files = files.expect("files");
     assert_eq!(files.len(), 5, "{files:?}");
     for file in files {
-        assert!(FileIdentity::of(&file.path).is_some(), "{file:?}");
+        assert!(FileIdentity::from_path(&file.path).is_some(), "{file:?}");
         bench.overrides.report = Some(file.path.clone());
         assert!(matches!(bench.failed(), Failure::Scene(_)), "{file:?}");
     }
@@ -182,7 +182,8 @@ fn checkpoint_does_not_replace_finished_part() {
     let before = fs::read(&part).expect("a part");
     bench.overrides.shard = Some((1, 2));
     bench.overrides.outputs = vec![out.clone()];
-    bench.overrides.checkpoints = Checkpoints { seconds: 1e-9, are_kept: true, ..Checkpoints::default() };
+    bench.overrides.checkpoints =
+        CheckpointSettings { seconds: 1e-9, are_kept: true, ..CheckpointSettings::default() };
     let of = bench.send();
     let events = bench.until_end(of);
     assert_eq!(fs::read(&part).expect("a part"), before);

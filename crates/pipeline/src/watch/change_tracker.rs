@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::time::Instant;
 
-use super::folders::Hint;
+use super::folders::ChangeHint;
 use super::{BETWEEN_CHANGES, WatchDelays};
 
 /// Tracks files that may be changing.
@@ -43,24 +43,24 @@ impl ChangeTracker {
     }
 
     /// Adds a hint about a watched file.
-    pub(super) fn hint(&mut self, hint: Hint, now: Instant) {
+    pub(super) fn hint(&mut self, hint: ChangeHint, now: Instant) {
         let first = self.pending.map_or(now, |pending| pending.first);
         let was_complete = self.pending.is_some_and(|pending| pending.is_complete);
         let is_complete = match hint {
-            Hint::Complete(name) => {
+            ChangeHint::Complete(name) => {
                 self.open.remove(&name);
                 true
             }
-            Hint::Written(name) => {
+            ChangeHint::Written(name) => {
                 self.open.insert(name);
                 false
             }
-            Hint::Gone(name) => {
+            ChangeHint::Gone(name) => {
                 self.open.remove(&name);
                 false
             }
             // Removing a backup or setting a timestamp afterwards does not make a save incomplete.
-            Hint::Touched => was_complete,
+            ChangeHint::Touched => was_complete,
         };
         let due = if is_complete { now } else { (now + self.delays.quiet).min(first + self.delays.longest) };
         let due = self.not_before.map_or(due, |earliest| due.max(earliest));
@@ -88,7 +88,7 @@ impl ChangeTracker {
 
     /// Whether it is too early to report a change that was found because of a hint. `is_missing` is true if a
     /// file is missing or empty, and `moves` is true if the previous check found a different change.
-    pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
+    pub(super) fn should_delay_report(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
         let Some(pending) = &mut self.pending else { return false };
         let due = if is_missing {
             pending.first + self.delays.quiet_missing

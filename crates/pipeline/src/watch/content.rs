@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
-use super::outputs::Outputs;
+use super::outputs::WrittenOutputs;
 use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::FingerprintHasher;
@@ -18,23 +18,23 @@ pub struct FileRead {
     /// Path of the file.
     pub path: PathBuf,
     /// The decoded content or, if the file was not decoded, its content during the request.
-    pub content: Content,
+    pub content: FileContentId,
 }
 
 /// Content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Content {
+pub enum FileContentId {
     /// The file does not exist.
     Missing,
     /// Not a regular file, or not readable.
-    Unusable(Obstacle),
+    Unusable(UnreadableReason),
     /// Hash of a regular file's bytes, or of its metadata if the file is very long.
     Hash([u8; 32]),
 }
 
 /// Reasons why a file cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Obstacle {
+pub enum UnreadableReason {
     /// A directory.
     Folder,
     /// A pipe, a socket or a device.
@@ -45,13 +45,13 @@ pub enum Obstacle {
     Error(ErrorKind),
 }
 
-impl Content {
+impl FileContentId {
     /// Adds the content to a stage's fingerprint.
-    pub(crate) fn add_to(self, key: &mut FingerprintHasher) {
+    pub(crate) fn add_to_fingerprint(self, key: &mut FingerprintHasher) {
         match self {
-            Self::Missing => key.u64(0),
-            Self::Unusable(_) => key.u64(1),
-            Self::Hash(hash) => key.u64(2).bytes(&hash),
+            Self::Missing => key.add_u64(0),
+            Self::Unusable(_) => key.add_u64(1),
+            Self::Hash(hash) => key.add_u64(2).add_bytes(&hash),
         };
     }
 }
@@ -66,10 +66,10 @@ const CHUNK: usize = 1 << 20;
 
 /// Cache of file hashes.
 #[derive(Debug, Default)]
-pub struct Contents {
-    known: Mutex<HashMap<PathBuf, (FileStamp, Content)>>,
+pub struct FileHashCache {
+    known: Mutex<HashMap<PathBuf, (FileStamp, FileContentId)>>,
     /// Files written by glimt.
-    pub outputs: Outputs,
+    pub outputs: WrittenOutputs,
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
@@ -81,8 +81,8 @@ pub struct Contents {
 
 /// A file as first seen by a request.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
-    content: Content,
+struct SeenFile {
+    content: FileContentId,
     /// The file's stamp before its content was read.
     stamp: Option<FileStamp>,
 }
@@ -91,15 +91,15 @@ struct Seen {
 /// the request starts again. The watcher detects later changes.
 #[derive(Debug)]
 pub(crate) struct Snapshot {
-    contents: Arc<Contents>,
+    contents: Arc<FileHashCache>,
     /// Time before the first read.
     begun: SystemTime,
-    seen: Mutex<HashMap<PathBuf, Seen>>,
+    seen: Mutex<HashMap<PathBuf, SeenFile>>,
     changed: Mutex<Option<PathBuf>>,
 }
 
 impl Snapshot {
-    pub(crate) fn of(contents: Arc<Contents>) -> Self {
+    pub(crate) fn new(contents: Arc<FileHashCache>) -> Self {
         Self { contents, begun: SystemTime::now(), seen: Mutex::default(), changed: Mutex::default() }
     }
 
@@ -107,25 +107,32 @@ impl Snapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+    pub(crate) fn read(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         if let Some(content) = self.known(path) {
             return Ok(content);
         }
-        let stamp = FileStamp::of(path);
+        let stamp = FileStamp::from_path(path);
         let content = self.contents.read(path, token)?;
-        Ok(self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content)
+        Ok(self.lock_seen_files().entry(path.to_owned()).or_insert(SeenFile { content, stamp }).content)
     }
 
     /// Returns the content of a file whose decoded bytes have this hash. Records a change if the content
     /// differs from what this request saw earlier.
-    pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
-        self.decoded_with_stamp(path, hash, None)
+    pub(crate) fn record_decoded(&self, path: &Path, hash: FileHash) -> FileContentId {
+        self.record_decoded_with_stamp(path, hash, None)
     }
 
-    /// Like [`Snapshot::decoded`], but takes a stamp obtained before the file was read.
-    fn decoded_with_stamp(&self, path: &Path, hash: FileHash, stamp: Option<FileStamp>) -> Content {
-        let content = Content::Hash(hash);
-        if self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content != content {
+    /// Like [`Snapshot::record_decoded`], but takes a stamp obtained before the file was read.
+    fn record_decoded_with_stamp(
+        &self,
+        path: &Path,
+        hash: FileHash,
+        stamp: Option<FileStamp>,
+    ) -> FileContentId {
+        let content = FileContentId::Hash(hash);
+        if self.lock_seen_files().entry(path.to_owned()).or_insert(SeenFile { content, stamp }).content
+            != content
+        {
             self.record_change(path);
         }
         content
@@ -141,7 +148,7 @@ impl Snapshot {
         token: &CancelToken,
     ) -> Result<FileRead, Cancelled> {
         let content = match hash {
-            Some(hash) => self.decoded_with_stamp(path, *hash, *stamp),
+            Some(hash) => self.record_decoded_with_stamp(path, *hash, *stamp),
             None => self.read(path, token)?,
         };
         Ok(FileRead { path: path.clone(), content })
@@ -154,14 +161,14 @@ impl Snapshot {
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
     pub(crate) fn verify(&self, token: &CancelToken) -> Result<(), Cancelled> {
-        let seen: Vec<_> = self.seen().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
-        for (path, Seen { content, stamp }) in seen {
-            let Some(now) = FileStamp::of(&path) else { continue };
-            if Some(now) == stamp && is_settled(&now, self.begun) {
+        let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
+        for (path, SeenFile { content, stamp }) in seen {
+            let Some(now) = FileStamp::from_path(&path) else { continue };
+            if Some(now) == stamp && is_stamp_reliable(&now, self.begun) {
                 continue;
             }
             let now = self.contents.read(&path, token)?;
-            if now != Content::Missing && now != content {
+            if now != FileContentId::Missing && now != content {
                 self.record_change(&path);
             }
         }
@@ -173,68 +180,69 @@ impl Snapshot {
     }
 
     /// Returns a file that changed while this request was reading its files.
-    pub(crate) fn changed(&self) -> Option<PathBuf> {
+    pub(crate) fn changed_file(&self) -> Option<PathBuf> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Returns a file's content if this request has seen it.
-    pub(crate) fn known(&self, path: &Path) -> Option<Content> {
-        self.seen().get(path).map(|seen| seen.content)
+    pub(crate) fn known(&self, path: &Path) -> Option<FileContentId> {
+        self.lock_seen_files().get(path).map(|seen| seen.content)
     }
 
-    fn seen(&self) -> MutexGuard<'_, HashMap<PathBuf, Seen>> {
+    fn lock_seen_files(&self) -> MutexGuard<'_, HashMap<PathBuf, SeenFile>> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Content to use for a file that is too long to hash.
-fn content_of_stamp(stamp: &FileStamp) -> Content {
-    Content::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
+fn content_of_stamp(stamp: &FileStamp) -> FileContentId {
+    FileContentId::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
 }
 
 /// Whether any change made after `now` is guaranteed to change the stamp.
-fn is_settled(stamp: &FileStamp, now: SystemTime) -> bool {
+fn is_stamp_reliable(stamp: &FileStamp, now: SystemTime) -> bool {
     let latest = stamp.modified.0.max(stamp.changed.0).max(0).unsigned_abs();
     let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
     now.duration_since(latest).is_ok_and(|age| age > STAMP_RESOLUTION)
 }
 
-impl Contents {
+impl FileHashCache {
     /// Returns the current content of a file.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled. The token is checked once per mebibyte.
-    pub fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+    pub fn read(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         token.check()?;
         let now = SystemTime::now();
-        let metadata = match file::kind(path) {
+        let metadata = match file::file_kind(path) {
             Ok((FileKind::Regular, metadata)) => metadata,
-            Ok((FileKind::Folder, _)) => return Ok(Content::Unusable(Obstacle::Folder)),
-            Ok((FileKind::Special, _)) => return Ok(Content::Unusable(Obstacle::Special)),
-            Ok((FileKind::Kernel, _)) => return Ok(Content::Unusable(Obstacle::Kernel)),
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Content::Missing),
+            Ok((FileKind::Folder, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Folder)),
+            Ok((FileKind::Special, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Special)),
+            Ok((FileKind::Kernel, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Kernel)),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(FileContentId::Missing),
             Err(error) => return Ok(unreadable(&error)),
         };
         let stamp = FileStamp::new(&metadata);
-        let known = self.known().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
+        let known =
+            self.lock_entries().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
         if let Some(content) = known {
             return Ok(content);
         }
         let content = if stamp.len > MAX_HASHED { content_of_stamp(&stamp) } else { self.hash(path, token)? };
-        if is_settled(&stamp, now) {
-            self.known().insert(path.to_owned(), (stamp, content));
+        if is_stamp_reliable(&stamp, now) {
+            self.lock_entries().insert(path.to_owned(), (stamp, content));
         } else {
-            self.known().remove(path);
+            self.lock_entries().remove(path);
         }
         Ok(content)
     }
 
     /// Forgets all files for which `keep` returns false.
     pub fn retain(&self, mut keep: impl FnMut(&Path) -> bool) {
-        self.known().retain(|path, _| keep(path));
+        self.lock_entries().retain(|path, _| keep(path));
     }
 
-    fn hash(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
+    fn hash(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         #[cfg(test)]
         self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
         let content = hash(path, token);
@@ -247,22 +255,24 @@ impl Contents {
         content
     }
 
-    fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (FileStamp, Content)>> {
+    fn lock_entries(&self) -> MutexGuard<'_, HashMap<PathBuf, (FileStamp, FileContentId)>> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-fn unreadable(error: &io::Error) -> Content {
-    Content::Unusable(Obstacle::Error(error.kind()))
+fn unreadable(error: &io::Error) -> FileContentId {
+    FileContentId::Unusable(UnreadableReason::Error(error.kind()))
 }
 
-fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
-    let mut file = match file::open(path) {
+fn hash(path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    let mut file = match file::open_regular_file(path) {
         Ok(Ok((file, _))) => file,
         // In these cases, the file has been replaced since its metadata was read.
-        Ok(Err(FileKind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
-        Ok(Err(FileKind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
-        Ok(Err(FileKind::Regular | FileKind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
+        Ok(Err(FileKind::Folder)) => return Ok(FileContentId::Unusable(UnreadableReason::Folder)),
+        Ok(Err(FileKind::Special)) => return Ok(FileContentId::Unusable(UnreadableReason::Special)),
+        Ok(Err(FileKind::Regular | FileKind::Kernel)) => {
+            return Ok(FileContentId::Unusable(UnreadableReason::Kernel));
+        }
         Err(error) => return Ok(unreadable(&error)),
     };
     let mut hasher = blake3::Hasher::new();
@@ -270,7 +280,7 @@ fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
     loop {
         token.check()?;
         match file.read(&mut buffer) {
-            Ok(0) => return Ok(Content::Hash(*hasher.finalize().as_bytes())),
+            Ok(0) => return Ok(FileContentId::Hash(*hasher.finalize().as_bytes())),
             Ok(count) => hasher.update(&buffer[..count]),
             Err(error) if error.kind() == ErrorKind::Interrupted => continue,
             Err(error) => return Ok(unreadable(&error)),
@@ -288,8 +298,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
-        let contents = Contents::default();
-        assert_eq!(contents.read(&path, &token), Ok(Content::Missing));
+        let contents = FileHashCache::default();
+        assert_eq!(contents.read(&path, &token), Ok(FileContentId::Missing));
         fs::write(&path, "a").expect("written");
         let first = contents.read(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
@@ -297,9 +307,15 @@ mod tests {
         assert_ne!(first, second, "a change should be detected at equal length and timestamp");
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read(&path, &token), Ok(first));
-        assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable(Obstacle::Folder)));
+        assert_eq!(
+            contents.read(folder.path(), &token),
+            Ok(FileContentId::Unusable(UnreadableReason::Folder))
+        );
         #[cfg(target_os = "linux")]
-        assert_eq!(contents.read(Path::new("/proc/kmsg"), &token), Ok(Content::Unusable(Obstacle::Kernel)));
+        assert_eq!(
+            contents.read(Path::new("/proc/kmsg"), &token),
+            Ok(FileContentId::Unusable(UnreadableReason::Kernel))
+        );
     }
 
     #[test]
@@ -308,13 +324,13 @@ mod tests {
         let path = folder.path().join("file");
         let file = File::create(&path).expect("a file");
         let token = CancelToken::new();
-        let contents = Contents::default();
+        let contents = FileHashCache::default();
         let read = |len| {
             file.set_len(len).expect("a sparse file");
             contents.read(&path, &token).expect("not cancelled")
         };
         let first = read(3 << 40);
-        assert!(matches!(first, Content::Hash(_)));
+        assert!(matches!(first, FileContentId::Hash(_)));
         assert_ne!(first, read((3 << 40) + 1));
     }
 
@@ -323,14 +339,14 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
-        let contents = Arc::new(Contents::default());
-        let snapshot = Snapshot::of(contents.clone());
+        let contents = Arc::new(FileHashCache::default());
+        let snapshot = Snapshot::new(contents.clone());
         fs::write(&path, "a").expect("written");
         let first = snapshot.read(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
         assert_eq!(snapshot.read(&path, &token), Ok(first));
         assert_ne!(
-            Snapshot::of(contents).read(&path, &token),
+            Snapshot::new(contents).read(&path, &token),
             Ok(first),
             "the next request should see the change"
         );
@@ -358,14 +374,14 @@ mod tests {
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
         let verified = |snapshot: &Snapshot| {
             snapshot.verify(&token).expect("not cancelled");
-            snapshot.changed()
+            snapshot.changed_file()
         };
         for is_decoded in [false, true] {
             show("old");
-            let snapshot = Snapshot::of(Arc::default());
+            let snapshot = Snapshot::new(Arc::default());
             snapshot.read(&same, &token).expect("not cancelled");
             if is_decoded {
-                let (hash, stamp) = (Some(hash_of(&library)), FileStamp::of(&library));
+                let (hash, stamp) = (Some(hash_of(&library)), FileStamp::from_path(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
                 snapshot.read_companion(&companion, &token).expect("not cancelled");
@@ -379,7 +395,7 @@ mod tests {
         }
         // Neither replacement with the same content nor removal is a change.
         show("old");
-        let snapshot = Snapshot::of(Arc::default());
+        let snapshot = Snapshot::new(Arc::default());
         snapshot.read(&same, &token).expect("not cancelled");
         show("new");
         assert_eq!(verified(&snapshot), None);
@@ -392,17 +408,17 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "new").expect("written");
-        let (old, stamp) = (*blake3::hash(b"old").as_bytes(), FileStamp::of(&path));
+        let (old, stamp) = (*blake3::hash(b"old").as_bytes(), FileStamp::from_path(&path));
         let token = CancelToken::new();
         for is_settled in [false, true] {
-            let mut snapshot = Snapshot::of(Arc::default());
+            let mut snapshot = Snapshot::new(Arc::default());
             if is_settled {
                 snapshot.begun += Duration::from_secs(4);
             }
-            snapshot.decoded_with_stamp(&path, old, stamp);
+            snapshot.record_decoded_with_stamp(&path, old, stamp);
             snapshot.verify(&token).expect("not cancelled");
             // A file with a settled stamp is not read again.
-            assert_eq!(snapshot.changed(), (!is_settled).then(|| path.clone()));
+            assert_eq!(snapshot.changed_file(), (!is_settled).then(|| path.clone()));
         }
     }
 
@@ -411,15 +427,17 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "a").expect("written");
-        let stamp = FileStamp::of(&path).expect("metadata");
-        assert!(!is_settled(&stamp, SystemTime::now()));
-        assert!(is_settled(&stamp, SystemTime::now() + Duration::from_secs(4)));
-        let contents = Contents::default();
-        contents.known().insert(path.clone(), (stamp, Content::Unusable(Obstacle::Special)));
+        let stamp = FileStamp::from_path(&path).expect("metadata");
+        assert!(!is_stamp_reliable(&stamp, SystemTime::now()));
+        assert!(is_stamp_reliable(&stamp, SystemTime::now() + Duration::from_secs(4)));
+        let contents = FileHashCache::default();
+        contents
+            .lock_entries()
+            .insert(path.clone(), (stamp, FileContentId::Unusable(UnreadableReason::Special)));
         let read = contents.read(&path, &CancelToken::new());
         assert_eq!(
             read,
-            Ok(Content::Unusable(Obstacle::Special)),
+            Ok(FileContentId::Unusable(UnreadableReason::Special)),
             "the cached content should be used while the stamp is unchanged"
         );
     }

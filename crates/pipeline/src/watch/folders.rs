@@ -12,7 +12,7 @@ use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
 /// A notification about a watched file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Hint {
+pub(super) enum ChangeHint {
     /// The file was closed after writing, or renamed into place.
     Complete(OsString),
     /// The file was written to and is still open.
@@ -44,7 +44,7 @@ fn identity(folder: &Path) -> Option<Identity> {
 
 /// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
 /// been dropped, and any use of the watcher would panic, even dropping it.
-fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
+fn keep_watcher_if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
     }
@@ -53,17 +53,19 @@ fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
 }
 
 impl WatchedFolders {
-    pub(super) fn new(poll: bool, say: impl Fn(Hint) + Send + 'static) -> Self {
+    pub(super) fn new(poll: bool, say: impl Fn(ChangeHint) + Send + 'static) -> Self {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
         let of_interest = names.clone();
         let handler = move |event: notify::Result<Event>| {
             let names = of_interest.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(hint) = event.map_or(Some(Hint::Touched), |event| hint(&event, &names)) {
+            if let Some(hint) =
+                event.map_or(Some(ChangeHint::Touched), |event| hint_for_event(&event, &names))
+            {
                 say(hint);
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
-        let watcher = watcher.and_then(|watcher| if_alive(watcher, &names));
+        let watcher = watcher.and_then(|watcher| keep_watcher_if_alive(watcher, &names));
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
@@ -73,7 +75,7 @@ impl WatchedFolders {
     }
 
     /// Watches the folders that contain the files or the targets of symbolic links.
-    pub(super) fn set<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
+    pub(super) fn watch_parents<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
         let mut folders = HashSet::new();
         let mut names = HashSet::new();
         for file in files {
@@ -94,7 +96,7 @@ impl WatchedFolders {
         names.extend(own);
         *self.names.lock().unwrap_or_else(PoisonError::into_inner) = names;
         let is_gone = |folder: &PathBuf| !folders.contains(folder);
-        self.release(is_gone);
+        self.unwatch_matching(is_gone);
         self.wanted = folders.into_iter().map(|folder| (folder.clone(), is_remote(&folder))).collect();
         self.watch_wanted();
     }
@@ -107,17 +109,17 @@ impl WatchedFolders {
             .filter(|(folder, known)| identity(folder) != Some(**known))
             .map(|(folder, _)| folder.clone())
             .collect();
-        self.release(|folder| lost.contains(folder));
+        self.unwatch_matching(|folder| lost.contains(folder));
         self.watch_wanted();
     }
 
     /// Renews all watches. If a notification was missed, any watch may be broken.
     pub(super) fn renew(&mut self) {
-        self.release(|_| true);
+        self.unwatch_matching(|_| true);
         self.watch_wanted();
     }
 
-    fn release(&mut self, is_released: impl Fn(&PathBuf) -> bool) {
+    fn unwatch_matching(&mut self, is_released: impl Fn(&PathBuf) -> bool) {
         let Some(watcher) = &mut self.watcher else { return };
         self.watched.retain(|folder, _| {
             let stays = !is_released(folder);
@@ -147,26 +149,26 @@ impl WatchedFolders {
 
 /// Converts an event to a hint if it concerns one of the names. Ignores reads, because the watcher's own
 /// reads would wake it.
-fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
+fn hint_for_event(event: &Event, names: &HashSet<OsString>) -> Option<ChangeHint> {
     let mut of_paths = event.paths.iter().map(|path| path.file_name());
     let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
     // An event without a path or a file name may concern any file.
     let Some(name) = named else {
         let is_any = event.paths.is_empty() || of_paths.any(|name| name.is_none());
-        return (is_any && !matches!(event.kind, EventKind::Access(_))).then_some(Hint::Touched);
+        return (is_any && !matches!(event.kind, EventKind::Access(_))).then_some(ChangeHint::Touched);
     };
     match event.kind {
-        EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Complete(name)),
+        EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(ChangeHint::Complete(name)),
         EventKind::Access(_) => None,
-        EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Complete(name)),
+        EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(ChangeHint::Complete(name)),
         // Each of the two names also has its own event.
         EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
-        EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
+        EventKind::Modify(ModifyKind::Data(_)) => Some(ChangeHint::Written(name)),
         EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {
-            Some(Hint::Gone(name))
+            Some(ChangeHint::Gone(name))
         }
         EventKind::Any | EventKind::Create(_) | EventKind::Modify(_) | EventKind::Other => {
-            Some(Hint::Touched)
+            Some(ChangeHint::Touched)
         }
     }
 }
@@ -208,32 +210,32 @@ mod tests {
     #[test]
     fn watcher_without_thread_is_not_used() {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
-        assert!(if_alive(Dead, &names).is_none());
+        assert!(keep_watcher_if_alive(Dead, &names).is_none());
         let _handler = names.clone();
-        assert_eq!(if_alive(1, &names), Some(1));
+        assert_eq!(keep_watcher_if_alive(1, &names), Some(1));
     }
 
     #[test]
     fn events_are_converted_to_hints() {
         let names = HashSet::from([OsString::from("a.toml")]);
-        let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
+        let of = |kind, path: &str| hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let name = || OsString::from("a.toml");
         let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
         let renamed = |mode| EventKind::Modify(ModifyKind::Name(mode));
-        assert_eq!(of(closed, "/x/a.toml"), Some(Hint::Complete(name())));
-        assert_eq!(of(renamed(RenameMode::To), "/x/a.toml"), Some(Hint::Complete(name())));
-        assert_eq!(of(renamed(RenameMode::From), "/x/a.toml"), Some(Hint::Gone(name())));
+        assert_eq!(of(closed, "/x/a.toml"), Some(ChangeHint::Complete(name())));
+        assert_eq!(of(renamed(RenameMode::To), "/x/a.toml"), Some(ChangeHint::Complete(name())));
+        assert_eq!(of(renamed(RenameMode::From), "/x/a.toml"), Some(ChangeHint::Gone(name())));
         assert_eq!(of(renamed(RenameMode::Both), "/x/a.toml"), None);
-        assert_eq!(of(EventKind::Remove(RemoveKind::File), "/x/a.toml"), Some(Hint::Gone(name())));
+        assert_eq!(of(EventKind::Remove(RemoveKind::File), "/x/a.toml"), Some(ChangeHint::Gone(name())));
         let written = EventKind::Modify(ModifyKind::Data(DataChange::Any));
-        assert_eq!(of(written, "/x/a.toml"), Some(Hint::Written(name())));
-        assert_eq!(of(EventKind::Create(CreateKind::File), "/x/a.toml"), Some(Hint::Touched));
+        assert_eq!(of(written, "/x/a.toml"), Some(ChangeHint::Written(name())));
+        assert_eq!(of(EventKind::Create(CreateKind::File), "/x/a.toml"), Some(ChangeHint::Touched));
     }
 
     #[test]
     fn reads_and_unrelated_names_are_ignored() {
         let names = HashSet::from([OsString::from("a.toml")]);
-        let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
+        let of = |kind, path: &str| hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let opened = EventKind::Access(AccessKind::Open(AccessMode::Any));
         let read = EventKind::Access(AccessKind::Close(AccessMode::Read));
         assert_eq!(of(opened, "/x/a.toml"), None);
@@ -241,6 +243,10 @@ mod tests {
         assert_eq!(of(EventKind::Access(AccessKind::Close(AccessMode::Write)), "/x/a.png"), None);
         assert_eq!(of(EventKind::Create(CreateKind::File), "/x/b"), None);
         let overflow = Event::new(EventKind::Other);
-        assert_eq!(hint(&overflow, &names), Some(Hint::Touched), "a queue overflow may concern any file");
+        assert_eq!(
+            hint_for_event(&overflow, &names),
+            Some(ChangeHint::Touched),
+            "a queue overflow may concern any file"
+        );
     }
 }

@@ -24,9 +24,9 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use self::change_tracker::ChangeTracker;
-use self::content::Content;
-pub use self::content::{Contents, FileRead};
-use self::folders::{Hint, WatchedFolders};
+use self::content::FileContentId;
+pub use self::content::{FileHashCache, FileRead};
+use self::folders::{ChangeHint, WatchedFolders};
 use self::outputs::UnconfirmedChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
 pub use self::working_folder::missing_folder;
@@ -75,7 +75,7 @@ impl Default for WatchDelays {
 #[derive(Clone, Debug)]
 pub enum WatchUpdate {
     /// A file's content changed, and the save appears complete.
-    Changed(Changed),
+    Changed(ContentChange),
     /// The changed files appear to be complete.
     Settled,
     /// A file written by glimt was changed, or was restored to what glimt wrote.
@@ -84,7 +84,7 @@ pub enum WatchUpdate {
 
 /// A change to one or more files.
 #[derive(Clone, Copy, Debug)]
-pub struct Changed {
+pub struct ContentChange {
     /// Time of the first hint, from which the save-to-screen latency is measured.
     pub noticed: Instant,
 }
@@ -97,7 +97,7 @@ pub struct Watcher {
 
 enum Message {
     /// A hint about a watched file.
-    Hint(Hint),
+    Hint(ChangeHint),
     /// Files to watch: those read after the specified time, and those read earlier.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
     /// The worker has written a file.
@@ -113,7 +113,7 @@ impl Watcher {
     /// The system cannot start a thread.
     pub fn start(
         poll: bool,
-        contents: Arc<Contents>,
+        contents: Arc<FileHashCache>,
         say: impl FnMut(WatchUpdate) + Send + 'static,
     ) -> std::io::Result<Self> {
         Self::start_with(poll, contents, WatchDelays::default(), say)
@@ -121,11 +121,11 @@ impl Watcher {
 
     fn start_with(
         poll: bool,
-        contents: Arc<Contents>,
+        contents: Arc<FileHashCache>,
         delays: WatchDelays,
         say: impl FnMut(WatchUpdate) + Send + 'static,
     ) -> std::io::Result<Self> {
-        working_folder::remember();
+        working_folder::remember_working_folder();
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
         let folders = WatchedFolders::new(poll, move |hint| {
@@ -173,10 +173,10 @@ struct WatchThread<F> {
     folders: WatchedFolders,
     /// Whether the working directory exists.
     has_working_folder: bool,
-    contents: Arc<Contents>,
+    contents: Arc<FileHashCache>,
     /// Each file's content when the file was last read or a change was last reported, and the time of that
     /// event.
-    files: HashMap<PathBuf, (Content, Instant)>,
+    files: HashMap<PathBuf, (FileContentId, Instant)>,
     change_tracker: ChangeTracker,
     /// Changes that the last check found but did not report.
     pending: Vec<FileRead>,
@@ -193,7 +193,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
             let pause = self.next_check().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
                 Ok(Message::Hint(hint)) => self.change_tracker.hint(hint, Instant::now()),
-                Ok(Message::Files(read, before, since)) => self.set(read, before, since),
+                Ok(Message::Files(read, before, since)) => self.set_files(read, before, since),
                 Ok(Message::Outputs) => self.set_folders(),
                 Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
@@ -209,7 +209,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         due.map_or(unhinted, |due| due.min(unhinted))
     }
 
-    fn set(&mut self, read: Vec<FileRead>, known: Vec<FileRead>, since: Instant) {
+    fn set_files(&mut self, read: Vec<FileRead>, known: Vec<FileRead>, since: Instant) {
         let before = std::mem::take(&mut self.files);
         for FileRead { path, content } in known {
             let said = before.get(&path).copied();
@@ -224,7 +224,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         self.set_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
-            self.change_tracker.hint(Hint::Touched, Instant::now());
+            self.change_tracker.hint(ChangeHint::Touched, Instant::now());
         }
     }
 
@@ -233,24 +233,24 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         let outputs = self.contents.outputs.paths();
         let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
         self.contents.retain(is_watched);
-        self.folders.set(self.files.keys().chain(&outputs));
+        self.folders.watch_parents(self.files.keys().chain(&outputs));
     }
 
     /// Checks all files and reports changes.
     fn check(&mut self, now: Instant) {
-        self.has_working_folder = working_folder::has_working_folder();
+        self.has_working_folder = working_folder::ensure_working_folder();
         self.folders.renew_lost();
-        for change in self.suspects.check(&self.contents, self.quiet, now) {
+        for change in self.suspects.take_confirmed(&self.contents, self.quiet, now) {
             (self.say)(WatchUpdate::Output(change));
         }
         let found = self.differences();
-        let is_said = !self.is_early(&found, now);
+        let is_said = !self.should_delay_report(&found, now);
         if is_said {
             for FileRead { path, content } in found {
                 self.files.insert(path, (content, now));
             }
             let noticed = self.change_tracker.mark_reported(now);
-            (self.say)(WatchUpdate::Changed(Changed { noticed }));
+            (self.say)(WatchUpdate::Changed(ContentChange { noticed }));
         }
         if self.change_tracker.take_settled(now) {
             (self.say)(WatchUpdate::Settled);
@@ -258,7 +258,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
     }
 
     /// Whether a check found no changes, or found changes that should not be reported yet.
-    fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
+    fn should_delay_report(&mut self, found: &[FileRead], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
             self.change_tracker.discard_hints();
@@ -266,12 +266,12 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         }
         let is_early = if self.change_tracker.has_hints() {
             let moves = !before.is_empty() && before != found;
-            self.change_tracker.is_early(is_missing(found), moves, now)
+            self.change_tracker.should_delay_report(is_missing(found), moves, now)
         } else {
             // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
             // check.
             self.folders.renew();
-            self.change_tracker.hint(Hint::Touched, now);
+            self.change_tracker.hint(ChangeHint::Touched, now);
             true
         };
         if is_early {
@@ -284,7 +284,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
     fn differences(&self) -> Vec<FileRead> {
         let token = CancelToken::new();
         // Use a token that is never cancelled.
-        let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Missing);
+        let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(FileContentId::Missing);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
             .map(|(path, (content, _))| (path, *content, now(path)))
@@ -298,8 +298,8 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
 
 /// Whether a file is missing or empty, in which case it is probably being replaced.
 fn is_missing(files: &[FileRead]) -> bool {
-    let empty = Content::Hash(*blake3::hash(b"").as_bytes());
-    files.iter().any(|file| file.content == Content::Missing || file.content == empty)
+    let empty = FileContentId::Hash(*blake3::hash(b"").as_bytes());
+    files.iter().any(|file| file.content == FileContentId::Missing || file.content == empty)
 }
 
 #[cfg(test)]

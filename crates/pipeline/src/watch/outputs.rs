@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::content::{Content, Contents};
+use super::content::{FileContentId, FileHashCache};
 use crate::control::CancelToken;
-use crate::protected::{ProtectedFile, Protection};
+use crate::protected::{OverwriteProtection, ProtectedFile};
 
 /// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub enum ExternalChange {
 
 impl ExternalChange {
     /// Describes the change as a phrase that follows the file name.
-    pub fn words(self) -> &'static str {
+    pub fn describe(self) -> &'static str {
         match self {
             Self::Removed => "was removed",
             Self::Replaced | Self::ReplacedByForeign => "was replaced by another program",
@@ -52,30 +52,30 @@ pub struct OutputChange {
 
 /// Written files by path, shared by the worker and the watcher.
 #[derive(Debug, Default)]
-pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
+pub struct WrittenOutputs(Mutex<HashMap<PathBuf, WrittenOutput>>);
 
 #[derive(Clone, Debug)]
-struct Output {
+struct WrittenOutput {
     /// The content written by glimt.
-    content: Content,
+    content: FileContentId,
     /// Number of writes started so far.
     writes: u64,
     is_being_written: bool,
-    protection: Protection,
+    protection: OverwriteProtection,
     /// The last reported change.
     reported: Option<ExternalChange>,
 }
 
-impl Outputs {
-    /// Records that a file is about to be written. Its content is ignored until [`Self::end`]. `protection`
+impl WrittenOutputs {
+    /// Records that a file is about to be written. Its content is ignored until [`Self::end_write`]. `protection`
     /// decides whether glimt would replace what another program writes to the file.
-    pub(crate) fn begin(&self, path: &Path, protection: Protection) {
+    pub(crate) fn begin_write(&self, path: &Path, protection: OverwriteProtection) {
         let mut known = self.lock();
-        let output = known.entry(path.to_owned()).or_insert(Output {
-            content: Content::Missing,
+        let output = known.entry(path.to_owned()).or_insert(WrittenOutput {
+            content: FileContentId::Missing,
             writes: 0,
             is_being_written: true,
-            protection: Protection::Nothing,
+            protection: OverwriteProtection::Nothing,
             reported: None,
         });
         (output.writes, output.is_being_written) = (output.writes + 1, true);
@@ -83,14 +83,14 @@ impl Outputs {
     }
 
     /// Records a written file's content, or `None` if the write failed. Special files are not watched.
-    pub(crate) fn end(&self, path: &Path, content: Option<Content>) {
+    pub(crate) fn end_write(&self, path: &Path, content: Option<FileContentId>) {
         let mut known = self.lock();
         let Some(output) = known.get_mut(path) else { return };
         output.is_being_written = false;
         if let Some(content) = content {
             (output.content, output.reported) = (content, None);
         }
-        if !matches!(output.content, Content::Hash(_)) {
+        if !matches!(output.content, FileContentId::Hash(_)) {
             known.remove(path);
         }
     }
@@ -106,35 +106,40 @@ impl Outputs {
     }
 
     /// Returns the files that no longer have the content written by glimt.
-    pub fn changed_externally(&self, contents: &Contents) -> Vec<(PathBuf, ExternalChange)> {
+    pub fn changed_externally(&self, contents: &FileHashCache) -> Vec<(PathBuf, ExternalChange)> {
         let found = self.states(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
 
     /// Returns the files whose state differs from the last report.
-    fn unreported_changes(&self, contents: &Contents) -> Vec<OutputChange> {
+    fn unreported_changes(&self, contents: &FileHashCache) -> Vec<OutputChange> {
         let found = self.states(contents).into_iter().filter(|(_, reported, lost)| reported != lost);
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
 
     /// Returns each file's last reported state and current state, except for files that are being written.
-    fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
-        let before: Vec<(PathBuf, Output)> = {
+    fn states(
+        &self,
+        contents: &FileHashCache,
+    ) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
+        let before: Vec<(PathBuf, WrittenOutput)> = {
             let known = self.lock();
             let idle = known.iter().filter(|(_, output)| !output.is_being_written);
             idle.map(|(path, output)| (path.clone(), output.clone())).collect()
         };
-        let state = |(path, output): (PathBuf, Output)| {
+        let state = |(path, output): (PathBuf, WrittenOutput)| {
             // Use a token that is never cancelled.
-            let now = contents.read(&path, &CancelToken::new()).unwrap_or(Content::Missing);
+            let now = contents.read(&path, &CancelToken::new()).unwrap_or(FileContentId::Missing);
             let lost = match now {
                 now if now == output.content => None,
-                Content::Missing => Some(ExternalChange::Removed),
-                Content::Hash(_) | Content::Unusable(_) => Some(match output.protection.applies_to(&path) {
-                    None => ExternalChange::Replaced,
-                    Some(ProtectedFile::OtherScene) => ExternalChange::ReplacedByOtherScene,
-                    Some(ProtectedFile::Foreign) => ExternalChange::ReplacedByForeign,
-                }),
+                FileContentId::Missing => Some(ExternalChange::Removed),
+                FileContentId::Hash(_) | FileContentId::Unusable(_) => {
+                    Some(match output.protection.reason_to_keep(&path) {
+                        None => ExternalChange::Replaced,
+                        Some(ProtectedFile::OtherScene) => ExternalChange::ReplacedByOtherScene,
+                        Some(ProtectedFile::Foreign) => ExternalChange::ReplacedByForeign,
+                    })
+                }
             };
             // Ignore the content if another write has started since.
             let is_current = self.lock().get(&path).is_some_and(|now| now.writes == output.writes);
@@ -145,13 +150,13 @@ impl Outputs {
         states
     }
 
-    fn report(&self, change: &OutputChange) {
+    fn mark_reported(&self, change: &OutputChange) {
         if let Some(output) = self.lock().get_mut(&change.path) {
             output.reported = change.lost;
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<PathBuf, Output>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<PathBuf, WrittenOutput>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -162,14 +167,19 @@ pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
 
 impl UnconfirmedChanges {
     /// Returns changes that have lasted for `quiet`. Returns each change only once.
-    pub(super) fn check(&mut self, contents: &Contents, quiet: Duration, now: Instant) -> Vec<OutputChange> {
+    pub(super) fn take_confirmed(
+        &mut self,
+        contents: &FileHashCache,
+        quiet: Duration,
+        now: Instant,
+    ) -> Vec<OutputChange> {
         let before = std::mem::take(&mut self.0);
         let mut lasting = Vec::new();
         for change in contents.outputs.unreported_changes(contents) {
             let since =
                 before.iter().find(|(suspect, _)| *suspect == change).map_or(now, |(_, since)| *since);
             if now.saturating_duration_since(since) >= quiet {
-                contents.outputs.report(&change);
+                contents.outputs.mark_reported(&change);
                 lasting.push(change);
             } else {
                 self.0.push((change, since));
@@ -192,27 +202,27 @@ mod tests {
 
     const QUIET: Duration = Duration::from_millis(250);
 
-    fn write(contents: &Contents, path: &Path, text: &str) {
-        contents.outputs.begin(path, Protection::Parts);
+    fn write(contents: &FileHashCache, path: &Path, text: &str) {
+        contents.outputs.begin_write(path, OverwriteProtection::Parts);
         fs::write(path, text).expect("written");
         let content = contents.read(path, &CancelToken::new()).expect("not cancelled");
-        contents.outputs.end(path, Some(content));
+        contents.outputs.end_write(path, Some(content));
     }
 
     #[test]
     fn lasting_changes_are_reported_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let (contents, mut suspects) = (Contents::default(), UnconfirmedChanges::default());
+        let (contents, mut suspects) = (FileHashCache::default(), UnconfirmedChanges::default());
         let begin = Instant::now();
-        let mut look = |contents: &Contents, after: u64| {
-            let found = suspects.check(contents, QUIET, begin + Duration::from_millis(after));
+        let mut look = |contents: &FileHashCache, after: u64| {
+            let found = suspects.take_confirmed(contents, QUIET, begin + Duration::from_millis(after));
             found.into_iter().map(|change| change.lost).collect::<Vec<_>>()
         };
         write(&contents, &path, "one");
         assert_eq!(look(&contents, 0), []);
         // glimt's own writes are not reported, either during or after the write.
-        contents.outputs.begin(&path, Protection::Parts);
+        contents.outputs.begin_write(&path, OverwriteProtection::Parts);
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 1000), look(&contents, 2000)), (vec![], vec![]));
         write(&contents, &path, "two");
@@ -251,17 +261,17 @@ mod tests {
     fn failed_write_keeps_previous_content() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let contents = Contents::default();
+        let contents = FileHashCache::default();
         write(&contents, &path, "one");
-        contents.outputs.begin(&path, Protection::Parts);
-        contents.outputs.end(&path, None);
+        contents.outputs.begin_write(&path, OverwriteProtection::Parts);
+        contents.outputs.end_write(&path, None);
         assert_eq!(contents.outputs.changed_externally(&contents), []);
         fs::remove_file(&path).expect("removed");
         assert_eq!(contents.outputs.changed_externally(&contents), [(path, ExternalChange::Removed)]);
         // A file that was never written is not watched.
         let other = folder.path().join("b.png");
-        contents.outputs.begin(&other, Protection::Parts);
-        contents.outputs.end(&other, None);
+        contents.outputs.begin_write(&other, OverwriteProtection::Parts);
+        contents.outputs.end_write(&other, None);
         assert_eq!(contents.outputs.paths().len(), 1);
     }
 
@@ -269,16 +279,16 @@ mod tests {
     fn replacement_by_protected_file_is_reported() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let contents = Contents::default();
+        let contents = FileHashCache::default();
         let scene = folder.path().join("a.toml");
         for (protection, change) in [
-            (Protection::OtherImages(scene), ExternalChange::ReplacedByForeign),
-            (Protection::Parts, ExternalChange::Replaced),
-            (Protection::Nothing, ExternalChange::Replaced),
+            (OverwriteProtection::OtherImages(scene), ExternalChange::ReplacedByForeign),
+            (OverwriteProtection::Parts, ExternalChange::Replaced),
+            (OverwriteProtection::Nothing, ExternalChange::Replaced),
         ] {
             write(&contents, &path, "one");
-            contents.outputs.begin(&path, protection);
-            contents.outputs.end(&path, None);
+            contents.outputs.begin_write(&path, protection);
+            contents.outputs.end_write(&path, None);
             fs::write(&path, "of another").expect("written");
             assert_eq!(contents.outputs.changed_externally(&contents), [(path.clone(), change)]);
         }

@@ -41,7 +41,7 @@ impl Scratch {
     }
 
     fn watch(&self, paths: &[&Path]) {
-        let contents = Contents::default();
+        let contents = FileHashCache::default();
         let read = |path: &&Path| FileRead {
             path: path.to_path_buf(),
             content: contents.read(path, &CancelToken::new()).expect("not cancelled"),
@@ -271,7 +271,7 @@ fn change_before_watching_is_detected() {
     let scratch = Scratch::new(false);
     let path = scratch.path("b.toml");
     fs::write(&path, "new").expect("written");
-    let content = Content::Hash(*blake3::hash(b"old").as_bytes());
+    let content = FileContentId::Hash(*blake3::hash(b"old").as_bytes());
     scratch.watcher.set_files(vec![FileRead { path, content }], Vec::new(), Instant::now());
     scratch.expect_one();
 }
@@ -282,7 +282,7 @@ fn restored_file_is_reported_if_change_was_read() {
     fs::write(&path, "said").expect("written");
     scratch.expect_one();
     // The file temporarily had different content, which a request read but the watcher did not see.
-    let content = Content::Hash(*blake3::hash(b"between").as_bytes());
+    let content = FileContentId::Hash(*blake3::hash(b"between").as_bytes());
     let between = vec![FileRead { path: path.clone(), content }];
     scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
     scratch.expect_one();

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 static HOME: OnceLock<PathBuf> = OnceLock::new();
 
 /// Remembers the working directory.
-pub(super) fn remember() {
+pub(super) fn remember_working_folder() {
     if let Ok(folder) = env::current_dir() {
         HOME.get_or_init(|| folder);
     }
@@ -19,17 +19,17 @@ pub(super) fn remember() {
 
 /// Whether the working directory exists. If it was removed, tries to change to a new directory of the same
 /// name.
-pub(super) fn has_working_folder() -> bool {
-    !is_removed() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
+pub(super) fn ensure_working_folder() -> bool {
+    !is_working_folder_removed() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
 }
 
-fn is_removed() -> bool {
+fn is_working_folder_removed() -> bool {
     env::current_dir().is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
 /// Returns a missing folder that the file needs: the working directory or the file's own folder.
 pub fn missing_folder(file: &Path) -> Option<PathBuf> {
-    if is_removed() && file.is_relative() {
+    if is_working_folder_removed() && file.is_relative() {
         return HOME.get().cloned();
     }
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty())?;

@@ -28,7 +28,7 @@ pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
     }
     let mut differences = KeyDifferences { texts: [before, after], listed: Vec::new(), count: 0 };
     differences.compare_tables("", old.root(), new.root());
-    differences.finish()
+    differences.into_descriptions()
 }
 
 /// Key differences found so far.
@@ -41,7 +41,7 @@ struct KeyDifferences<'t> {
 }
 
 impl KeyDifferences<'_> {
-    fn finish(mut self) -> Vec<String> {
+    fn into_descriptions(mut self) -> Vec<String> {
         let rest = self.count - self.listed.len();
         if let Some(last) = self.listed.last_mut().filter(|_| rest > 0) {
             *last += &format!(" and {rest} more");
@@ -71,9 +71,11 @@ impl KeyDifferences<'_> {
     }
 
     fn compare_values(&mut self, name: &str, old: &Value<'_>, new: &Value<'_>) {
-        match (old.item(), new.item()) {
+        match (old.decode(), new.decode()) {
             (TomlValue::Table(old), TomlValue::Table(new)) => self.compare_tables(name, old, new),
-            (TomlValue::Array(old), TomlValue::Array(new)) if old.is_of_tables() && new.is_of_tables() => {
+            (TomlValue::Array(old), TomlValue::Array(new))
+                if old.starts_with_table() && new.starts_with_table() =>
+            {
                 self.compare_lists(name, old, new);
             }
             _ if is_equal_value(old, new) => {}
@@ -108,8 +110,8 @@ impl KeyDifferences<'_> {
 
     /// Adds a key that exists in only one document. Adds each `[[name]]` table separately.
     fn add_unmatched(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
-        match value.item() {
-            TomlValue::Array(array) if array.is_of_tables() => {
+        match value.decode() {
+            TomlValue::Array(array) if array.starts_with_table() => {
                 let all: Vec<Value<'_>> = array.iter().collect();
                 for (element, value) in element_keys(&all).iter().zip(&all) {
                     self.add_unmatched_entry(sign, &join_key(name, element), value, text);
@@ -127,9 +129,9 @@ impl KeyDifferences<'_> {
 
     /// Adds a single key or table that exists in only one document.
     fn add_unmatched_entry(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
-        let is_short = match value.item() {
+        let is_short = match value.decode() {
             TomlValue::Table(_) => false,
-            TomlValue::Array(array) => !array.is_of_tables(),
+            TomlValue::Array(array) => !array.starts_with_table(),
             TomlValue::String(_)
             | TomlValue::Integer { .. }
             | TomlValue::Float(_)
@@ -142,13 +144,13 @@ impl KeyDifferences<'_> {
 
     /// Returns a value's source text, on one line.
     fn value_text(&self, text: usize, value: &Value<'_>) -> String {
-        if let TomlValue::Table(_) = value.item() {
+        if let TomlValue::Table(_) = value.decode() {
             return "{…}".to_owned();
         }
         let written = self.texts[text].get(value.span()).unwrap_or_default();
         let shown = shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), MAX_VALUE_CHARS);
         // Cut between elements, because a truncated number would look like a different number.
-        match (value.item(), shown.rfind(", ")) {
+        match (value.decode(), shown.rfind(", ")) {
             (TomlValue::Array(_), Some(end)) if shown.ends_with('…') => format!("{}…", &shown[..end + 2]),
             _ => shown,
         }
@@ -174,8 +176,8 @@ fn element_keys(all: &[Value<'_>]) -> Vec<String> {
 }
 
 fn table_name<'t>(value: &Value<'t>) -> Option<&'t str> {
-    let TomlValue::Table(table) = value.item() else { return None };
-    match table.get("name")?.value.item() {
+    let TomlValue::Table(table) = value.decode() else { return None };
+    match table.get("name")?.value.decode() {
         TomlValue::String(name) => Some(name),
         TomlValue::Array(_)
         | TomlValue::Table(_)
@@ -188,7 +190,7 @@ fn table_name<'t>(value: &Value<'t>) -> Option<&'t str> {
 
 /// Whether two values are equal, ignoring formatting and key order.
 fn is_equal_value(a: &Value<'_>, b: &Value<'_>) -> bool {
-    match (a.item(), b.item()) {
+    match (a.decode(), b.decode()) {
         (TomlValue::Table(a), TomlValue::Table(b)) => {
             let has = |a: Entries<'_>, b: Entries<'_>| {
                 a.iter().all(|entry| {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::Located;
+use super::Spanned;
 use crate::math::DVec3;
 
 /// A scene's camera.
@@ -27,7 +27,7 @@ pub enum Camera {
     /// A camera defined by a gKit orbiter file.
     Orbiter {
         /// The orbiter file.
-        file: Located<PathBuf>,
+        file: Spanned<PathBuf>,
         /// Vertical field of view in degrees, in (0, 180). `None` uses the field of view in the file.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
@@ -90,7 +90,7 @@ impl CameraChange {
 impl Viewpoint {
     /// Applies a change. If the focal plane passes through `look_at` (the default), the focus follows
     /// `look_at`.
-    pub fn changed(&self, change: &CameraChange) -> Self {
+    pub fn with_change(&self, change: &CameraChange) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
         Self {
@@ -123,7 +123,7 @@ pub fn is_same_distance(a: f64, b: f64) -> bool {
 
 impl Camera {
     /// Whether the camera has this viewpoint, up to rounding of the focus distance.
-    pub fn is_nearly(&self, view: &Viewpoint) -> bool {
+    pub fn matches_viewpoint(&self, view: &Viewpoint) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
                 *self == Viewpoint { focus: *focus, ..*view }.into()
@@ -144,13 +144,19 @@ impl Fingerprinted for Camera {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::LookAt { position, look_at, up, fov, aperture, focus } => {
-                key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);
+                key.add_index(0)
+                    .add_dvec3(*position)
+                    .add_dvec3(*look_at)
+                    .add_dvec3(*up)
+                    .add_f64(*fov)
+                    .add_f64(*aperture)
+                    .add_f64(*focus);
             }
             // Hash the file's contents rather than its name.
             Self::Orbiter { file: _, fov, aperture, focus } => {
                 // 0 is neither a valid angle nor a valid distance.
-                key.index(1).f64(*aperture).f64(fov.unwrap_or(0.0)).f64(focus.unwrap_or(0.0));
-                key.text(of.orbiter.unwrap_or(""));
+                key.add_index(1).add_f64(*aperture).add_f64(fov.unwrap_or(0.0)).add_f64(focus.unwrap_or(0.0));
+                key.add_str(of.orbiter.unwrap_or(""));
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::Located;
+use super::Spanned;
 pub use crate::lights::delta::Falloff;
 use crate::math::{DVec3, Vec3};
 
@@ -59,7 +59,7 @@ pub struct Environment {
     /// Radiance, or a scale factor for the map.
     pub color: Vec3,
     /// Path to an equirectangular map, resolved against the scene's folder.
-    pub file: Option<Located<PathBuf>>,
+    pub file: Option<Spanned<PathBuf>>,
     /// Rotation of the map about +y in degrees, counterclockwise when seen from above.
     pub rotate: f64,
 }
@@ -103,13 +103,13 @@ impl Environment {
 impl Fingerprinted for Light {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Point(light) => light.add_to(key.text("point"), of),
+            Self::Point(light) => light.add_to(key.add_str("point"), of),
             Self::Spot(SpotLight { point, look_at, angle, blend }) => {
-                point.add_to(key.text("spot"), of);
-                key.dvec3(*look_at).f64(*angle).f32(*blend);
+                point.add_to(key.add_str("spot"), of);
+                key.add_dvec3(*look_at).add_f64(*angle).add_f32(*blend);
             }
             Self::Directional(DirectionalLight { direction, irradiance, angle }) => {
-                key.text("directional").dvec3(*direction).vec3(*irradiance).f64(*angle);
+                key.add_str("directional").add_dvec3(*direction).add_vec3(*irradiance).add_f64(*angle);
             }
         }
     }
@@ -118,7 +118,7 @@ impl Fingerprinted for Light {
 impl Fingerprinted for PointLight {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { position, intensity, falloff } = *self;
-        key.dvec3(position).vec3(intensity).choice(falloff);
+        key.add_dvec3(position).add_vec3(intensity).add_choice(falloff);
     }
 }
 
@@ -126,9 +126,9 @@ impl Fingerprinted for PointLight {
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { color, file, rotate } = self;
-        key.vec3(*color).f64(*rotate).flag(file.is_some());
+        key.add_vec3(*color).add_f64(*rotate).add_bool(file.is_some());
         if let Some(file) = file {
-            key.path(&file.value);
+            key.add_path(&file.value);
         }
     }
 }

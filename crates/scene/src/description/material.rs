@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::Located;
+use super::Spanned;
 use crate::choice;
 pub use crate::materials::UvSet;
 pub use crate::materials::texture::{TextureFilter, Wrap};
-pub use crate::materials::{Channel, EmissionSides, PixelValue};
+pub use crate::materials::{Channel, ChannelSelector, EmissionSides};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// An image used by materials.
@@ -16,7 +16,7 @@ pub struct Texture {
     /// Name of the texture in the scene file.
     pub name: String,
     /// Path to the image or glTF file, resolved against the scene's folder.
-    pub file: Located<PathBuf>,
+    pub file: Spanned<PathBuf>,
     /// Index of the image within a glTF file. `None` if the file is itself an image.
     pub image: Option<u32>,
     /// Interpolation between texels.
@@ -32,14 +32,14 @@ pub struct Texture {
     /// Texture coordinate set.
     pub uv: UvSet,
     /// Encoding of the pixels.
-    pub encoding: Encoding,
+    pub encoding: TextureEncoding,
     /// Scale factor for linear colors and numbers. Normals and heights ignore it.
     pub factor: Vec3,
 }
 
 choice! {
     /// Texture encodings.
-    pub enum Encoding {
+    pub enum TextureEncoding {
         /// sRGB for 8- and 16-bit colors, linear for numbers, normal maps and floating-point files.
         Auto = "auto",
         /// sRGB, decoded.
@@ -83,10 +83,12 @@ impl NumberSource {
 
     /// Returns the texture's index, and how to compute the number from a pixel: from the specified channel if
     /// there is one, and otherwise as in `usual`. `None` if the number is constant.
-    pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
+    pub fn texture(&self, usual: ChannelSelector) -> Option<(usize, ChannelSelector)> {
         match *self {
             Self::Constant(_) => None,
-            Self::Texture { texture, channel } => Some((texture, channel.map_or(usual, PixelValue::Channel))),
+            Self::Texture { texture, channel } => {
+                Some((texture, channel.map_or(usual, ChannelSelector::Channel)))
+            }
         }
     }
 }
@@ -114,8 +116,8 @@ impl OpacitySource {
 
     /// Returns the texture's index, and how to compute the opacity from a pixel. `None` if the opacity is
     /// constant.
-    pub fn texture(&self) -> Option<(usize, PixelValue)> {
-        self.value.texture(PixelValue::Opacity)
+    pub fn texture(&self) -> Option<(usize, ChannelSelector)> {
+        self.value.texture(ChannelSelector::Opacity)
     }
 }
 
@@ -185,7 +187,7 @@ impl MaterialKind {
     }
 
     /// Whether the material has a δ lobe, like a mirror, smooth glass or a smooth coat.
-    pub fn has_delta(&self) -> bool {
+    pub fn has_delta_lobe(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
             Self::Metal { roughness, .. }
@@ -223,7 +225,7 @@ impl MaterialKind {
     }
 
     /// Whether the material has a color that can be multiplied by vertex colors.
-    pub fn has_color(&self) -> bool {
+    pub fn accepts_vertex_colors(&self) -> bool {
         match self {
             Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
             Self::Metal { fresnel: FresnelSource::Schlick(_), .. }
@@ -279,14 +281,14 @@ pub struct Bump {
 
 impl Bump {
     /// Returns how to compute the height from a pixel.
-    pub fn number(&self) -> PixelValue {
-        self.channel.map_or(PixelValue::Luminance, PixelValue::Channel)
+    pub fn pixel_value(&self) -> ChannelSelector {
+        self.channel.map_or(ChannelSelector::Luminance, ChannelSelector::Channel)
     }
 }
 
 /// How a texture's pixels are interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TextureUse {
+pub enum PixelInterpretation {
     /// Pixels are colors.
     Color,
     /// Pixels are surface colors, and the image's alpha channel is the surface's opacity.
@@ -294,7 +296,7 @@ pub enum TextureUse {
     /// Pixels are tangent-space normals.
     Normal,
     /// Pixels are converted to numbers.
-    Number(PixelValue),
+    Number(ChannelSelector),
 }
 
 /// Role of a texture in a material.
@@ -309,31 +311,31 @@ pub enum TextureRole {
     /// Reflectance or index of refraction of the microfacets.
     Facets,
     /// Roughness or another microfacet parameter.
-    Roughness(PixelValue),
+    Roughness(ChannelSelector),
     /// Emitted radiance.
     Emission,
     /// Normal map.
     NormalMap,
     /// Height map.
-    Bump(PixelValue),
+    Bump(ChannelSelector),
     /// Opacity of the surface.
-    Opacity(PixelValue),
+    Opacity(ChannelSelector),
     /// Weight or roughness of an emitter's clear coat.
-    EmissionCoat(PixelValue),
+    EmissionCoat(ChannelSelector),
 }
 
 impl TextureRole {
     /// Returns how the texture's pixels are interpreted in this role.
-    pub fn texture_use(self) -> TextureUse {
+    pub fn pixel_interpretation(self) -> PixelInterpretation {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
-                TextureUse::Color
+                PixelInterpretation::Color
             }
             Self::Roughness(number)
             | Self::Bump(number)
             | Self::Opacity(number)
-            | Self::EmissionCoat(number) => TextureUse::Number(number),
-            Self::NormalMap => TextureUse::Normal,
+            | Self::EmissionCoat(number) => PixelInterpretation::Number(number),
+            Self::NormalMap => PixelInterpretation::Normal,
         }
     }
 }
@@ -429,7 +431,7 @@ impl ColorSource {
 
 impl MaterialKind {
     /// Returns the color parameters that may be textures, each with its role.
-    fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
+    fn color_parameters(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
                 (diffuse, TextureRole::Diffuse),
@@ -458,7 +460,7 @@ impl MaterialKind {
     }
 
     /// Returns the number parameters that may be textures.
-    fn numbers(&self) -> Vec<NumberSource> {
+    fn number_parameters(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
             Self::Plastic { roughness, .. } | Self::Glass { roughness, .. } => vec![*roughness],
@@ -503,15 +505,19 @@ impl Material {
     /// their roles. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
-        let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
-        let numbers = kind.numbers().into_iter().filter_map(|number| number.texture(PixelValue::Luminance));
+        let colors =
+            kind.color_parameters().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
+        let numbers = kind
+            .number_parameters()
+            .into_iter()
+            .filter_map(|number| number.texture(ChannelSelector::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
-        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.number())));
+        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.pixel_value())));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
         let coat = self.emission_coat().into_iter().flatten();
-        let coat = coat.filter_map(|number| number.texture(PixelValue::Luminance));
+        let coat = coat.filter_map(|number| number.texture(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
         colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()
     }
@@ -521,9 +527,18 @@ impl Material {
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;
-        key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
-        key.f64(*rotate).f32(offset.x).f32(offset.y).vec3(*factor).flag(*uv == UvSet::Second);
-        key.index(image.map_or(0, |image| image as usize + 1));
+        key.add_path(&file.value)
+            .add_choice(*filter)
+            .add_choice(*wrap)
+            .add_choice(*encoding)
+            .add_f32(repeat.x)
+            .add_f32(repeat.y);
+        key.add_f64(*rotate)
+            .add_f32(offset.x)
+            .add_f32(offset.y)
+            .add_vec3(*factor)
+            .add_bool(*uv == UvSet::Second);
+        key.add_index(image.map_or(0, |image| image as usize + 1));
     }
 }
 
@@ -531,10 +546,10 @@ impl Fingerprinted for ColorSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Constant(color) => {
-                key.index(0).vec3(*color);
+                key.add_index(0).add_vec3(*color);
             }
             Self::Texture(index) => {
-                of.textures[*index].add_to(key.index(1), of);
+                of.textures[*index].add_to(key.add_index(1), of);
             }
         }
     }
@@ -543,7 +558,7 @@ impl Fingerprinted for ColorSource {
 impl Fingerprinted for OpacitySource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { value, cutoff } = self;
-        key.f32(*cutoff).add(value, of);
+        key.add_f32(*cutoff).add(value, of);
     }
 }
 
@@ -551,12 +566,12 @@ impl Fingerprinted for NumberSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match *self {
             Self::Constant(value) => {
-                key.index(0).f32(value);
+                key.add_index(0).add_f32(value);
             }
             Self::Texture { texture, channel } => {
-                key.index(1).flag(channel.is_some());
+                key.add_index(1).add_bool(channel.is_some());
                 if let Some(channel) = channel {
-                    key.choice(channel);
+                    key.add_choice(channel);
                 }
                 of.textures[texture].add_to(key, of);
             }
@@ -568,10 +583,10 @@ impl Fingerprinted for FresnelSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Schlick(color) => {
-                key.index(0).add(color, of);
+                key.add_index(0).add(color, of);
             }
             Self::Index { eta, k } => {
-                key.index(1).add(eta, of).add(k, of);
+                key.add_index(1).add(eta, of).add(k, of);
             }
         }
     }
@@ -580,7 +595,7 @@ impl Fingerprinted for FresnelSource {
 impl Fingerprinted for EmissionSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { scale, texture, sides } = *self;
-        key.vec3(scale).choice(sides).flag(texture.is_some());
+        key.add_vec3(scale).add_choice(sides).add_bool(texture.is_some());
         if let Some(texture) = texture {
             of.textures[texture].add_to(key, of);
         }
@@ -590,14 +605,14 @@ impl Fingerprinted for EmissionSource {
 impl Fingerprinted for NormalMap {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, strength } = *self;
-        of.textures[texture].add_to(key.f32(strength), of);
+        of.textures[texture].add_to(key.add_f32(strength), of);
     }
 }
 
 impl Fingerprinted for Bump {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, channel, scale } = *self;
-        key.f32(scale).add(&NumberSource::Texture { texture, channel }, of);
+        key.add_f32(scale).add(&NumberSource::Texture { texture, channel }, of);
     }
 }
 
@@ -605,22 +620,22 @@ impl Fingerprinted for MaterialKind {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Phong { diffuse, specular, shininess, ambient } => {
-                key.index(0).f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
+                key.add_index(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
             }
             Self::Mirror { reflectance } => {
-                key.index(1).add(reflectance, of);
+                key.add_index(1).add(reflectance, of);
             }
             Self::Glass { ior, tint, roughness } => {
-                key.index(2).f32(*ior).dvec3(*tint).add(roughness, of);
+                key.add_index(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of);
             }
             Self::Pane { ior, tint } => {
-                key.index(3).f32(*ior).add(tint, of);
+                key.add_index(3).add_f32(*ior).add(tint, of);
             }
             Self::Metal { fresnel, roughness, anisotropy } => {
-                key.index(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
+                key.add_index(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
             }
             Self::Plastic { diffuse, specular, ior, roughness } => {
-                key.index(4).add(diffuse, of).add(specular, of).f32(*ior).add(roughness, of);
+                key.add_index(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
             }
             Self::Principled {
                 color,
@@ -633,7 +648,7 @@ impl Fingerprinted for MaterialKind {
                 clearcoat,
                 clearcoat_roughness,
             } => {
-                key.index(5).add(color, of).add(metallic, of).add(roughness, of).f32(*ior);
+                key.add_index(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
                 key.add(specular, of).add(specular_color, of).add(transmission, of);
                 key.add(clearcoat, of).add(clearcoat_roughness, of);
             }

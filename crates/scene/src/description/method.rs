@@ -15,7 +15,7 @@ choice! {
 
 /// Properties of an integrator, and the settings it supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Method {
+pub struct IntegratorProperties {
     /// Whether camera paths split at glass, rather than randomly choosing between reflection and refraction.
     pub splits: bool,
     /// Whether paths continue at rough surfaces and thus account for all light. If not, they end at rough
@@ -33,9 +33,9 @@ pub struct Method {
 
 impl Integrator {
     /// Returns the integrator's properties.
-    pub const fn method(self) -> Method {
+    pub const fn properties(self) -> IntegratorProperties {
         match self {
-            Self::Whitted => Method {
+            Self::Whitted => IntegratorProperties {
                 splits: true,
                 scatters: false,
                 gathers: true,
@@ -43,7 +43,7 @@ impl Integrator {
                 honors_ambient: true,
                 honors_clamp: false,
             },
-            Self::Path => Method {
+            Self::Path => IntegratorProperties {
                 splits: false,
                 scatters: true,
                 gathers: false,

@@ -16,27 +16,27 @@ use std::path::PathBuf;
 pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{Environment, Light};
 pub use material::{
-    Bump, Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material,
-    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelValue, Texture, TextureFilter, TextureRole,
-    TextureUse, UvSet, Wrap,
+    Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
+    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelInterpretation, Texture, TextureEncoding,
+    TextureFilter, TextureRole, UvSet, Wrap,
 };
-pub use method::{Integrator, Method};
+pub use method::{Integrator, IntegratorProperties};
 pub use render::{
-    Accel, KeyRange, MAX_BOUNCES, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
+    Accel, KeyRange, MAX_BOUNCES, PixelFilter, RenderKeySpec, RenderOptions, ShadowMode, Tonemap, render_keys,
 };
-pub use shape::{LoweredShape, Mesh, MeshTransform, Object, Shape, Sheet, max_projection};
+pub use shape::{LoweredShape, MeshReference, MeshTransform, Object, OpenSurface, Shape, max_projection};
 
 /// A validated scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The `[render]` table.
-    pub render: Render,
+    pub render: RenderOptions,
     /// The value of `output` in `[render]`, resolved against the scene's folder.
     pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,
     /// The `[photons]` table.
-    pub photons: Photons,
+    pub photons: PhotonOptions,
     /// `[textures.*]`, in file order.
     pub textures: Vec<Texture>,
     /// `[materials.*]`, in file order.
@@ -47,13 +47,13 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// `[[light]]`, in file order.
     pub lights: Vec<Light>,
-    /// `[environment]`, which replaces [`Render::background`].
+    /// `[environment]`, which replaces [`RenderOptions::background`].
     pub environment: Option<Environment>,
 }
 
 /// A value and its span in the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Located<T> {
+pub struct Spanned<T> {
     /// The value.
     pub value: T,
     /// Byte range in the scene file.
@@ -73,7 +73,7 @@ pub struct MeshFile {
 
 /// The `[photons]` table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Photons {
+pub struct PhotonOptions {
     /// Whether the scene enables photons.
     pub enabled: bool,
     /// Photons per pass. 0 means about one per pixel.

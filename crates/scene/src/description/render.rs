@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::super::keys::key::{ChoiceValues, words};
+use super::super::keys::key::{ChoiceValuesFn, choice_values};
 use super::method::Integrator;
 use crate::choice;
 use crate::choice::Choice;
@@ -37,7 +37,7 @@ macro_rules! __render_keys {
             /// The rendering algorithm.
             integrator: Integrator = Integrator::Whitted, choice, "", option;
             /// Shadows in `whitted`.
-            shadows: Shadows = Shadows::Soft, choice, "", option;
+            shadows: ShadowMode = ShadowMode::Soft, choice, "", option;
             /// Limit on indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0 disables the limit.
             clamp: f32 = 0.0, at_least(0.0), "radiance", option;
             /// Ambient radiance in `whitted`, an approximation of indirect light.
@@ -122,7 +122,7 @@ pub enum KeyRange {
 
 /// A `[render]` key.
 #[derive(Clone, Debug)]
-pub struct RenderKey {
+pub struct RenderKeySpec {
     /// Name of the key.
     pub name: &'static str,
     /// Description: one sentence without a final period.
@@ -132,7 +132,7 @@ pub struct RenderKey {
     /// Accepted values.
     pub range: KeyRange,
     /// Returns the accepted names and their meanings. Empty for other types.
-    pub words: ChoiceValues,
+    pub choice_values: ChoiceValuesFn,
     /// The default, in scene file syntax.
     pub default: String,
     /// Whether a command-line option overrides the key.
@@ -157,9 +157,9 @@ macro_rules! range {
     };
 }
 
-macro_rules! words {
+macro_rules! choice_values {
     (choice, $type:ty) => {
-        words::<$type>
+        choice_values::<$type>
     };
     ($range:ident, $type:ty) => {
         Vec::new
@@ -184,30 +184,30 @@ macro_rules! settings {
     )*) => {
         /// The `[render]` settings.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Render {
+        pub struct RenderOptions {
             $($(#[doc = $doc])* pub $name: $type,)*
         }
 
-        impl Render {
+        impl RenderOptions {
             /// The default settings.
             pub const DEFAULT: Self = Self { $($name: $default),* };
 
             /// Returns the keys in `[render]`, except `output`.
-            pub fn keys() -> Vec<RenderKey> {
-                vec![$(RenderKey {
+            pub fn key_specs() -> Vec<RenderKeySpec> {
+                vec![$(RenderKeySpec {
                     name: stringify!($name),
                     doc: concat!($($doc),*).trim().trim_end_matches('.'),
                     unit: $unit,
                     range: range!($range $(($($limit),*))?, $type),
-                    words: words!($range, $type),
+                    choice_values: choice_values!($range, $type),
                     default: in_toml!($range, Self::DEFAULT.$name),
                     has_option: stringify!($change) == "option",
                 }),*]
             }
 
             /// Finds a key by its name.
-            pub fn key(name: &str) -> Option<RenderKey> {
-                Self::keys().into_iter().find(|key| key.name == name)
+            pub fn find_key_spec(name: &str) -> Option<RenderKeySpec> {
+                Self::key_specs().into_iter().find(|key| key.name == name)
             }
         }
     };
@@ -217,7 +217,7 @@ render_keys!(settings);
 
 choice! {
     /// Kinds of shadows.
-    pub enum Shadows {
+    pub enum ShadowMode {
         /// No shadows.
         Off = "off",
         /// One ray to the center of each light.
@@ -240,12 +240,12 @@ choice! {
     }
 }
 
-impl Render {
+impl RenderOptions {
     /// Replaces settings ignored by the integrator with their defaults.
-    pub fn effective(self) -> Self {
-        let method = self.integrator.method();
+    pub fn reset_ignored(self) -> Self {
+        let method = self.integrator.properties();
         Self {
-            shadows: if method.honors_shadows { self.shadows } else { Shadows::Soft },
+            shadows: if method.honors_shadows { self.shadows } else { ShadowMode::Soft },
             ambient: if method.honors_ambient { self.ambient } else { Vec3::ZERO },
             clamp: if method.honors_clamp { self.clamp } else { 0.0 },
             ..self
@@ -254,7 +254,7 @@ impl Render {
 }
 
 /// Fingerprint of all settings that affect the samples.
-impl Fingerprinted for Render {
+impl Fingerprinted for RenderOptions {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self {
             width,
@@ -277,15 +277,18 @@ impl Fingerprinted for Render {
             // key to their fingerprint.
             accel: _,
             seed,
-        } = self.effective();
-        key.f32(error);
-        key.u64(width.into()).u64(height.into()).u64(shadow_samples.into()).u64(max_depth.into());
-        key.choice(integrator)
-            .choice(shadows)
-            .f32(clamp)
-            .vec3(ambient)
-            .vec3(background)
-            .choice(filter)
-            .u64(seed.into());
+        } = self.reset_ignored();
+        key.add_f32(error);
+        key.add_u64(width.into())
+            .add_u64(height.into())
+            .add_u64(shadow_samples.into())
+            .add_u64(max_depth.into());
+        key.add_choice(integrator)
+            .add_choice(shadows)
+            .add_f32(clamp)
+            .add_vec3(ambient)
+            .add_vec3(background)
+            .add_choice(filter)
+            .add_u64(seed.into());
     }
 }

@@ -116,12 +116,12 @@ pub enum Shape {
         tube: f64,
     },
     /// An instance of a mesh file.
-    Mesh(Mesh),
+    Mesh(MeshReference),
 }
 
 /// An open surface, which does not enclose a volume on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sheet {
+pub enum OpenSurface {
     /// The corners of a parallelogram, counterclockwise when seen from the front.
     Quad([DVec3; 4]),
     /// The corners of a triangle, counterclockwise when seen from the front.
@@ -157,7 +157,7 @@ pub enum Sheet {
 
 /// An instance of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mesh {
+pub struct MeshReference {
     /// Index into [`Scene::mesh_files`](super::Scene::mesh_files).
     pub file: usize,
     /// Transform from file coordinates to scene coordinates.
@@ -209,7 +209,7 @@ pub enum LoweredShape<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
     /// A triangle mesh from a file.
-    Mesh(&'a Mesh),
+    Mesh(&'a MeshReference),
 }
 
 impl Shape {
@@ -257,20 +257,20 @@ impl Shape {
     }
 
     /// Returns the mesh instance. `None` for other shapes.
-    pub fn mesh(&self) -> Option<&Mesh> {
+    pub fn mesh(&self) -> Option<&MeshReference> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
     /// Returns the shape as an open surface. `None` for closed shapes, planes and meshes.
-    pub fn sheet(&self) -> Option<Sheet> {
+    pub fn as_open_surface(&self) -> Option<OpenSurface> {
         match *self {
             Self::Quad { corner, u, v } => {
-                Some(Sheet::Quad([corner, corner + u, corner + u + v, corner + v]))
+                Some(OpenSurface::Quad([corner, corner + u, corner + u + v, corner + v]))
             }
-            Self::Triangle { a, b, c } => Some(Sheet::Triangle([a, b, c])),
-            Self::Disk { center, normal, radius } => Some(Sheet::Disk { center, normal, radius }),
-            Self::Cylinder { a, b, radius, caps: false } => Some(Sheet::Cylinder { a, b, radius }),
-            Self::Cone { base, tip, radius, cap: false } => Some(Sheet::Cone { base, tip, radius }),
+            Self::Triangle { a, b, c } => Some(OpenSurface::Triangle([a, b, c])),
+            Self::Disk { center, normal, radius } => Some(OpenSurface::Disk { center, normal, radius }),
+            Self::Cylinder { a, b, radius, caps: false } => Some(OpenSurface::Cylinder { a, b, radius }),
+            Self::Cone { base, tip, radius, cap: false } => Some(OpenSurface::Cone { base, tip, radius }),
             Self::Sphere { .. }
             | Self::Plane { .. }
             | Self::Box { .. }
@@ -282,7 +282,7 @@ impl Shape {
     }
 
     /// Returns a point on or inside the shape. `None` for a mesh.
-    pub fn point(&self) -> Option<DVec3> {
+    pub fn representative_point(&self) -> Option<DVec3> {
         match *self {
             Self::Sphere { center, .. }
             | Self::Box { center, .. }
@@ -341,37 +341,41 @@ pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
 impl Fingerprinted for Shape {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Sphere { center, radius } => key.index(0).dvec3(*center).f64(*radius),
-            Self::Quad { corner, u, v } => key.index(1).dvec3(*corner).dvec3(*u).dvec3(*v),
-            Self::Plane { point, normal } => key.index(2).dvec3(*point).dvec3(*normal),
-            Self::Box { center, size, rotate } => key.index(3).dvec3(*center).dvec3(*size).dvec3(*rotate),
-            Self::Triangle { a, b, c } => key.index(4).dvec3(*a).dvec3(*b).dvec3(*c),
-            Self::Disk { center, normal, radius } => key.index(5).dvec3(*center).dvec3(*normal).f64(*radius),
+            Self::Sphere { center, radius } => key.add_index(0).add_dvec3(*center).add_f64(*radius),
+            Self::Quad { corner, u, v } => key.add_index(1).add_dvec3(*corner).add_dvec3(*u).add_dvec3(*v),
+            Self::Plane { point, normal } => key.add_index(2).add_dvec3(*point).add_dvec3(*normal),
+            Self::Box { center, size, rotate } => {
+                key.add_index(3).add_dvec3(*center).add_dvec3(*size).add_dvec3(*rotate)
+            }
+            Self::Triangle { a, b, c } => key.add_index(4).add_dvec3(*a).add_dvec3(*b).add_dvec3(*c),
+            Self::Disk { center, normal, radius } => {
+                key.add_index(5).add_dvec3(*center).add_dvec3(*normal).add_f64(*radius)
+            }
             Self::Cylinder { a, b, radius, caps } => {
-                key.index(6).dvec3(*a).dvec3(*b).f64(*radius).flag(*caps)
+                key.add_index(6).add_dvec3(*a).add_dvec3(*b).add_f64(*radius).add_bool(*caps)
             }
             Self::Cone { base, tip, radius, cap } => {
-                key.index(7).dvec3(*base).dvec3(*tip).f64(*radius).flag(*cap)
+                key.add_index(7).add_dvec3(*base).add_dvec3(*tip).add_f64(*radius).add_bool(*cap)
             }
             Self::Torus { center, axis, radius, tube } => {
-                key.index(8).dvec3(*center).dvec3(*axis).f64(*radius).f64(*tube)
+                key.add_index(8).add_dvec3(*center).add_dvec3(*axis).add_f64(*radius).add_f64(*tube)
             }
-            Self::Mesh(mesh) => key.index(9).add(mesh, of),
+            Self::Mesh(mesh) => key.add_index(9).add(mesh, of),
         };
     }
 }
 
-impl Fingerprinted for Mesh {
+impl Fingerprinted for MeshReference {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
-        key.key(&of.meshes[file]).flag(smooth);
+        key.add_fingerprint(&of.meshes[file]).add_bool(smooth);
         match placed {
             MeshTransform::Steps { scale, rotate, translate } => {
-                key.index(0).dvec3(scale).dvec3(rotate).dvec3(translate);
+                key.add_index(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate);
             }
             MeshTransform::Matrix { linear: [x, y, z], translate } => {
-                key.index(1).dvec3(x).dvec3(y).dvec3(z).dvec3(translate);
+                key.add_index(1).add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(translate);
             }
         }
     }

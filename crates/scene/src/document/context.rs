@@ -16,12 +16,12 @@ pub(super) struct FileContext<'a> {
     issues: RefCell<Vec<Issue>>,
     /// Number of errors and number of warnings.
     counts: Cell<[usize; 2]>,
-    searches: Cell<SearchCounts>,
+    searches: Cell<NameSearchCounts>,
 }
 
 /// How many searches for similar names were made, and how many names were compared.
 #[derive(Clone, Copy, Default)]
-struct SearchCounts {
+struct NameSearchCounts {
     count: usize,
     comparisons: usize,
 }
@@ -67,27 +67,27 @@ impl Issue {
     }
 
     /// Sets the text next to the underline.
-    pub(super) fn label(self, label: impl Into<String>) -> Self {
+    pub(super) fn with_label(self, label: impl Into<String>) -> Self {
         Self { label: label.into(), ..self }
     }
 
     /// Sets the help text.
-    pub(super) fn help(self, help: impl Into<String>) -> Self {
+    pub(super) fn with_help(self, help: impl Into<String>) -> Self {
         Self { help: Some(help.into()), ..self }
     }
 
     /// Sets the help text, if any.
-    pub(super) fn maybe_help(self, help: Option<String>) -> Self {
+    pub(super) fn with_optional_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
     }
 
     /// Marks the issue as caused by a missing value.
-    pub(super) fn caused_by_absence(self) -> Self {
+    pub(super) fn mark_missing_value(self) -> Self {
         Self { cause: IssueCause::Absence, ..self }
     }
 
     /// Marks the issue as a syntax error.
-    pub(super) fn caused_by_syntax(self) -> Self {
+    pub(super) fn mark_syntax_error(self) -> Self {
         Self { cause: IssueCause::Syntax, ..self }
     }
 }
@@ -99,8 +99,8 @@ impl<'a> FileContext<'a> {
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_in_set_value(&self, span: &Range<usize>) -> bool {
-        self.source.is_in_set_value(span)
+    pub(super) fn is_in_set_arg(&self, span: &Range<usize>) -> bool {
+        self.source.is_in_set_arg(span)
     }
 
     /// Adds an issue to the list.
@@ -125,12 +125,12 @@ impl<'a> FileContext<'a> {
     }
 
     /// The file's text.
-    pub(super) fn file(&self) -> &str {
-        self.source.text()
+    pub(super) fn file_text(&self) -> &str {
+        self.source.file_text()
     }
 
     /// Returns the text at `span`, or an empty string if `span` is out of range.
-    pub(super) fn text(&self, span: &Range<usize>) -> &str {
+    pub(super) fn span_text(&self, span: &Range<usize>) -> &str {
         self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
@@ -142,11 +142,11 @@ impl<'a> FileContext<'a> {
         comparisons: usize,
         look: impl FnOnce() -> Option<T>,
     ) -> Option<T> {
-        let SearchCounts { count, comparisons: before } = self.searches.get();
+        let NameSearchCounts { count, comparisons: before } = self.searches.get();
         if count >= MAX_SEARCHES || before >= MAX_COMPARISONS {
             return None;
         }
-        self.searches.set(SearchCounts { count: count + 1, comparisons: before + comparisons });
+        self.searches.set(NameSearchCounts { count: count + 1, comparisons: before + comparisons });
         look()
     }
 
@@ -157,28 +157,28 @@ impl<'a> FileContext<'a> {
     }
 
     /// The 1-based line number of a byte offset.
-    pub(super) fn line(&self, offset: usize) -> usize {
-        self.lines().line(offset)
+    pub(super) fn line_number(&self, offset: usize) -> usize {
+        self.line_index().line_number(offset)
     }
 
     /// The text of a line, given its 1-based number.
     pub(super) fn line_text(&self, line: usize) -> Option<&str> {
         let text = self.source.full_text();
-        text.get(self.lines().span(line.checked_sub(1)?, text)?)
+        text.get(self.line_index().line_span(line.checked_sub(1)?, text)?)
     }
 
-    fn lines(&self) -> &LineIndex {
+    fn line_index(&self) -> &LineIndex {
         self.lines.get_or_init(|| LineIndex::new(self.source.full_text()))
     }
 
     /// Resolves a path relative to the scene's folder.
-    pub(super) fn resolve(&self, file: &str) -> PathBuf {
+    pub(super) fn resolve_path(&self, file: &str) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
     /// Returns all issues in file order. If there are syntax errors, omits issues that they may have caused:
     /// issues in `broken_lines` and missing values.
-    pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
+    pub(super) fn into_diagnostics(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
             issues.retain(|issue| match issue.cause {
@@ -187,7 +187,7 @@ impl<'a> FileContext<'a> {
                 // Placeholders for values with syntax errors have no span.
                 IssueCause::Value if issue.span == (0..0) => false,
                 IssueCause::Value => {
-                    let line = self.line(issue.span.start);
+                    let line = self.line_number(issue.span.start);
                     let before = broken_lines.partition_point(|lines| lines.start <= line);
                     !before.checked_sub(1).is_some_and(|last| broken_lines[last].contains(&line))
                 }
@@ -205,7 +205,7 @@ impl<'a> FileContext<'a> {
         issues.sort_by_key(place);
         if unshown > 0 {
             let message = format!("and {unshown} {MORE_LIKE_THESE}");
-            let end = self.source.text().len();
+            let end = self.source.file_text().len();
             let make = if unshown_errors > 0 { Issue::error } else { Issue::warning };
             issues.push(make(end..end, message));
         }

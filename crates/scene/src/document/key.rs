@@ -13,9 +13,9 @@ use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::{TableReader, TableTitle};
-use super::value::{TomlValue, Value, describe_found, number_within, parse_integer, report_wrong_type};
+use super::value::{TomlValue, Value, describe_value, number_within, parse_integer, report_wrong_type};
 use crate::choice::Choice;
-use crate::math::limits::{SHORTEST, is_too_short, length};
+use crate::math::limits::{SHORTEST, is_too_short, robust_length};
 use crate::math::{DVec3, Vec2};
 
 /// A table's key, which may be absent.
@@ -57,14 +57,14 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads a number in single precision.
-    pub(super) fn number32(&self, limits: Limits) -> Option<f32> {
+    pub(super) fn number_f32(&self, limits: Limits) -> Option<f32> {
         self.number(limits).map(|number| number as f32)
     }
 
     /// Reads an integer. `N` must be able to represent all of `range`.
     pub(super) fn integer<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
-        let TomlValue::Integer { digits, radix } = value.item() else {
+        let TomlValue::Integer { digits, radix } = value.decode() else {
             report_wrong_type(self.context, self.name, value, "a whole number");
             return None;
         };
@@ -72,8 +72,8 @@ impl<'a> TableKey<'a> {
         if number.is_none() {
             let (name, low, high) = (self.name, range.start(), range.end());
             let message = format!("`{name}` must be a whole number between {low} and {high}");
-            let label = format!("found {}", describe_found(self.context, value));
-            self.context.report(Issue::error(value.span(), message).label(label));
+            let label = format!("found {}", describe_value(self.context, value));
+            self.context.report(Issue::error(value.span(), message).with_label(label));
         }
         number.and_then(|number| number.try_into().ok())
     }
@@ -81,7 +81,7 @@ impl<'a> TableKey<'a> {
     /// Reads `true` or `false`.
     pub(super) fn boolean(&self) -> Option<bool> {
         let value = self.value?;
-        if let TomlValue::Boolean(flag) = value.item() {
+        if let TomlValue::Boolean(flag) = value.decode() {
             return Some(flag);
         }
         report_wrong_type(self.context, self.name, value, "true or false");
@@ -89,14 +89,14 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads a string. `expected` describes the string in error messages.
-    pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
-        self.text_described_by(|| expected.to_owned())
+    pub(super) fn string(&self, expected: &str) -> Option<&'a str> {
+        self.string_described_by(|| expected.to_owned())
     }
 
     /// Reads a string. `expected` returns its description for errors.
-    fn text_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
+    fn string_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
-        if let TomlValue::String(text) = value.item() {
+        if let TomlValue::String(text) = value.decode() {
             return Some(text);
         }
         report_wrong_type(self.context, self.name, value, &expected());
@@ -108,19 +108,20 @@ impl<'a> TableKey<'a> {
         if !self.is_present() {
             return Some(None);
         }
-        let text = self.text("the name of this shape")?;
+        let text = self.string("the name of this shape")?;
         if text.bytes().any(|byte| !byte.is_ascii_digit()) {
             return Some(Some(text.into()));
         }
         let issue = Issue::error(self.span()?, format!("`{}` must not be a number", self.name));
-        self.context
-            .report(issue.help("use a name with a letter, because shapes can also be referenced by number"));
+        self.context.report(
+            issue.with_help("use a name with a letter, because shapes can also be referenced by number"),
+        );
         None
     }
 
     /// Whether the value is a table.
     pub(super) fn is_table(&self) -> bool {
-        self.value.is_some_and(|value| matches!(value.item(), TomlValue::Table(_)))
+        self.value.is_some_and(|value| matches!(value.decode(), TomlValue::Table(_)))
     }
 
     /// Reads a choice by its name.
@@ -129,7 +130,7 @@ impl<'a> TableKey<'a> {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
             if C::ALL.len() == 1 { list } else { format!("one of {list}") }
         };
-        let text = self.text_described_by(list)?;
+        let text = self.string_described_by(list)?;
         if let Some(meant) = C::named(text) {
             return Some(meant);
         }
@@ -138,11 +139,12 @@ impl<'a> TableKey<'a> {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
         } else {
-            Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
+            Issue::error(span, format!("`{name}` cannot be \"{shown}\""))
+                .with_help(format!("expected {list}"))
         };
         let names: Vec<&str> = C::ALL.iter().map(|one| one.name()).collect();
         if let Some(near) = translate_foreign_name(text, &names) {
-            issue = issue.label(format!("did you mean \"{near}\"?"));
+            issue = issue.with_label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);
         None
@@ -161,22 +163,22 @@ impl<'a> TableKey<'a> {
     /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
     /// length 0, the caller reports a more specific error.
     pub(super) fn check_vector_length(&self, vector: DVec3) -> bool {
-        let length = length(vector);
+        let length = robust_length(vector);
         let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
         let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
-        self.context.report(issue.label(format!("its length is {length:e}")));
+        self.context.report(issue.with_label(format!("its length is {length:e}")));
         false
     }
 
     /// Checks that the points at the keys `self` and `other` are far enough apart to compute with, and
     /// reports an error if not. For equal points, the caller reports a more specific error.
     pub(super) fn check_distance(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
-        let distance = length(to - from);
+        let distance = robust_length(to - from);
         let span = other.span().or(self.span());
         let Some(span) = span.filter(|_| is_too_short(distance)) else { return true };
         let (first, second) = (self.name, other.name);
         let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
-        self.context.report(Issue::error(span, message).label(format!("they are {distance:e} apart")));
+        self.context.report(Issue::error(span, message).with_label(format!("they are {distance:e} apart")));
         false
     }
 
@@ -201,8 +203,8 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads scale factors: one number for all three axes, or three numbers.
-    pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
-        if matches!(self.value?.item(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
+    pub(super) fn scale_factors(&self, limits: Limits) -> Option<DVec3> {
+        if matches!(self.value?.decode(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
             return self.number(limits).map(DVec3::splat);
         }
         self.numbers(limits, "a number, or three numbers [x, y, z]").map(DVec3::from_array)
@@ -210,15 +212,15 @@ impl<'a> TableKey<'a> {
 
     /// Reads a name and returns the name's index in `names`.
     pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
-        self.find(names, self.text_described_by(|| format!("the name of a {}", names.kind))?)
+        self.find_defined_name(names, self.string_described_by(|| format!("the name of a {}", names.kind))?)
     }
 
     /// Looks up `text`, the name that is the key's value.
-    fn find(&self, names: &DefinedNames, text: &str) -> Option<usize> {
+    fn find_defined_name(&self, names: &DefinedNames, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
-            let issue = Issue::error(self.span()?, message).caused_by_absence();
+            let issue = Issue::error(self.span()?, message).mark_missing_value();
             self.context.report(names.suggest_names(self.context, issue, text));
         }
         index

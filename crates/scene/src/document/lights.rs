@@ -27,39 +27,39 @@ pub(super) fn read_lights(root: &TableReader<'_>) -> Option<Vec<Light>> {
 }
 
 fn read_light(table: &TableReader<'_>) -> Option<Light> {
-    let key = table.optional("type");
+    let key = table.optional_key("type");
     // Without a valid type, keys cannot be checked.
     let kind = if key.is_present() { key.choice()? } else { LightKind::Point };
     let light = match kind {
-        LightKind::Point => read_point(table).map(Light::Point),
-        LightKind::Spot => read_spot(table).map(Light::Spot),
-        LightKind::Directional => read_directional(table).map(Light::Directional),
+        LightKind::Point => read_point_light(table).map(Light::Point),
+        LightKind::Spot => read_spot_light(table).map(Light::Spot),
+        LightKind::Directional => read_directional_light(table).map(Light::Directional),
     };
-    table.finish();
+    table.report_invalid_keys();
     light
 }
 
-fn read_point(table: &TableReader<'_>) -> Option<PointLight> {
-    let position = table.optional("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
-    let intensity = table.optional("intensity").color().unwrap_or(Vec3::splat(10.0));
-    let falloff = table.optional("falloff").choice().unwrap_or(Falloff::Square);
+fn read_point_light(table: &TableReader<'_>) -> Option<PointLight> {
+    let position = table.optional_key("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
+    let intensity = table.optional_key("intensity").color().unwrap_or(Vec3::splat(10.0));
+    let falloff = table.optional_key("falloff").choice().unwrap_or(Falloff::Square);
     Some(PointLight { position: position?, intensity, falloff })
 }
 
-fn read_spot(table: &TableReader<'_>) -> Option<SpotLight> {
-    let point = read_point(table);
-    let aim = table.optional("look_at");
+fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
+    let point = read_point_light(table);
+    let aim = table.optional_key("look_at");
     let look_at = aim.vector_or(Limits::Any, DVec3::ZERO);
-    let angle = table.optional("angle");
-    let angle = if angle.is_present() { angle.number(table.limits("spot.angle")) } else { Some(45.0) };
-    let blend = table.optional("blend");
-    let blend = if blend.is_present() { blend.number32(table.limits("spot.blend")) } else { Some(0.2) };
+    let angle = table.optional_key("angle");
+    let angle = if angle.is_present() { angle.number(table.key_limits("spot.angle")) } else { Some(45.0) };
+    let blend = table.optional_key("blend");
+    let blend = if blend.is_present() { blend.number_f32(table.key_limits("spot.blend")) } else { Some(0.2) };
     let (point, look_at) = (point?, look_at?);
-    let place = table.optional("position");
+    let place = table.optional_key("position");
     if point.position == look_at {
         let issue = Issue::error(aim.span().or(place.span())?, "the spotlight has no direction")
-            .label("`position` and `look_at` are the same point")
-            .help("the defaults are `position = [0, 3, 0]` and `look_at = [0, 0, 0]`");
+            .with_label("`position` and `look_at` are the same point")
+            .with_help("the defaults are `position = [0, 3, 0]` and `look_at = [0, 0, 0]`");
         table.context.report(issue);
         return None;
     }
@@ -73,15 +73,15 @@ fn read_spot(table: &TableReader<'_>) -> Option<SpotLight> {
 /// from 0.
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
-fn read_directional(table: &TableReader<'_>) -> Option<DirectionalLight> {
+fn read_directional_light(table: &TableReader<'_>) -> Option<DirectionalLight> {
     let direction = read_direction(table, "direction", "light", DVec3::NEG_Y);
-    let irradiance = table.optional("irradiance").color().unwrap_or(Vec3::ONE);
-    let key = table.optional("angle");
-    let angle = if key.is_present() { key.number(table.limits("directional.angle")) } else { Some(0.0) };
+    let irradiance = table.optional_key("irradiance").color().unwrap_or(Vec3::ONE);
+    let key = table.optional_key("angle");
+    let angle = if key.is_present() { key.number(table.key_limits("directional.angle")) } else { Some(0.0) };
     if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
         let issue =
             Issue::error(key.span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
-        table.context.report(issue.help("0 means no extent; use 0.53 for the sun"));
+        table.context.report(issue.with_help("0 means no extent; use 0.53 for the sun"));
         return None;
     }
     Some(DirectionalLight { direction: direction?, irradiance, angle: angle? })

@@ -10,7 +10,7 @@ use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::choice;
-use crate::materials::conductor::elements::Element;
+use crate::materials::conductor::elements::MetalElement;
 use crate::math::{DVec3, Vec3};
 
 /// The materials defined in a file.
@@ -60,7 +60,7 @@ choice! {
 }
 
 fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames) -> Option<Material> {
-    let key = table.optional("type");
+    let key = table.optional_key("type");
     // Without a valid type, keys cannot be checked.
     let kind = if key.is_present() { key.choice()? } else { MaterialType::Phong };
     let kind = match kind {
@@ -80,28 +80,28 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
     } else {
         common::read_opacity(table, textures)
     };
-    table.finish();
+    table.report_invalid_keys();
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
 fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
-    let ambient_key = table.optional("ambient");
-    let color = |key: &TableKey<'_>, name| key.color_or_texture(textures, table.limits(name));
+    let (diffuse_key, specular_key) = (table.optional_key("diffuse"), table.optional_key("specular"));
+    let ambient_key = table.optional_key("ambient");
+    let color = |key: &TableKey<'_>, name| key.color_or_texture(textures, table.key_limits(name));
     let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
     let is_wrong = |key: &TableKey<'_>, color: &Option<ColorSource>| key.is_present() && color.is_none();
     let is_invalid = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
     let are_bytes = [&diffuse_key, &specular_key, &ambient_key]
-        .map(|key| key.rejects_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
+        .map(|key| key.report_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
     if !is_invalid && are_bytes == [false; 3] {
         warn_about_energy_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
     MaterialKind::Phong {
         diffuse,
         specular,
-        shininess: read_or(table, "phong.shininess", 32.0, TableKey::number32),
+        shininess: read_or_default(table, "phong.shininess", 32.0, TableKey::number_f32),
         ambient: color(&ambient_key, "phong.ambient"),
     }
 }
@@ -121,8 +121,8 @@ fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &Col
     let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
     let channel = ["red", "green", "blue"][sum.max_position()];
     let issue = Issue::warning(span, ENERGY_GAIN)
-        .label(format!("diffuse + specular is {:.3} in {channel}", most))
-        .help("keep `diffuse` + `specular` at or below 1 in every channel");
+        .with_label(format!("diffuse + specular is {:.3} in {channel}", most))
+        .with_help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);
 }
 
@@ -145,7 +145,7 @@ fn read_plastic(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKin
 }
 
 fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    common::warn_without(table, "clearcoat_roughness", "clearcoat");
+    common::warn_if_ineffective(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
         |path, default| read_color(table, textures, path, default),
         |path, default| read_number(table, textures, path, default),
@@ -164,19 +164,19 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn type_key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
-    table.optional(path.split_once('.').map_or(path, |(_, name)| name))
+fn key_from_path<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+    table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
 /// Reads the key at the path `TYPE.KEY` and checks its limits. Returns `default` if the key is missing or
 /// invalid.
-fn read_or<'a, T>(
+fn read_or_default<'a, T>(
     table: &TableReader<'a>,
     path: &'static str,
     default: T,
     read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
 ) -> T {
-    read(&type_key(table, path), table.limits(path)).unwrap_or(default)
+    read(&key_from_path(table, path), table.key_limits(path)).unwrap_or(default)
 }
 
 /// Reads a color or a texture.
@@ -187,7 +187,7 @@ fn read_color(
     default: f32,
 ) -> ColorSource {
     let default = ColorSource::Constant(Vec3::splat(default));
-    read_or(table, path, default, |key, limits| key.color_or_texture(textures, limits))
+    read_or_default(table, path, default, |key, limits| key.color_or_texture(textures, limits))
 }
 
 /// Reads a number or a texture.
@@ -198,17 +198,17 @@ fn read_number(
     default: f32,
 ) -> NumberSource {
     let default = NumberSource::Constant(default);
-    read_or(table, path, default, |key, limits| key.number_or_texture(textures, limits))
+    read_or_default(table, path, default, |key, limits| key.number_or_texture(textures, limits))
 }
 
 /// Reads an index of refraction.
 fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
-    read_or(table, path, 1.5, TableKey::number32)
+    read_or_default(table, path, 1.5, TableKey::number_f32)
 }
 
 /// Reads a metal's reflectance, which exactly one of three groups of keys must specify.
 fn read_fresnel(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
-    let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
+    let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional_key(name));
     let is_index = eta.is_present() || k.is_present();
     let count =
         [color.is_present(), is_index, element.is_present()].into_iter().filter(|given| *given).count();
@@ -218,22 +218,22 @@ fn read_fresnel(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Fres
             given.and_then(TableKey::key_span)?,
             "the reflectance of this metal is specified twice",
         )
-        .help("use exactly one of `color`, `eta` with `k`, and `element`");
+        .with_help("use exactly one of `color`, `eta` with `k`, and `element`");
         table.context.report(issue);
         return None;
     }
     if element.is_present() {
-        let [eta, k] = element.choice::<Element>()?.index().map(ColorSource::Constant);
+        let [eta, k] = element.choice::<MetalElement>()?.complex_ior().map(ColorSource::Constant);
         return Some(FresnelSource::Index { eta, k });
     }
     if is_index {
         let [eta, k] = [("eta", "metal.eta"), ("k", "metal.k")].map(|(name, path)| {
-            table.required(name, "[0.2, 0.9, 1.1]").color_or_texture(textures, table.limits(path))
+            table.required_key(name, "[0.2, 0.9, 1.1]").color_or_texture(textures, table.key_limits(path))
         });
         return Some(FresnelSource::Index { eta: eta?, k: k? });
     }
-    let color = table.required("color", "[0.9, 0.8, 0.4]");
-    color.color_or_texture(textures, table.limits("metal.color")).map(FresnelSource::Schlick)
+    let color = table.required_key("color", "[0.9, 0.8, 0.4]");
+    color.color_or_texture(textures, table.key_limits("metal.color")).map(FresnelSource::Schlick)
 }
 
 fn read_mirror(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
@@ -242,22 +242,22 @@ fn read_mirror(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind
 
 fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
     let ior = read_ior(table, "glass.ior");
-    let (tint, thin) = (table.optional("tint"), table.optional("thin"));
-    let rough = table.optional("roughness");
+    let (tint, thin) = (table.optional_key("tint"), table.optional_key("thin"));
+    let rough = table.optional_key("roughness");
     let roughness = read_number(table, textures, "glass.roughness", 0.0);
     // If `thin` is present but invalid, the user probably wants a pane.
     if !thin.boolean().unwrap_or(thin.is_present()) {
-        let tint = tint.color_f64(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
+        let tint = tint.color_f64(table.key_limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {
         let issue = Issue::error(rough.span()?, "thin panes cannot be rough")
-            .help("remove `thin` and give the glass a thickness: use a box instead of a quad");
+            .with_help("remove `thin` and give the glass a thickness: use a box instead of a quad");
         table.context.report(issue);
         return None;
     }
     let tint = tint
-        .color_or_texture(textures, table.limits("glass.tint"))
+        .color_or_texture(textures, table.key_limits("glass.tint"))
         .unwrap_or(ColorSource::Constant(Vec3::ONE));
     Some(MaterialKind::Pane { ior, tint })
 }

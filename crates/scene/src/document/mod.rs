@@ -24,7 +24,7 @@ use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
 use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
-use super::{MAX_FILE_BYTES, Outcome, SettingSpan, facing, toml};
+use super::{MAX_FILE_BYTES, ParseOutcome, SettingSpan, facing, toml};
 use crate::math::Vec3;
 use context::{FileContext, Issue};
 use table::TableReader;
@@ -39,32 +39,44 @@ pub(super) use shapes::has_mesh_extension;
 pub(super) use syntax::MISSING_VALUE;
 
 /// Reads and validates a scene. Relative paths are resolved against the folder of `path`.
-pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
+pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
     let context = FileContext::new(source.clone(), path);
-    let text = source.text();
+    let text = source.file_text();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         let help = NEW_SCENE_HELP;
-        context.report(Issue::error(0..0, "the scene file is empty").help(help));
-        return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
+        context.report(Issue::error(0..0, "the scene file is empty").with_help(help));
+        return ParseOutcome {
+            scene: None,
+            diagnostics: context.into_diagnostics(&[]),
+            settings: Vec::new(),
+        };
     }
     if text.len() as u64 > MAX_FILE_BYTES {
         let message = format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20);
         context.report(Issue::error(0..0, message));
-        return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
+        return ParseOutcome {
+            scene: None,
+            diagnostics: context.into_diagnostics(&[]),
+            settings: Vec::new(),
+        };
     }
     let (document, errors) = toml::parse(text);
     let broken_lines = syntax::report_syntax_errors(&context, errors);
-    let document = sets::apply_sets(&context, source, document);
-    let scene = scene(&TableReader::root(&context, document.root()));
+    let document = sets::apply_set_args(&context, source, document);
+    let scene = read_scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
-    let settings = settings(&document);
-    Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines), settings }
+    let settings = setting_spans(&document);
+    ParseOutcome {
+        scene: scene.filter(|_| !has_errors),
+        diagnostics: context.into_diagnostics(&broken_lines),
+        settings,
+    }
 }
 
 /// Returns the spans of all values in `[render]` and `[photons]`.
-fn settings(document: &toml::Document<'_>) -> Vec<SettingSpan> {
+fn setting_spans(document: &toml::Document<'_>) -> Vec<SettingSpan> {
     let values = |table: &'static str| {
-        let entries = document.root().get(table).and_then(|found| match found.value.item() {
+        let entries = document.root().get(table).and_then(|found| match found.value.decode() {
             toml::TomlValue::Table(entries) => Some(entries),
             toml::TomlValue::String(_)
             | toml::TomlValue::Integer { .. }
@@ -84,27 +96,27 @@ fn settings(document: &toml::Document<'_>) -> Vec<SettingSpan> {
 }
 
 /// Reads only a scene's camera. Returns `None` if there are errors.
-pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
+pub(super) fn parse_camera(source: &SceneText) -> Option<Camera> {
     let context = FileContext::new(source.clone(), Path::new(""));
-    let (document, errors) = toml::parse(source.text());
-    let document = sets::apply_sets(&context, source, document);
+    let (document, errors) = toml::parse(source.file_text());
+    let document = sets::apply_set_args(&context, source, document);
     let camera = camera::read_camera(&TableReader::root(&context, document.root()));
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
 /// Returns the files that a scene references, even if the scene has errors.
-pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
-    fn gather(table: toml::Entries<'_>, names: &mut Vec<String>) {
+pub(super) fn referenced_files(text: &str, path: &Path) -> Vec<PathBuf> {
+    fn collect_file_names(table: toml::Entries<'_>, names: &mut Vec<String>) {
         for toml::KeyValue { key, value, .. } in table.iter() {
-            match value.item() {
+            match value.decode() {
                 toml::TomlValue::String(name) if matches!(key, "file" | "orbiter") => {
                     names.push(name.to_owned());
                 }
-                toml::TomlValue::Table(inner) => gather(inner, names),
+                toml::TomlValue::Table(inner) => collect_file_names(inner, names),
                 toml::TomlValue::Array(array) => {
                     for element in array.iter() {
-                        if let toml::TomlValue::Table(inner) = element.item() {
-                            gather(inner, names);
+                        if let toml::TomlValue::Table(inner) = element.decode() {
+                            collect_file_names(inner, names);
                         }
                     }
                 }
@@ -117,13 +129,13 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
         }
     }
     let mut names = Vec::new();
-    gather(toml::parse(text).0.root(), &mut names);
+    collect_file_names(toml::parse(text).0.root(), &mut names);
     let folder = path.parent().unwrap_or(Path::new(""));
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
 /// Reads the whole scene. Textures and materials are read before the tables that refer to them by name.
-fn scene(root: &TableReader<'_>) -> Option<Scene> {
+fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read(root);
     let camera = camera::read_camera(root);
     let photons = photons::read_photons(root);
@@ -135,7 +147,7 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read_lights(root);
     let environment = environment::read_environment(root);
-    root.finish();
+    root.report_invalid_keys();
 
     let scene = Scene {
         render: render?,
@@ -152,15 +164,16 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
     if !root.context.has_errors() {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
-        warn_about_darkness(root.context, &scene);
+        warn_if_empty_or_unlit(root.context, &scene);
         // If there are meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {
             for span in facing::lights_facing_away(&scene, Vec::new) {
-                root.context
-                    .report(Issue::warning(span, facing::MESSAGE).label(facing::LABEL).help(facing::HELP));
+                root.context.report(
+                    Issue::warning(span, facing::MESSAGE).with_label(facing::LABEL).with_help(facing::HELP),
+                );
             }
         }
-        environment::warn_about_background(root, &scene);
+        environment::warn_if_background_hidden(root, &scene);
     }
     Some(scene)
 }
@@ -171,10 +184,10 @@ pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
 pub(super) const NO_AREA: &str = "has no area";
 
 /// Warns if a scene has no shapes or no light.
-fn warn_about_darkness(context: &FileContext<'_>, scene: &Scene) {
+fn warn_if_empty_or_unlit(context: &FileContext<'_>, scene: &Scene) {
     if scene.objects.is_empty() {
         let help = "add one, such as a [[sphere]]; until then the image shows the background";
-        context.report(Issue::warning(0..0, "the scene has no shapes").help(help));
+        context.report(Issue::warning(0..0, "the scene has no shapes").with_help(help));
         return;
     }
     let has_file_materials = scene.objects.iter().any(|object| object.material.is_none());
@@ -183,12 +196,12 @@ fn warn_about_darkness(context: &FileContext<'_>, scene: &Scene) {
     let has_lights = scene.lights.iter().any(Light::has_emission)
         || scene.environment.iter().any(Environment::has_emission);
     // `path` and photons compute indirect light instead of using `ambient`.
-    let method = scene.render.integrator.method();
+    let method = scene.render.integrator.properties();
     let has_ambient = method.honors_ambient
         && scene.render.ambient != Vec3::ZERO
         && !(method.gathers && scene.photons.enabled);
     if !has_lights && !has_file_materials && !has_emitters && !has_ambient {
         let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
-        context.report(Issue::warning(0..0, UNLIT_SCENE).help(help));
+        context.report(Issue::warning(0..0, UNLIT_SCENE).with_help(help));
     }
 }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::super::nearest::nearest;
+use super::super::nearest::nearest_name;
 use super::super::sanitize::shortened;
 use super::context::{FileContext, Issue};
 
@@ -56,9 +56,9 @@ impl DefinedNames {
             1 => format!("there is {list}"),
             _ => format!("there are {list}"),
         };
-        let issue = issue.help(help);
-        match context.search_similar_name(self.entries.len(), || nearest(name, known())) {
-            Some(near) => issue.label(format!("did you mean {}?", quoted(near))),
+        let issue = issue.with_help(help);
+        match context.search_similar_name(self.entries.len(), || nearest_name(name, known())) {
+            Some(near) => issue.with_label(format!("did you mean {}?", quoted(near))),
             None => issue,
         }
     }
@@ -82,7 +82,7 @@ mod tests {
     /// Returns the number of comparisons when `count` unknown names are looked up among `count` defined
     /// names.
     fn comparisons(count: usize) -> usize {
-        let context = FileContext::new(SceneText::file("".into()), Path::new("scene.toml"));
+        let context = FileContext::new(SceneText::from_file_text("".into()), Path::new("scene.toml"));
         let names = DefinedNames::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
         for number in 0..count {
             names.suggest_names(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));

@@ -1,17 +1,20 @@
 //! Reads the `[photons]` table.
 
-use super::super::description::Photons;
+use super::super::description::PhotonOptions;
 use super::table::TableReader;
 
-pub(super) fn read_photons(root: &TableReader<'_>) -> Option<Photons> {
-    let default = Photons { enabled: false, count: 0, radius: 0.0, bounces: 16 };
+pub(super) fn read_photons(root: &TableReader<'_>) -> Option<PhotonOptions> {
+    let default = PhotonOptions { enabled: false, count: 0, radius: 0.0, bounces: 16 };
     let Some(table) = root.table("photons") else { return Some(default) };
-    let photons = Photons {
-        enabled: table.optional("enabled").boolean().unwrap_or(default.enabled),
-        count: table.optional("count").integer(table.range("count")).unwrap_or(default.count),
-        radius: table.optional("radius").number(table.limits("radius")).unwrap_or(default.radius),
-        bounces: table.optional("bounces").integer(table.range("bounces")).unwrap_or(default.bounces),
+    let photons = PhotonOptions {
+        enabled: table.optional_key("enabled").boolean().unwrap_or(default.enabled),
+        count: table.optional_key("count").integer(table.integer_range("count")).unwrap_or(default.count),
+        radius: table.optional_key("radius").number(table.key_limits("radius")).unwrap_or(default.radius),
+        bounces: table
+            .optional_key("bounces")
+            .integer(table.integer_range("bounces"))
+            .unwrap_or(default.bounces),
     };
-    table.finish();
+    table.report_invalid_keys();
     Some(photons)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::description::{MAX_BOUNCES, Render, render_keys};
+use super::super::description::{MAX_BOUNCES, RenderOptions, render_keys};
 use super::super::keys::endings::IMAGES;
 use super::context::Issue;
 use super::limits::Limits;
@@ -15,10 +15,10 @@ macro_rules! read {
         $key.integer(i128::from($least)..=i128::from($most))
     };
     ($key:expr, at_least($least:expr)) => {
-        $key.number32(Limits::AtLeast($least))
+        $key.number_f32(Limits::AtLeast($least))
     };
     ($key:expr, between($least:expr, $most:expr)) => {
-        $key.number32(Limits::Between($least, $most))
+        $key.number_f32(Limits::Between($least, $most))
     };
     ($key:expr, choice) => {
         $key.choice()
@@ -33,10 +33,10 @@ macro_rules! reader {
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Reads all keys. Uses the default values of absent or invalid keys.
-        fn read_settings(table: &TableReader<'_>) -> Render {
-            let key = |name| table.optional(name);
-            Render {
-                $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(Render::DEFAULT.$name),)*
+        fn read_settings(table: &TableReader<'_>) -> RenderOptions {
+            let key = |name| table.optional_key(name);
+            RenderOptions {
+                $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(RenderOptions::DEFAULT.$name),)*
             }
         }
     };
@@ -45,28 +45,28 @@ macro_rules! reader {
 render_keys!(reader);
 
 /// Reads the settings and the optional output path.
-pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) {
-    let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
+pub(super) fn read(root: &TableReader<'_>) -> (Option<RenderOptions>, Option<PathBuf>) {
+    let Some(table) = root.table("render") else { return (Some(RenderOptions::DEFAULT), None) };
     let render = read_settings(&table);
     let output = read_output_path(&table);
-    check_size(&table, &render);
-    table.finish();
+    check_image_size(&table, &render);
+    table.report_invalid_keys();
     (Some(render), output)
 }
 
 fn read_output_path(table: &TableReader<'_>) -> Option<PathBuf> {
-    let key = table.optional("output");
-    let text = key.text("an image path, such as \"image.png\"")?;
-    key.check_extension(text, IMAGES).then(|| table.context.resolve(text))
+    let key = table.optional_key("output");
+    let text = key.string("an image path, such as \"image.png\"")?;
+    key.check_extension(text, IMAGES).then(|| table.context.resolve_path(text))
 }
 
-fn check_size(table: &TableReader<'_>, render: &Render) {
-    let Render { width, height, .. } = *render;
-    let spans = || table.optional("width").span().or(table.optional("height").span());
+fn check_image_size(table: &TableReader<'_>, render: &RenderOptions) {
+    let RenderOptions { width, height, .. } = *render;
+    let spans = || table.optional_key("width").span().or(table.optional_key("height").span());
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         let issue =
             Issue::error(spans().unwrap_or_default(), format!("{width} × {height} pixels are too many"))
-                .help(format!("the limit is {MAX_PIXELS} pixels"));
+                .with_help(format!("the limit is {MAX_PIXELS} pixels"));
         table.context.report(issue);
     }
 }
@@ -75,29 +75,29 @@ fn check_size(table: &TableReader<'_>, render: &Render) {
 mod tests {
     use std::path::Path;
 
-    use super::super::super::description::{KeyRange, Render};
-    use super::super::super::{Outcome, parse, starter};
+    use super::super::super::description::{KeyRange, RenderOptions};
+    use super::super::super::{ParseOutcome, parse, starter_scene};
 
     /// Parses a scene with `line` in `[render]`. Returns the settings or the error messages.
-    fn read(line: &str) -> Result<Render, Vec<String>> {
+    fn read(line: &str) -> Result<RenderOptions, Vec<String>> {
         let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
-        let Outcome { scene, diagnostics, .. } =
+        let ParseOutcome { scene, diagnostics, .. } =
             parse(format!("[render]\n{line}\n{camera}").into(), Path::new("a.toml"));
         scene.map(|scene| scene.render).ok_or(diagnostics.into_iter().map(|one| one.message).collect())
     }
 
     #[test]
     fn every_key_accepts_its_default() {
-        assert_eq!(read(""), Ok(Render::DEFAULT));
-        for key in Render::keys() {
+        assert_eq!(read(""), Ok(RenderOptions::DEFAULT));
+        for key in RenderOptions::key_specs() {
             let line = format!("{} = {}", key.name, key.default);
-            assert_eq!(read(&line), Ok(Render::DEFAULT), "{line}");
+            assert_eq!(read(&line), Ok(RenderOptions::DEFAULT), "{line}");
         }
     }
 
     #[test]
     fn every_key_accepts_exactly_its_range() {
-        for key in Render::keys() {
+        for key in RenderOptions::key_specs() {
             let (name, mut accepted, mut refused) = (key.name, Vec::new(), Vec::new());
             match key.range {
                 KeyRange::Whole(range) => {
@@ -136,8 +136,8 @@ mod tests {
 
     #[test]
     fn starter_scene_shows_every_key_and_choice() {
-        let table = starter().split("[camera]").next().unwrap_or_default();
-        for key in Render::keys() {
+        let table = starter_scene().split("[camera]").next().unwrap_or_default();
+        for key in RenderOptions::key_specs() {
             let shown = |line: &&str| line.trim_start_matches("# ").starts_with(&format!("{} = ", key.name));
             let line = table.lines().find(shown).unwrap_or_else(|| panic!("no line for `{}`", key.name));
             if let KeyRange::Names(names) = key.range {

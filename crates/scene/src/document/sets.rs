@@ -1,9 +1,9 @@
 //! Applies `--set` values to a document.
 
-use super::super::nearest::nearest;
+use super::super::nearest::nearest_name;
 use super::super::sanitize::shortened;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, set};
+use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, apply_assignment};
 use super::context::{FileContext, Issue};
 use super::shapes;
 
@@ -14,14 +14,14 @@ const LAYOUT: TopLevelLayout = TopLevelLayout {
 };
 
 /// Applies all `--set` values and reports keys that cannot be set.
-pub(super) fn apply_sets<'s>(
+pub(super) fn apply_set_args<'s>(
     context: &FileContext<'_>,
     source: &'s SceneText,
     mut document: Document<'s>,
 ) -> Document<'s> {
-    for at in source.set_offsets() {
+    for at in source.set_arg_offsets() {
         let placed;
-        (document, placed) = set(document, source.full_text(), at, LAYOUT);
+        (document, placed) = apply_assignment(document, source.full_text(), at, LAYOUT);
         if let Err(key_error) = placed {
             context.report(key_error_issue(key_error));
         }
@@ -37,8 +37,8 @@ fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
         let names = names.iter().take(MAX_LISTED).map(|name| format!("`{}`", shortened(name, 40)));
         names.collect::<Vec<_>>().join(", ")
     };
-    let near = |issue: Issue, names: &[String]| match nearest(&part, names.iter().map(String::as_str)) {
-        Some(near) => issue.label(format!("did you mean `{}`?", shortened(near, 40))),
+    let near = |issue: Issue, names: &[String]| match nearest_name(&part, names.iter().map(String::as_str)) {
+        Some(near) => issue.with_label(format!("did you mean `{}`?", shortened(near, 40))),
         None => issue,
     };
     match why {
@@ -49,7 +49,7 @@ fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
             } else {
                 format!("there are {}", quoted(&known))
             };
-            near(issue, &known).help(help)
+            near(issue, &known).with_help(help)
         }
         KeyErrorKind::NoEntry { count: 0, .. } => Issue::error(span, format!("the scene has no [[{list}]]")),
         KeyErrorKind::NoEntry { count, names } => {
@@ -59,15 +59,15 @@ fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
             } else {
                 format!(", or the name of one: {}", quoted(&names))
             };
-            near(issue, &names).help(format!("expected a number from 1 to {count}{by_name}"))
+            near(issue, &names).with_help(format!("expected a number from 1 to {count}{by_name}"))
         }
         KeyErrorKind::Ambiguous { count } => {
             Issue::error(span, format!("{count} [[{list}]] tables are named `{part}`"))
-                .help("use a number, counting from 1")
+                .with_help("use a number, counting from 1")
         }
         KeyErrorKind::Element => {
             Issue::error(span, format!("`{list}` is an array of values and can only be set as a whole"))
-                .help(format!("for example {list}=[0, 1, 2]"))
+                .with_help(format!("for example {list}=[0, 1, 2]"))
         }
     }
 }

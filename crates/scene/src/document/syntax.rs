@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::super::sanitize::shortened;
-use super::super::toml::{Bracket, SyntaxError, brackets, last_open};
+use super::super::toml::{Bracket, SyntaxError, find_array_brackets, innermost_open_bracket};
 use super::context::{FileContext, Issue};
 
 /// Reports only the first error on each line, because it usually causes the other errors on the line. Returns
@@ -15,14 +15,14 @@ pub(super) fn report_syntax_errors(
     context: &FileContext<'_>,
     mut errors: Vec<SyntaxError>,
 ) -> Vec<Range<usize>> {
-    let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
+    let lists = ArrayBrackets { text: context.file_text(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
     // The opening brackets of unclosed lists, indexed by line.
     let (mut in_open_array, mut opened) = (false, BTreeMap::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
-        let is_new = lines.insert(context.line(error.span.start)) && !(lacks_comma && in_open_array);
+        let is_new = lines.insert(context.line_number(error.span.start)) && !(lacks_comma && in_open_array);
         in_open_array = lacks_comma;
         if !is_new {
             continue;
@@ -30,28 +30,30 @@ pub(super) fn report_syntax_errors(
         match find_unclosed_bracket(context, &lists, &error) {
             // The parser treated all lines from the bracket to the error as part of the list.
             Some(open) => {
-                lines.extend(context.line(open)..context.line(error.span.start));
-                opened.insert(context.line(open), open);
+                lines.extend(context.line_number(open)..context.line_number(error.span.start));
+                opened.insert(context.line_number(open), open);
             }
             None => firsts.push(error),
         }
     }
     // The parser does not report an unclosed list at the end of the file. Skip this check if lists are nested
     // too deeply, because the list may be closed after all.
-    if let Some(open) = open_at_end(context.file()).filter(|_| !firsts.iter().any(is_too_deep)) {
-        lines.insert(context.line(open));
-        opened.insert(context.line(open), open);
+    if let Some(open) =
+        last_unclosed_bracket(context.file_text()).filter(|_| !firsts.iter().any(is_nesting_limit_error))
+    {
+        lines.insert(context.line_number(open));
+        opened.insert(context.line_number(open), open);
     }
     for error in firsts {
         // Ignore errors after an unclosed bracket on the same line.
-        let open = opened.get(&context.line(error.span.start));
+        let open = opened.get(&context.line_number(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
-            context.report(syntax_issue(context, &lists, error).caused_by_syntax());
+            context.report(syntax_issue(context, &lists, error).mark_syntax_error());
         }
     }
     for open in opened.into_values() {
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
-        context.report(issue.help(unclosed_list_help(context, open)).caused_by_syntax());
+        context.report(issue.with_help(unclosed_list_help(context, open)).mark_syntax_error());
     }
     lines.into_iter().map(|line| line..end_of_broken_lines(context, line)).collect()
 }
@@ -64,9 +66,9 @@ struct ArrayBrackets<'a> {
 
 impl ArrayBrackets<'_> {
     /// Returns the opening bracket of the innermost list that is open at byte `end`.
-    fn open_at(&self, end: usize) -> Option<usize> {
-        let all = self.brackets.get_or_init(|| brackets(self.text));
-        last_open(&all[..all.partition_point(|bracket| bracket.at < end)])
+    fn enclosing_open_bracket(&self, end: usize) -> Option<usize> {
+        let all = self.brackets.get_or_init(|| find_array_brackets(self.text));
+        innermost_open_bracket(&all[..all.partition_point(|bracket| bracket.at < end)])
     }
 }
 
@@ -80,33 +82,33 @@ fn find_unclosed_bracket(
     SyntaxError { span, what, .. }: &SyntaxError,
 ) -> Option<usize> {
     if what == "unclosed array" {
-        let is_bracket = context.text(&(span.start..span.end)).starts_with('[');
-        return if is_bracket { Some(span.start) } else { lists.open_at(span.end) };
+        let is_bracket = context.span_text(&(span.start..span.end)).starts_with('[');
+        return if is_bracket { Some(span.start) } else { lists.enclosing_open_bracket(span.end) };
     }
-    let open = lists.open_at(span.start)?;
-    let line = context.line_text(context.line(span.start))?.trim();
+    let open = lists.enclosing_open_bracket(span.start)?;
+    let line = context.line_text(context.line_number(span.start))?.trim();
     let is_header = line.starts_with('[') && line.ends_with(']') && !line.contains([',', ' ']);
-    let is_later = context.line(open) < context.line(span.start);
-    (what == MISSING_COMMA && is_later && (is_key(line) || is_header)).then_some(open)
+    let is_later = context.line_number(open) < context.line_number(span.start);
+    (what == MISSING_COMMA && is_later && (starts_with_key(line) || is_header)).then_some(open)
 }
 
-fn is_too_deep(error: &SyntaxError) -> bool {
+fn is_nesting_limit_error(error: &SyntaxError) -> bool {
     error.what.contains("recurs")
 }
 
 /// Whether a line starts with a key and `=`.
-fn is_key(line: &str) -> bool {
+fn starts_with_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
 /// Returns the opening bracket of a list that is still open at the end of the file. Starts at the last key,
 /// because files may be long.
-fn open_at_end(text: &str) -> Option<usize> {
+fn last_unclosed_bracket(text: &str) -> Option<usize> {
     let mut start = text.len();
     loop {
         let line = text[..start].rfind('\n').map_or(0, |end| end + 1);
-        if is_key(&text[line..start]) {
-            return last_open(&brackets(&text[line..])).map(|open| line + open);
+        if starts_with_key(&text[line..start]) {
+            return innermost_open_bracket(&find_array_brackets(&text[line..])).map(|open| line + open);
         }
         start = line.checked_sub(1)?;
     }
@@ -114,9 +116,11 @@ fn open_at_end(text: &str) -> Option<usize> {
 
 /// Returns the help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
 fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
-    let end =
-        context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
-    match format_number_list(context.text(&(open + 1..end))) {
+    let end = context
+        .span_text(&(open..context.file_text().len()))
+        .find('\n')
+        .map_or(context.file_text().len(), |at| open + at);
+    match format_number_list(context.span_text(&(open + 1..end))) {
         Some(list) => format!("write {list}"),
         None => "expected `]`".to_owned(),
     }
@@ -125,9 +129,9 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
 /// Returns the message about missing commas in a single-line list. `at` is the position of the first missing
 /// comma.
 fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
-    let open = lists.open_at(at)?;
-    let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
-    let line = context.line_text(context.line(at))?;
+    let open = lists.enclosing_open_bracket(at)?;
+    let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
+    let line = context.line_text(context.line_number(at))?;
     let inner = line.get(open.checked_sub(line_start)? + 1..)?;
     let inner = &inner[..inner.find(']')?];
     let values = split_values(inner);
@@ -141,9 +145,9 @@ fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, 
 /// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0,
 /// 1, 0)`.
 fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
-    let line = context.line_text(context.line(at))?;
-    let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
-    let (key, after) = line.split_once('=').filter(|_| is_key(line))?;
+    let line = context.line_text(context.line_number(at))?;
+    let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
+    let (key, after) = line.split_once('=').filter(|_| starts_with_key(line))?;
     let value = after.split('#').next()?.trim();
     let name = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let inner = value.trim_start_matches(name).strip_prefix(['(', '{', '<'])?;
@@ -193,13 +197,13 @@ fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
 fn number_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);
-    while start > 0 && is_of_number(context.text(&(start - 1..start))) {
+    while start > 0 && is_of_number(context.span_text(&(start - 1..start))) {
         start -= 1;
     }
-    while is_of_number(context.text(&(end..end + 1))) {
+    while is_of_number(context.span_text(&(end..end + 1))) {
         end += 1;
     }
-    context.text(&(start..end))
+    context.span_text(&(start..end))
 }
 
 /// Adds missing digits before or after the decimal point. `None` if the result is not a number.
@@ -216,44 +220,44 @@ fn add_missing_digits(number: &str) -> Option<String> {
 }
 
 fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -> Issue {
-    let is_deep = is_too_deep(&error);
+    let is_deep = is_nesting_limit_error(&error);
     let SyntaxError { span, what, expected } = error;
     if let Some(issue) = wrong_brackets_issue(context, span.start) {
         return issue;
     }
     let expected = expected.unwrap_or_default();
-    let written = shortened(context.text(&span), 40);
+    let written = shortened(context.span_text(&span), 40);
     let error = |words: &str| Issue::error(span.clone(), words);
     match what.as_str() {
         "duplicate key" => Issue::error(span, format!("`{written}` is defined twice"))
-            .label("second definition")
-            .help("remove one of them; headers of shapes have double brackets, such as [[sphere]]"),
+            .with_label("second definition")
+            .with_help("remove one of them; headers of shapes have double brackets, such as [[sphere]]"),
         MISSING_COMMA => match missing_commas_message(context, lists, span.start) {
             Some(words) => error(&words),
-            None => error("a comma is missing").help("expected `,` or the closing `]`"),
+            None => error("a comma is missing").with_help("expected `,` or the closing `]`"),
         },
-        "unclosed array" => error("this list is not closed").help("expected `]`"),
+        "unclosed array" => error("this list is not closed").with_help("expected `]`"),
         "unclosed table" | "unclosed array table" => {
-            error("this header is not closed").help(format!("expected {expected}"))
+            error("this header is not closed").with_help(format!("expected {expected}"))
         }
         "invalid mantissa" | "invalid fraction" | "invalid exponent" => {
             let help = match add_missing_digits(number_at(context, &span)) {
                 Some(number) => format!("write {number}"),
                 None => "write 0.5, 5.0 and 1e3".to_owned(),
             };
-            error("digits are missing in this number").help(help)
+            error("digits are missing in this number").with_help(help)
         }
         "unexpected key or value" => error("unexpected text after the value")
-            .help("expected the end of the line; put several numbers in brackets, such as [0, 1, 0]"),
-        "key with no value" => error("this key has no value").help("expected `=`"),
+            .with_help("expected the end of the line; put several numbers in brackets, such as [0, 1, 0]"),
+        "key with no value" => error("this key has no value").with_help("expected `=`"),
         "invalid unquoted key" if written.starts_with("//") => {
-            error("this is not a key").help("comments start with #")
+            error("this is not a key").with_help("comments start with #")
         }
         what if what.ends_with("basic string") || what.ends_with("literal string") => {
-            error("this string is not closed").help(format!("expected a closing {expected}"))
+            error("this string is not closed").with_help(format!("expected a closing {expected}"))
         }
         _ if is_deep => {
-            error("arrays or tables are nested too deeply").help("scenes need at most three levels")
+            error("arrays or tables are nested too deeply").with_help("scenes need at most three levels")
         }
         what if what.contains("must be quoted") => match missing_commas_message(context, lists, span.start) {
             Some(words) => error(&words),
@@ -263,8 +267,8 @@ fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: Syn
             let issue = Issue::error(span, format!("this is not TOML: {what}"));
             match expected.as_str() {
                 "" => issue,
-                "nothing" => issue.help("remove it"),
-                expected => issue.help(format!("expected {expected}")),
+                "nothing" => issue.with_help("remove it"),
+                expected => issue.with_help(format!("expected {expected}")),
             }
         }
     }
@@ -277,12 +281,12 @@ pub(crate) const MISSING_VALUE: &str = "a value is missing";
 fn invalid_value_issue(span: Range<usize>, written: &str) -> Issue {
     const VALUES: &str = "expected a number, true, false, a quoted string, or values in brackets";
     if written.trim().is_empty() {
-        return Issue::error(span, MISSING_VALUE).help(VALUES);
+        return Issue::error(span, MISSING_VALUE).with_help(VALUES);
     }
     if written.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
-        return Issue::error(span, format!("`{written}` is not a number")).help(VALUES);
+        return Issue::error(span, format!("`{written}` is not a number")).with_help(VALUES);
     }
-    Issue::error(span, "strings must be quoted").label(format!("write \"{written}\""))
+    Issue::error(span, "strings must be quoted").with_label(format!("write \"{written}\""))
 }
 
 #[cfg(test)]

@@ -4,15 +4,15 @@ use std::cell::RefCell;
 use std::fmt;
 use std::ops::{Range, RangeInclusive};
 
+use super::super::keys::find_table as table_info;
 use super::super::keys::key::ValueKind;
-use super::super::keys::table as table_info;
-use super::super::nearest::{nearest, translate_foreign_name};
+use super::super::nearest::{nearest_name, translate_foreign_name};
 use super::super::sanitize::shortened;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{FileContext, Issue};
 use super::key::TableKey;
 use super::limits::Limits;
-use super::value::{TomlValue, Value, describe_found};
+use super::value::{TomlValue, Value, describe_value};
 
 /// How messages refer to a table.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +41,7 @@ impl fmt::Display for TableTitle<'_> {
     }
 }
 
-/// A table in the file. Read its keys, then call [`TableReader::finish`].
+/// A table in the file. Read its keys, then call [`TableReader::report_invalid_keys`].
 pub(super) struct TableReader<'a> {
     pub(super) context: &'a FileContext<'a>,
     /// Byte range of the header or the braces.
@@ -75,14 +75,15 @@ impl<'a> TableReader<'a> {
         value: Value<'a>,
         title: TableTitle<'a>,
     ) -> Option<Self> {
-        match value.item() {
+        match value.decode() {
             TomlValue::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
             other => {
                 let mut issue = Issue::error(value.span(), format!("{title} must be a table"));
                 if is_array_of_tables(&other) {
-                    issue = issue.label("found an array of tables").help(format!("write {title} once"));
+                    issue =
+                        issue.with_label("found an array of tables").with_help(format!("write {title} once"));
                 } else {
-                    issue = issue.label(format!("found {}", describe_found(context, value)));
+                    issue = issue.with_label(format!("found {}", describe_value(context, value)));
                 }
                 context.report(issue);
                 None
@@ -91,7 +92,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reads an optional key.
-    pub(super) fn optional(&self, name: &'static str) -> TableKey<'a> {
+    pub(super) fn optional_key(&self, name: &'static str) -> TableKey<'a> {
         let mut known = self.known.borrow_mut();
         if !known.contains(&name) {
             known.push(name);
@@ -106,7 +107,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Returns the range defined for the key `name`, which has the form `KEY` or `TYPE.KEY`.
-    pub(super) fn limits(&self, name: &str) -> Limits {
+    pub(super) fn key_limits(&self, name: &str) -> Limits {
         match self.value_kind(name) {
             Some(
                 ValueKind::Number(limits)
@@ -132,7 +133,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Returns the range defined for an integer key.
-    pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
+    pub(super) fn integer_range(&self, name: &str) -> RangeInclusive<i128> {
         match self.value_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
@@ -148,15 +149,15 @@ impl<'a> TableReader<'a> {
             TableTitle::Root | TableTitle::Key(_) => return None,
         };
         let (kind, name) = match name.split_once('.') {
-            Some((kind, name)) => (info.type_of(Some(kind)), name),
+            Some((kind, name)) => (info.find_type(Some(kind)), name),
             None => (None, name),
         };
-        info.keys_of(kind).find(|key| key.name == name).map(|key| key.kind)
+        info.keys_for_type(kind).find(|key| key.name == name).map(|key| key.kind)
     }
 
     /// Reads a required key. `example` is a valid value to show in the help text.
-    pub(super) fn required(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
-        let key = self.optional(name);
+    pub(super) fn required_key(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
+        let key = self.optional_key(name);
         if !key.is_present() {
             self.missing.borrow_mut().push((name, example));
         }
@@ -165,16 +166,16 @@ impl<'a> TableReader<'a> {
 
     /// Reports an error if the key `name` is present, which is not allowed here.
     pub(super) fn reject_key(&self, name: &'static str, message: &str, help: Option<&str>) {
-        let key = self.optional(name);
+        let key = self.optional_key(name);
         self.unavailable.borrow_mut().push(name);
         if let Some(span) = key.key_span() {
-            self.context.report(Issue::error(span, message).maybe_help(help.map(str::to_owned)));
+            self.context.report(Issue::error(span, message).with_optional_help(help.map(str::to_owned)));
         }
     }
 
     /// Reads the `[name]` table, if present.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
-        let value = self.optional(name).value?;
+        let value = self.optional_key(name).value?;
         Self::from_value(self.context, value, TableTitle::Table(name))
     }
 
@@ -190,15 +191,15 @@ impl<'a> TableReader<'a> {
     /// Reads the `[[name]]` tables.
     pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
         let context = self.context;
-        let key = self.optional(name);
+        let key = self.optional_key(name);
         let list = key.value.and_then(|value| {
             if let Some(array) = value.array() {
                 return Some(array);
             }
             let span = key.key_span().unwrap_or_default();
             let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
-                .label(format!("found {}", describe_found(context, value)))
-                .help(format!("write [[{name}]] with double brackets"));
+                .with_label(format!("found {}", describe_value(context, value)))
+                .with_help(format!("write [[{name}]] with double brackets"));
             context.report(issue);
             None
         });
@@ -207,41 +208,41 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
-    pub(super) fn finish(&self) {
+    pub(super) fn report_invalid_keys(&self) {
         let known = self.known.borrow();
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
             self.context.report_with(|| {
-                let near = self.probably_meant_key(key, &known);
+                let near = self.guess_intended_key(key, &known);
                 meant.extend(near);
-                self.report_unknown_key(key, span, &value.item(), near)
+                self.unknown_key_issue(key, span, &value.decode(), near)
             });
         }
         for (name, example) in self.missing.borrow().iter().filter(|(name, _)| !meant.contains(name)) {
             let issue = Issue::error(self.span.clone(), format!("{} needs `{name}`", self.title))
-                .label(format!("`{name}` is missing"))
-                .help(format!("add a line, such as `{name} = {example}`"));
-            self.context.report(issue.caused_by_absence());
+                .with_label(format!("`{name}` is missing"))
+                .with_help(format!("add a line, such as `{name} = {example}`"));
+            self.context.report(issue.mark_missing_value());
         }
     }
 
     /// Guesses which key the user meant by an unknown key. Prefers keys that are absent from the table.
-    fn probably_meant_key(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
+    fn guess_intended_key(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();
         let is_other = |name: &&&'static str| absent(name) && !unavailable.contains(name);
         let others: Vec<&'static str> = known.iter().filter(is_other).copied().collect();
-        translate_foreign_name(key, &others).or_else(|| nearest(key, known.iter().copied()))
+        translate_foreign_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
     }
 
     /// Whether there is a table with a similar name that is probably a misspelling of `name`.
-    pub(super) fn has_misspelled(&self, name: &'static str) -> bool {
-        let is_table = |value: Value<'_>| matches!(value.item(), TomlValue::Table(_));
+    pub(super) fn has_misspelled_table(&self, name: &'static str) -> bool {
+        let is_table = |value: Value<'_>| matches!(value.decode(), TomlValue::Table(_));
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));
-        others.any(|one| nearest(one.key, [name]).is_some())
+        others.any(|one| nearest_name(one.key, [name]).is_some())
     }
 
-    fn report_unknown_key(
+    fn unknown_key_issue(
         &self,
         key: &str,
         span: Range<usize>,
@@ -263,9 +264,9 @@ impl<'a> TableReader<'a> {
         };
         let mut issue = Issue::error(span, message);
         if let Some(near) = near {
-            issue = issue.label(format!("did you mean `{near}`?"));
+            issue = issue.with_label(format!("did you mean `{near}`?"));
         }
-        issue.help(format!("expected one of {}", self.format_known_keys()))
+        issue.with_help(format!("expected one of {}", self.format_known_keys()))
     }
 
     fn format_known_keys(&self) -> String {
@@ -276,5 +277,5 @@ impl<'a> TableReader<'a> {
 }
 
 fn is_array_of_tables(value: &TomlValue<'_>) -> bool {
-    matches!(value, TomlValue::Array(array) if array.is_of_tables())
+    matches!(value, TomlValue::Array(array) if array.starts_with_table())
 }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use super::super::description::{
-    Channel, Encoding, Located, Material, PixelValue, Texture, TextureFilter, TextureUse, UvSet, Wrap,
+    Channel, ChannelSelector, Material, PixelInterpretation, Spanned, Texture, TextureEncoding,
+    TextureFilter, UvSet, Wrap,
 };
 use super::super::keys::endings::{GLTF, MAPS};
 use super::super::sanitize::shortened;
@@ -32,28 +33,28 @@ pub(super) fn read_textures(root: &TableReader<'_>) -> TextureList {
 
 fn read_texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
     let (file, image) = read_image_reference(table);
-    let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
-    let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
-    let repeat = table.optional("repeat").pair(table.limits("repeat")).unwrap_or(Vec2::ONE);
-    let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
-    let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
-    let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
-    let uv = table.optional("uv").integer(table.range("uv"));
+    let filter = table.optional_key("filter").choice().unwrap_or(TextureFilter::Bilinear);
+    let wrap = table.optional_key("wrap").choice().unwrap_or(Wrap::Repeat);
+    let repeat = table.optional_key("repeat").pair(table.key_limits("repeat")).unwrap_or(Vec2::ONE);
+    let rotate = table.optional_key("rotate").number(Limits::Any).unwrap_or(0.0);
+    let offset = table.optional_key("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
+    let encoding = table.optional_key("encoding").choice().unwrap_or(TextureEncoding::Auto);
+    let uv = table.optional_key("uv").integer(table.integer_range("uv"));
     let uv = if uv == Some(1) { UvSet::Second } else { UvSet::First };
-    let factor = table.optional("factor");
+    let factor = table.optional_key("factor");
     let factor = if factor.is_present() { factor.color() } else { Some(Vec3::ONE) };
-    table.finish();
+    table.report_invalid_keys();
     let (file, image, factor) = (file?, image?, factor?);
     Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }
 
 /// Reads the file and, for a glTF file, the index of the image.
-fn read_image_reference(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
-    let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
+fn read_image_reference(table: &TableReader<'_>) -> (Option<Spanned<PathBuf>>, Option<Option<u32>>) {
+    let (key, number) = (table.required_key("file", "\"picture.png\""), table.optional_key("image"));
     if !number.is_present() {
-        return (key.file(MAPS), Some(None));
+        return (key.existing_file(MAPS), Some(None));
     }
-    (key.file(GLTF), number.integer(table.range("image")).map(Some))
+    (key.existing_file(GLTF), number.integer(table.integer_range("image")).map(Some))
 }
 
 /// Reports textures without `encoding` that are used for both colors and numbers. Ignores uses of the alpha
@@ -62,20 +63,22 @@ pub(super) fn check_encodings(context: &FileContext<'_>, textures: &TextureList,
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
     for (texture, role) in materials.iter().flat_map(Material::textures) {
-        match role.texture_use() {
-            TextureUse::Color | TextureUse::CutOut => colors[texture] = true,
-            TextureUse::Normal | TextureUse::Number(PixelValue::Channel(Channel::Alpha)) => {}
-            TextureUse::Number(_) => numbers[texture] = true,
+        match role.pixel_interpretation() {
+            PixelInterpretation::Color | PixelInterpretation::CutOut => colors[texture] = true,
+            PixelInterpretation::Normal
+            | PixelInterpretation::Number(ChannelSelector::Channel(Channel::Alpha)) => {}
+            PixelInterpretation::Number(_) => numbers[texture] = true,
         }
     }
     let is_unclear = |texture: &usize| colors[*texture] && numbers[*texture];
-    for texture in (0..list.len()).filter(is_unclear).filter(|&index| list[index].encoding == Encoding::Auto)
+    for texture in
+        (0..list.len()).filter(is_unclear).filter(|&index| list[index].encoding == TextureEncoding::Auto)
     {
         let name = shortened(&list[texture].name, 40);
         let message = format!("the texture \"{name}\" is used for colors and for numbers");
         let issue = Issue::error(textures.names.span(texture), message)
-            .label("it needs `encoding`")
-            .help("write `encoding = \"srgb\"` or `\"linear\"`, or take numbers from `channel = \"a\"`");
+            .with_label("it needs `encoding`")
+            .with_help("write `encoding = \"srgb\"` or `\"linear\"`, or take numbers from `channel = \"a\"`");
         context.report(issue);
     }
 }

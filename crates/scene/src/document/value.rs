@@ -6,10 +6,10 @@ use super::context::{FileContext, Issue};
 use super::limits::Limits;
 
 /// Describes a value for use in messages, as in `found the string "a"`.
-pub(super) fn describe_found(context: &FileContext<'_>, value: Value<'_>) -> String {
+pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
-    let written = || shortened(context.text(&value.span()), LONGEST);
-    match value.item() {
+    let written = || shortened(context.span_text(&value.span()), LONGEST);
+    match value.decode() {
         TomlValue::String(_) => format!("the string {}", written()),
         TomlValue::Integer { .. } | TomlValue::Float(_) | TomlValue::Boolean(_) => written(),
         TomlValue::Datetime => format!("the date {}", written()),
@@ -24,7 +24,7 @@ pub(super) fn describe_found(context: &FileContext<'_>, value: Value<'_>) -> Str
 
 /// Converts an integer or a float, clamped to the range of doubles. `None` for other values.
 pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
-    match value.item() {
+    match value.decode() {
         // Round to the nearest double, as if the number were written as a float.
         TomlValue::Integer { digits, radix } => {
             Some(parse_integer(digits, radix).map_or(f64::MAX, |number| number as f64))
@@ -61,20 +61,20 @@ pub(super) fn number_within(
     };
     let violation = limits.violation(number);
     if let Some(words) = &violation {
-        let label = format!("found {}", describe_found(context, value));
-        context.report(Issue::error(value.span(), format!("`{name}` {words}")).label(label));
+        let label = format!("found {}", describe_value(context, value));
+        context.report(Issue::error(value.span(), format!("`{name}` {words}")).with_label(label));
     }
     violation.is_none().then_some(number)
 }
 
 /// Reports a value of the wrong type.
 pub(super) fn report_wrong_type(context: &FileContext<'_>, name: &str, value: Value<'_>, expected: &str) {
-    let label = format!("found {}", describe_found(context, value));
-    let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).label(label);
+    let label = format!("found {}", describe_value(context, value));
+    let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).with_label(label);
     // Explain that textures are not allowed here. Otherwise, users would look for a typo.
-    let is_texture = matches!(value.item(), TomlValue::Table(table) if table.get("texture").is_some());
+    let is_texture = matches!(value.decode(), TomlValue::Table(table) if table.get("texture").is_some());
     context.report(match is_texture && !expected.contains("texture") {
-        true => issue.help(format!("`{name}` cannot be a texture")),
+        true => issue.with_help(format!("`{name}` cannot be a texture")),
         false => issue,
     });
 }

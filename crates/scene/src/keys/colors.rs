@@ -8,12 +8,12 @@ pub fn color_names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Parses a color string (`#rrggbb` or a case-insensitive name) into sRGB bytes.
-pub fn color_bytes(text: &str) -> Option<[u8; 3]> {
-    rgb_bytes(text).or_else(|| named_color(text))
+pub fn parse_color_bytes(text: &str) -> Option<[u8; 3]> {
+    parse_hex_color(text).or_else(|| named_color(text))
 }
 
 /// Parses `#rrggbb`.
-fn rgb_bytes(text: &str) -> Option<[u8; 3]> {
+fn parse_hex_color(text: &str) -> Option<[u8; 3]> {
     let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
     let number = u32::from_str_radix(digits, 16).ok()?;
     let [_, red, green, blue] = number.to_be_bytes();
@@ -36,20 +36,20 @@ mod tests {
 
     #[test]
     fn color_names_are_case_insensitive() {
-        assert_eq!(color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
-        assert_eq!(color_bytes("DarkSlateGrey"), color_bytes("darkslategray"));
+        assert_eq!(parse_color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
+        assert_eq!(parse_color_bytes("DarkSlateGrey"), parse_color_bytes("darkslategray"));
         assert_eq!(color_names().count(), 148);
         for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
-            assert_eq!(color_bytes(wrong), None, "{wrong}");
+            assert_eq!(parse_color_bytes(wrong), None, "{wrong}");
         }
     }
 
     #[test]
     fn hex_colors_need_six_digits() {
-        assert_eq!(color_bytes("#ff8000"), Some([255, 128, 0]));
-        assert_eq!(color_bytes("#FF80aa"), Some([255, 128, 170]));
+        assert_eq!(parse_color_bytes("#ff8000"), Some([255, 128, 0]));
+        assert_eq!(parse_color_bytes("#FF80aa"), Some([255, 128, 170]));
         for wrong in ["", "#", "ff8000", "#ff800", "#ff80000", "#gg8000", "#+f8000", "#ä1234"] {
-            assert_eq!(color_bytes(wrong), None, "{wrong}");
+            assert_eq!(parse_color_bytes(wrong), None, "{wrong}");
         }
     }
 }

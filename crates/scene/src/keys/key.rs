@@ -50,7 +50,7 @@ pub struct KeyInfo {
     /// Unit of the value, or an empty string.
     pub unit: &'static str,
     /// The value used if the key is absent.
-    pub default: Default,
+    pub default: DefaultValue,
     /// Description: one sentence without a final period.
     pub doc: &'static str,
 }
@@ -65,7 +65,7 @@ pub enum ValueKind {
     /// `true` or `false`.
     Flag,
     /// One of these words.
-    Words(ChoiceValues),
+    Words(ChoiceValuesFn),
     /// Any text.
     Text,
     /// The path of a file with one of these extensions. If the list is empty, any file is allowed.
@@ -92,7 +92,7 @@ pub enum ValueKind {
 
 impl ValueKind {
     /// Returns the table in which the name is defined. `None` if the value is not a name.
-    pub fn named_in(self) -> Option<&'static str> {
+    pub fn defining_table(self) -> Option<&'static str> {
         match self {
             Self::Material => Some("materials"),
             Self::Texture | Self::Heights => Some("textures"),
@@ -113,7 +113,7 @@ impl ValueKind {
 }
 
 /// A function that returns a choice's named values in display order.
-pub type ChoiceValues = fn() -> Vec<ChoiceValue>;
+pub type ChoiceValuesFn = fn() -> Vec<ChoiceValue>;
 
 /// A named value of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,13 +125,13 @@ pub struct ChoiceValue {
 }
 
 /// Returns a choice's named values.
-pub fn words<C: Choice>() -> Vec<ChoiceValue> {
+pub fn choice_values<C: Choice>() -> Vec<ChoiceValue> {
     C::ALL.iter().map(|one| ChoiceValue { name: one.name(), meaning: one.meaning() }).collect()
 }
 
 /// Default of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Default {
+pub enum DefaultValue {
     /// The key is required. Contains an example value.
     Required(&'static str),
     /// A constant, in scene file syntax.
@@ -146,11 +146,11 @@ pub enum Default {
 pub(super) const MOST_WHOLE: u64 = u32::MAX as u64;
 
 /// Defines a key.
-pub(super) const fn key(
+pub(super) const fn define_key(
     name: &'static str,
     kind: ValueKind,
     unit: &'static str,
-    default: Default,
+    default: DefaultValue,
     doc: &'static str,
 ) -> KeyInfo {
     KeyInfo { name, kind, unit, default, doc }
@@ -159,7 +159,7 @@ pub(super) const fn key(
 impl TableInfo {
     /// Returns the type called `name`, or the default type if `name` is `None`. `None` if the type is
     /// unknown.
-    pub fn type_of(&self, name: Option<&str>) -> Option<&'static TypeInfo> {
+    pub fn find_type(&self, name: Option<&str>) -> Option<&'static TypeInfo> {
         match name {
             Some(name) => self.types.iter().find(|one| one.name == name),
             None => self.types.first(),
@@ -167,12 +167,12 @@ impl TableInfo {
     }
 
     /// Returns all keys of a table with this type, except `type`. The type-specific keys come first.
-    pub fn keys_of(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
+    pub fn keys_for_type(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
         kind.map_or(&[] as &[KeyInfo], |kind| kind.keys).iter().chain(self.keys)
     }
 
     /// The table header, such as `[materials.NAME]`.
-    pub fn head(&self) -> String {
+    pub fn header(&self) -> String {
         match self.form {
             TableSyntax::Single => format!("[{}]", self.name),
             TableSyntax::Named => format!("[{}.NAME]", self.name),
@@ -185,28 +185,28 @@ impl KeyInfo {
     /// The default value, or an example.
     pub fn example(&self) -> String {
         match (self.default, self.kind) {
-            (Default::Required(value) | Default::Is(value), _) => value.to_owned(),
-            (Default::By(_) | Default::Absent, kind) => kind.example(),
+            (DefaultValue::Required(value) | DefaultValue::Is(value), _) => value.to_owned(),
+            (DefaultValue::By(_) | DefaultValue::Absent, kind) => kind.example(),
         }
     }
 
     /// Returns the range, such as `0 … 1`. Empty if the type implies the range.
-    pub fn range(&self) -> String {
-        self.kind.range()
+    pub fn range_text(&self) -> String {
+        self.kind.range_text()
     }
 
     /// The name of the type, such as `color or texture`.
-    pub fn kind(&self) -> String {
-        self.kind.words()
+    pub fn kind_text(&self) -> String {
+        self.kind.kind_text()
     }
 
     /// Returns the default in Markdown, as shown in the documentation.
-    pub fn default_words(&self) -> String {
+    pub fn default_text(&self) -> String {
         match self.default {
-            Default::Required(_) => "*required*".to_owned(),
-            Default::Is(value) => format!("`{value}`"),
-            Default::By(words) => words.to_owned(),
-            Default::Absent => "none".to_owned(),
+            DefaultValue::Required(_) => "*required*".to_owned(),
+            DefaultValue::Is(value) => format!("`{value}`"),
+            DefaultValue::By(words) => words.to_owned(),
+            DefaultValue::Absent => "none".to_owned(),
         }
     }
 }
@@ -232,7 +232,7 @@ impl ValueKind {
         }
     }
 
-    fn words(self) -> String {
+    fn kind_text(self) -> String {
         match self {
             Self::Whole(..) => "whole number".to_owned(),
             Self::Number(_) => "number".to_owned(),
@@ -254,7 +254,7 @@ impl ValueKind {
         }
     }
 
-    fn range(self) -> String {
+    fn range_text(self) -> String {
         match self {
             Self::Whole(least, most) if least == most => least.to_string(),
             Self::Whole(least, most) => format!("{least} … {most}"),
@@ -264,7 +264,7 @@ impl ValueKind {
             | Self::Emission(limits)
             | Self::NumberOrTexture(limits)
             | Self::Numbers(_, _, limits)
-            | Self::Scale(limits) => limits.range(),
+            | Self::Scale(limits) => limits.range_text(),
             Self::Flag
             | Self::Words(_)
             | Self::Text

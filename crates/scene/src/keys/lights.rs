@@ -1,8 +1,8 @@
 //! Definitions of the `[[light]]` keys.
 
-use super::key::Default::Is;
+use super::key::DefaultValue::Is;
 use super::key::ValueKind::{Color, Number, Numbers, Words};
-use super::key::{TableInfo, TableSyntax, TypeInfo, key, words};
+use super::key::{TableInfo, TableSyntax, TypeInfo, choice_values, define_key};
 use super::limits::Limits::{Any, AtLeast, Between, Inside};
 use crate::description::light::Falloff;
 
@@ -16,17 +16,17 @@ pub(super) const LIGHT: TableInfo = TableInfo {
             name: "point",
             doc: "A point light",
             keys: &[
-                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
-                key(
+                define_key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
+                define_key(
                     "intensity",
                     Color(AtLeast(0.0)),
                     "W/sr",
                     Is("[10, 10, 10]"),
                     "Radiant intensity, the same in all directions",
                 ),
-                key(
+                define_key(
                     "falloff",
-                    Words(words::<Falloff>),
+                    Words(choice_values::<Falloff>),
                     "",
                     Is("\"square\""),
                     "`\"square\"`: inverse-square falloff, physically correct; `\"none\"`: `intensity` is the irradiance at normal incidence, at any distance",
@@ -37,51 +37,63 @@ pub(super) const LIGHT: TableInfo = TableInfo {
             name: "spot",
             doc: "A point light that shines into a cone",
             keys: &[
-                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
-                key(
+                define_key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
+                define_key(
                     "look_at",
                     Numbers(3, "point", Any),
                     "length",
                     Is("[0, 0, 0]"),
                     "A point on the cone's axis",
                 ),
-                key(
+                define_key(
                     "intensity",
                     Color(AtLeast(0.0)),
                     "W/sr",
                     Is("[10, 10, 10]"),
                     "Radiant intensity on the axis",
                 ),
-                key("angle", Number(Inside(0.0, 360.0)), "degrees", Is("45"), "Full apex angle of the cone"),
-                key(
+                define_key(
+                    "angle",
+                    Number(Inside(0.0, 360.0)),
+                    "degrees",
+                    Is("45"),
+                    "Full apex angle of the cone",
+                ),
+                define_key(
                     "blend",
                     Number(Between(0.0, 1.0)),
                     "fraction of the half angle",
                     Is("0.2"),
                     "Outer part of the cone where the light fades out",
                 ),
-                key("falloff", Words(words::<Falloff>), "", Is("\"square\""), "As for a point light"),
+                define_key(
+                    "falloff",
+                    Words(choice_values::<Falloff>),
+                    "",
+                    Is("\"square\""),
+                    "As for a point light",
+                ),
             ],
         },
         TypeInfo {
             name: "directional",
             doc: "Light from a distant source, such as the sun",
             keys: &[
-                key(
+                define_key(
                     "direction",
                     Numbers(3, "direction", Any),
                     "",
                     Is("[0, -1, 0]"),
                     "Direction in which the light travels",
                 ),
-                key(
+                define_key(
                     "irradiance",
                     Color(AtLeast(0.0)),
                     "W/m²",
                     Is("[1, 1, 1]"),
                     "Irradiance at normal incidence",
                 ),
-                key(
+                define_key(
                     "angle",
                     Number(Between(0.0, 180.0)),
                     "degrees",

@@ -36,7 +36,7 @@ impl Limits {
                 Some("must be more than 1e-18 in magnitude".to_owned())
             }
             _ if self.contains(number) => None,
-            _ => Some(self.words()),
+            _ => Some(self.requirement_text()),
         }
     }
 
@@ -53,7 +53,7 @@ impl Limits {
     }
 
     /// Returns the range as shown in the documentation.
-    pub fn range(self) -> String {
+    pub fn range_text(self) -> String {
         match self {
             Self::Any => "any".to_owned(),
             Self::NotZero => "not 0".to_owned(),
@@ -65,7 +65,7 @@ impl Limits {
         }
     }
 
-    fn words(self) -> String {
+    fn requirement_text(self) -> String {
         match self {
             Self::Any => "must be a number".to_owned(),
             Self::NotZero => "must not be 0".to_owned(),

@@ -1,51 +1,51 @@
 //! Definitions of the `[materials.NAME]` keys.
 
-use super::key::Default::{Absent, By, Is};
+use super::key::DefaultValue::{Absent, By, Is};
 use super::key::ValueKind::{
     ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
 };
-use super::key::{TableInfo, TableSyntax, TypeInfo, key, words};
+use super::key::{TableInfo, TableSyntax, TypeInfo, choice_values, define_key};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::description::EmissionSides;
-use crate::materials::conductor::elements::Element;
+use crate::materials::conductor::elements::MetalElement;
 
 pub(super) const MATERIALS: TableInfo = TableInfo {
     name: "materials",
     form: TableSyntax::Named,
     doc: "A material, which shapes refer to by name",
     keys: &[
-        key(
+        define_key(
             "emission",
             Emission(AtLeast(0.0)),
             "radiance",
             Is("[0, 0, 0]"),
             "Emitted radiance; if not black, every shape with this material is an area light",
         ),
-        key(
+        define_key(
             "emission_sides",
-            Words(words::<EmissionSides>),
+            Words(choice_values::<EmissionSides>),
             "",
             Is("\"front\""),
             "The sides that emit light",
         ),
-        key("normal_map", Texture, "", Absent, "Tangent-space normal map"),
-        key("normal_strength", Number(AtLeast(0.0)), "", Is("1.0"), "Strength of the normal map"),
-        key("bump", Heights, "", Absent, "Height map that perturbs the normals"),
-        key(
+        define_key("normal_map", Texture, "", Absent, "Tangent-space normal map"),
+        define_key("normal_strength", Number(AtLeast(0.0)), "", Is("1.0"), "Strength of the normal map"),
+        define_key("bump", Heights, "", Absent, "Height map that perturbs the normals"),
+        define_key(
             "bump_scale",
             Number(Any),
             "length",
             Is("0.01"),
             "Displacement of white; negative values invert the relief",
         ),
-        key(
+        define_key(
             "opacity",
             NumberOrTexture(Between(0.0, 1.0)),
             "",
             Is("1.0"),
             "Probability that a ray hits the surface instead of passing through",
         ),
-        key(
+        define_key(
             "opacity_cutoff",
             Number(Between(0.0, 1.0)),
             "",
@@ -58,28 +58,28 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             name: "phong",
             doc: "A diffuse surface with a glossy highlight",
             keys: &[
-                key(
+                define_key(
                     "diffuse",
                     ColorOrTexture(AtLeast(0.0)),
                     "reflectance",
                     Is("[0.7, 0.7, 0.7]"),
                     "Diffuse reflectance, kd",
                 ),
-                key(
+                define_key(
                     "specular",
                     ColorOrTexture(AtLeast(0.0)),
                     "reflectance",
                     Is("[0, 0, 0]"),
                     "Glossy reflectance, ks; glimt warns if `diffuse` + `specular` exceeds 1, which is not energy conserving",
                 ),
-                key(
+                define_key(
                     "shininess",
                     Number(Between(0.0, 1000000.0)),
                     "",
                     Is("32.0"),
                     "Phong exponent; larger values make smaller highlights",
                 ),
-                key(
+                define_key(
                     "ambient",
                     ColorOrTexture(AtLeast(0.0)),
                     "",
@@ -91,7 +91,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
         TypeInfo {
             name: "mirror",
             doc: "A perfect mirror",
-            keys: &[key(
+            keys: &[define_key(
                 "reflectance",
                 ColorOrTexture(Between(0.0, 1.0)),
                 "reflectance",
@@ -103,58 +103,70 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             name: "glass",
             doc: "A smooth or rough dielectric, or a thin pane",
             keys: &[
-                key("ior", Number(Between(0.1, 10.0)), "", Is("1.5"), "Index of refraction, relative to air"),
-                key(
+                define_key(
+                    "ior",
+                    Number(Between(0.1, 10.0)),
+                    "",
+                    Is("1.5"),
+                    "Index of refraction, relative to air",
+                ),
+                define_key(
                     "roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.0"),
                     "Square root of the GGX α; 0 is smooth. Thin panes are always smooth",
                 ),
-                key(
+                define_key(
                     "tint",
                     ColorOrTexture(Between(0.0, 1.0)),
                     "per unit length",
                     Is("[1, 1, 1]"),
                     "Transmittance per unit length (Beer's law); for a thin pane, transmittance at any angle, which may be a texture",
                 ),
-                key("thin", Flag, "", Is("false"), "Whether the glass is an infinitely thin pane"),
+                define_key("thin", Flag, "", Is("false"), "Whether the glass is an infinitely thin pane"),
             ],
         },
         TypeInfo {
             name: "metal",
             doc: "A rough or smooth conductor, defined by exactly one of `color`, `eta` with `k`, and `element`",
             keys: &[
-                key(
+                define_key(
                     "color",
                     ColorOrTexture(Between(0.0, 1.0)),
                     "reflectance",
                     Absent,
                     "Reflectance at normal incidence; other angles use Schlick's approximation",
                 ),
-                key(
+                define_key(
                     "eta",
                     ColorOrTexture(AtLeast(0.0)),
                     "",
                     Absent,
                     "Index of refraction for red, green and blue, used in the exact Fresnel equations",
                 ),
-                key(
+                define_key(
                     "k",
                     ColorOrTexture(AtLeast(0.0)),
                     "",
                     Absent,
                     "Extinction coefficient for red, green and blue",
                 ),
-                key("element", Words(words::<Element>), "", Absent, "Measured `eta` and `k` of a metal"),
-                key(
+                define_key(
+                    "element",
+                    Words(choice_values::<MetalElement>),
+                    "",
+                    Absent,
+                    "Measured `eta` and `k` of a metal",
+                ),
+                define_key(
                     "roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.2"),
                     "Square root of the GGX α; 0 is a mirror",
                 ),
-                key(
+                define_key(
                     "anisotropy",
                     NumberOrTexture(Between(-1.0, 1.0)),
                     "",
@@ -167,22 +179,28 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             name: "plastic",
             doc: "A diffuse base under a rough or smooth coat",
             keys: &[
-                key(
+                define_key(
                     "diffuse",
                     ColorOrTexture(Between(0.0, 1.0)),
                     "reflectance",
                     Is("[0.7, 0.7, 0.7]"),
                     "Reflectance of the base",
                 ),
-                key(
+                define_key(
                     "specular",
                     ColorOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("[1, 1, 1]"),
                     "Scale factor for the coat's reflectance",
                 ),
-                key("ior", Number(Between(1.0, 10.0)), "", Is("1.5"), "The coat's index of refraction"),
-                key(
+                define_key(
+                    "ior",
+                    Number(Between(1.0, 10.0)),
+                    "",
+                    Is("1.5"),
+                    "The coat's index of refraction",
+                ),
+                define_key(
                     "roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
@@ -195,57 +213,63 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             name: "principled",
             doc: "The glTF material model",
             keys: &[
-                key(
+                define_key(
                     "color",
                     ColorOrTexture(Between(0.0, 1.0)),
                     "reflectance",
                     Is("[0.8, 0.8, 0.8]"),
                     "Diffuse reflectance of the dielectric part, and the metal's reflectance at normal incidence",
                 ),
-                key("metallic", NumberOrTexture(Between(0.0, 1.0)), "", Is("0.0"), "Weight of the metal"),
-                key(
+                define_key(
+                    "metallic",
+                    NumberOrTexture(Between(0.0, 1.0)),
+                    "",
+                    Is("0.0"),
+                    "Weight of the metal",
+                ),
+                define_key(
                     "roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.5"),
                     "Square root of the specular lobe's GGX α",
                 ),
-                key(
+                define_key(
                     "ior",
                     Number(Between(1.0, 10.0)),
                     "",
                     Is("1.5"),
                     "Index of refraction of the dielectric part",
                 ),
-                key(
+                define_key(
                     "specular",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("1.0"),
                     "Scale factor for the dielectric part's specular reflectance",
                 ),
-                key(
+                define_key(
                     "specular_color",
                     ColorOrTexture(AtLeast(0.0)),
                     "",
                     Is("[1, 1, 1]"),
                     "Scale factor for the dielectric part's specular reflectance at normal incidence",
                 ),
-                key(
+                define_key(
                     "transmission",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.0"),
                     "Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered",
                 ),
-                key(
+                define_key(
                     "clearcoat",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",
                     Is("0.0"),
                     "Weight of the clear coat on top",
                 ),
-                key(
+                define_key(
                     "clearcoat_roughness",
                     NumberOrTexture(Between(0.0, 1.0)),
                     "",

@@ -17,15 +17,16 @@ mod textures;
 use std::sync::LazyLock;
 
 pub(super) use colors::hex_digits;
-pub use colors::{color_bytes, color_names};
+pub use colors::{color_names, parse_color_bytes};
 pub use key::{
-    ChoiceValue, ChoiceValues, Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind, words,
+    ChoiceValue, ChoiceValuesFn, DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind,
+    choice_values,
 };
 
 /// Returns all tables, in the same order as in the documentation.
-pub fn tables() -> &'static [TableInfo] {
+pub fn all_tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
-        let before = [render::table(), singles::CAMERA, singles::PHOTONS];
+        let before = [render::render_table(), singles::CAMERA, singles::PHOTONS];
         let named = [textures::TEXTURES, materials::MATERIALS];
         let shapes = shapes::SHAPES.iter().cloned();
         let lights = [lights::LIGHT, singles::ENVIRONMENT];
@@ -36,9 +37,9 @@ pub fn tables() -> &'static [TableInfo] {
 
 /// Paths and descriptions of all tables, types and keys, such as `materials`, `materials.metal`,
 /// `materials.metal.roughness`.
-pub fn paths() -> Vec<(String, &'static str)> {
+pub fn documented_paths() -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
-    for table in tables() {
+    for table in all_tables() {
         all.push((table.name.to_owned(), table.doc));
         for key in table.keys {
             all.push((format!("{}.{}", table.name, key.name), key.doc));
@@ -53,8 +54,8 @@ pub fn paths() -> Vec<(String, &'static str)> {
 }
 
 /// Returns the table with this name.
-pub fn table(name: &str) -> Option<&'static TableInfo> {
-    tables().iter().find(|table| table.name == name)
+pub fn find_table(name: &str) -> Option<&'static TableInfo> {
+    all_tables().iter().find(|table| table.name == name)
 }
 
 #[cfg(test)]
@@ -76,10 +77,11 @@ mod tests {
             _ => &[],
         };
         let pair = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
+        let required = super::find_table(table)
+            .into_iter()
+            .flat_map(|info| info.keys_for_type(info.find_type(Some(kind))));
         let required =
-            super::table(table).into_iter().flat_map(|info| info.keys_of(info.type_of(Some(kind))));
-        let required =
-            required.filter(|info| table != "camera" && matches!(info.default, Default::Required(_)));
+            required.filter(|info| table != "camera" && matches!(info.default, DefaultValue::Required(_)));
         let required = required.map(|info| (info.name.to_owned(), info.example()));
         let fixed: Vec<_> = fixed.iter().copied().map(pair).collect();
         let is_other =
@@ -99,7 +101,7 @@ mod tests {
                 text.push_str(body);
             }
         }
-        text.push_str(&info.head().replace("NAME", "other"));
+        text.push_str(&info.header().replace("NAME", "other"));
         if let Some(kind) = kind {
             text.push_str(&format!("\ntype = \"{}\"", kind.name));
         }
@@ -113,13 +115,13 @@ mod tests {
     #[test]
     fn every_example_is_accepted() {
         let (mut refused, folder) = (Vec::new(), tempfile::tempdir().expect("a folder"));
-        for info in tables() {
+        for info in all_tables() {
             let kinds: Vec<_> = match info.types {
                 [] => vec![None],
                 types => types.iter().map(Some).collect(),
             };
             for kind in kinds {
-                for key in info.keys_of(kind) {
+                for key in info.keys_for_type(kind) {
                     // Solid glass has no opacity.
                     let is_glass = kind.is_some_and(|kind| kind.name == "glass");
                     if is_glass && key.name.starts_with("opacity") {

@@ -3,25 +3,25 @@
 use std::sync::LazyLock;
 
 use super::endings::IMAGES;
-use super::key::{Default, KeyInfo, TableInfo, TableSyntax, ValueKind, key};
+use super::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, ValueKind, define_key};
 use super::limits::Limits;
-use crate::description::{KeyRange, Render, RenderKey};
+use crate::description::{KeyRange, RenderKeySpec, RenderOptions};
 use crate::math::limits::LARGEST;
 
 /// Definitions of the `[render]` keys, created on first use.
 static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
-    let output = key(
+    let output = define_key(
         "output",
         ValueKind::File(IMAGES),
         "",
-        Default::By("the scene's name with `.png`"),
+        DefaultValue::By("the scene's name with `.png`"),
         "The image file; the extension determines the format",
     );
-    Render::keys().into_iter().map(render_key_info).chain([output]).collect()
+    RenderOptions::key_specs().into_iter().map(render_key_info).chain([output]).collect()
 });
 
 /// Returns the definition of the `[render]` table.
-pub(super) fn table() -> TableInfo {
+pub(super) fn render_table() -> TableInfo {
     TableInfo {
         name: "render",
         form: TableSyntax::Single,
@@ -31,17 +31,17 @@ pub(super) fn table() -> TableInfo {
     }
 }
 
-fn render_key_info(key: RenderKey) -> KeyInfo {
-    let RenderKey { name, doc, unit, range, words, default, has_option: _ } = key;
+fn render_key_info(key: RenderKeySpec) -> KeyInfo {
+    let RenderKeySpec { name, doc, unit, range, choice_values, default, has_option: _ } = key;
     let kind = match range {
         KeyRange::Whole(range) => ValueKind::Whole((*range.start()).into(), (*range.end()).into()),
         KeyRange::Number(range) if *range.end() >= LARGEST => {
             ValueKind::Number(Limits::AtLeast(*range.start()))
         }
         KeyRange::Number(range) => ValueKind::Number(Limits::Between(*range.start(), *range.end())),
-        KeyRange::Names(_) => ValueKind::Words(words),
+        KeyRange::Names(_) => ValueKind::Words(choice_values),
         KeyRange::Color => ValueKind::Color(Limits::AtLeast(0.0)),
     };
     // Leaking is fine: the list is created once.
-    KeyInfo { name, kind, unit, default: Default::Is(default.leak()), doc }
+    KeyInfo { name, kind, unit, default: DefaultValue::Is(default.leak()), doc }
 }

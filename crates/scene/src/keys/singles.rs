@@ -1,46 +1,52 @@
 //! Definitions of the `[camera]`, `[photons]` and `[environment]` keys.
 
 use super::endings::MAPS;
-use super::key::Default::{Absent, By, Is, Required};
+use super::key::DefaultValue::{Absent, By, Is, Required};
 use super::key::ValueKind::{Color, File, Flag, Number, Numbers, Whole};
-use super::key::{KeyInfo, TableInfo, TableSyntax, key};
+use super::key::{KeyInfo, TableInfo, TableSyntax, define_key};
 use super::limits::Limits::{Any, AtLeast, Inside, Length, LengthOrZero};
 
 pub(super) const CAMERA: TableInfo = single_table(
     "camera",
     "The camera: `position` and `look_at`, or an `orbiter` file",
     &[
-        key("position", Numbers(3, "point", Any), "length", Required("[0, 1, 4]"), "Position of the camera"),
-        key(
+        define_key(
+            "position",
+            Numbers(3, "point", Any),
+            "length",
+            Required("[0, 1, 4]"),
+            "Position of the camera",
+        ),
+        define_key(
             "look_at",
             Numbers(3, "point", Any),
             "length",
             Required("[0, 1, 0]"),
             "The point at the center of the image",
         ),
-        key(
+        define_key(
             "up",
             Numbers(3, "direction", Any),
             "",
             Is("[0, 1, 0]"),
             "Up direction in the image; not parallel to the view direction",
         ),
-        key("fov", Number(Inside(0.0, 180.0)), "degrees", Is("40.0"), "Vertical field of view"),
-        key(
+        define_key("fov", Number(Inside(0.0, 180.0)), "degrees", Is("40.0"), "Vertical field of view"),
+        define_key(
             "aperture",
             Number(LengthOrZero),
             "length",
             Is("0.0"),
             "Lens radius; 0 is a pinhole without depth of field",
         ),
-        key(
+        define_key(
             "focus",
             Number(Length),
             "length",
             By("the distance to `look_at`"),
             "Focus distance along the view axis",
         ),
-        key(
+        define_key(
             "orbiter",
             File(&[]),
             "",
@@ -54,22 +60,28 @@ pub(super) const PHOTONS: TableInfo = single_table(
     "photons",
     "Photon mapping in `whitted`: caustics and all other indirect light",
     &[
-        key("enabled", Flag, "", Is("false"), "Enables photon mapping; the key `p` toggles it"),
-        key(
+        define_key("enabled", Flag, "", Is("false"), "Enables photon mapping; the key `p` toggles it"),
+        define_key(
             "count",
             Whole(0, 1_000_000_000_000),
             "per pass",
             Is("0"),
             "Photons emitted per sample of the image. 0 means one per pixel, clamped to between 8,192 and 200,000. Values above 4 million are reduced to 4 million, with a warning",
         ),
-        key(
+        define_key(
             "radius",
             Number(LengthOrZero),
             "length",
             Is("0.0"),
             "Kernel radius of the first pass; 0 chooses a radius based on the photon density",
         ),
-        key("bounces", Whole(0, 4_294_967_295), "bounces", Is("16"), "Maximum number of bounces per photon"),
+        define_key(
+            "bounces",
+            Whole(0, 4_294_967_295),
+            "bounces",
+            Is("16"),
+            "Maximum number of bounces per photon",
+        ),
     ],
 );
 
@@ -77,21 +89,21 @@ pub(super) const ENVIRONMENT: TableInfo = single_table(
     "environment",
     "Light from all directions, a color or a map; replaces `background`",
     &[
-        key(
+        define_key(
             "color",
             Color(AtLeast(0.0)),
             "radiance",
             By("black; `[1, 1, 1]` with a `file`"),
             "Radiance; with a `file`, a scale factor for the map",
         ),
-        key(
+        define_key(
             "file",
             File(MAPS),
             "",
             Absent,
             "An equirectangular map. Its center is seen towards −z, its right quarter towards +x, and its top row at +y",
         ),
-        key(
+        define_key(
             "rotate",
             Number(Any),
             "degrees",

@@ -4,7 +4,7 @@ use annotate_snippets::Renderer;
 use anstyle::{AnsiColor, Effects};
 
 use super::super::diagnostic::Diagnostic;
-use super::render_with;
+use super::render_report_with;
 
 /// A line of a report.
 pub type ReportLine = Vec<StyledSpan>;
@@ -33,25 +33,25 @@ pub enum SpanRole {
     Message,
 }
 
-/// Returns the same report as [`super::render`], as styled lines.
-pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
+/// Returns the same report as [`super::render_report`], as styled lines.
+pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
         .warning(AnsiColor::Yellow.on_default())
         .line_num(AnsiColor::Blue.on_default())
         .emphasis(Effects::BOLD.into());
-    render_with(diagnostics, width, &renderer).lines().map(pieces).collect()
+    render_report_with(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
 }
 
 /// Splits a line at color escape sequences, all of which come from the renderer because text from files is
 /// sanitized.
-fn pieces(line: &str) -> ReportLine {
+fn split_styled_spans(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
     let mut role = SpanRole::Text;
     for (number, part) in line.split("\u{1b}[").enumerate() {
         let text = match part.split_once('m') {
             Some((codes, text)) if number > 0 => {
-                role = role_of(codes);
+                role = role_from_color_code(codes);
                 text
             }
             _ => part,
@@ -63,8 +63,8 @@ fn pieces(line: &str) -> ReportLine {
     pieces
 }
 
-/// Returns the role that a color code marks in [`lines`].
-fn role_of(codes: &str) -> SpanRole {
+/// Returns the role that a color code marks in [`report_lines`].
+fn role_from_color_code(codes: &str) -> SpanRole {
     match codes {
         "31" => SpanRole::Error,
         "33" => SpanRole::Warning,

@@ -46,7 +46,7 @@ pub(super) struct ErrorCollector<'a> {
 
 impl ErrorSink for ErrorCollector<'_> {
     fn report_error(&mut self, error: ParseError) {
-        self.errors.push_with(|| SyntaxError::new(&error, self.base));
+        self.errors.push_with(|| SyntaxError::from_parse_error(&error, self.base));
     }
 }
 
@@ -111,8 +111,8 @@ impl<'s> DocumentBuilder<'s> {
     /// Adds `path.key = value` to the current table.
     pub(super) fn add_key_value(&mut self, path: &[Name<'s>], key: Name<'s>, value: ValueNode) {
         let is_dotted = !path.is_empty();
-        let Some(parent) = self.descend(self.table, path, is_dotted) else { return };
-        let adds_to_defined = is_dotted && !self.document.origin(parent).is_implicit;
+        let Some(parent) = self.find_or_create_table(self.table, path, is_dotted) else { return };
+        let adds_to_defined = is_dotted && !self.document.table_origin(parent).is_implicit;
         if adds_to_defined || self.document.find(parent, &key.text).is_some() {
             self.report_duplicate(key.span);
         } else {
@@ -128,8 +128,8 @@ impl<'s> DocumentBuilder<'s> {
         key: Name<'s>,
         value: ValueNode,
     ) {
-        let Some(parent) = self.descend_inline(table, path) else { return };
-        let adds_to_defined = self.document.origin(parent).is_dotted == path.is_empty();
+        let Some(parent) = self.find_or_create_inline_table(table, path) else { return };
+        let adds_to_defined = self.document.table_origin(parent).is_dotted == path.is_empty();
         if adds_to_defined || self.document.find(parent, &key.text).is_some() {
             self.report_duplicate(key.span);
         } else {
@@ -143,8 +143,8 @@ impl<'s> DocumentBuilder<'s> {
         self.table = self
             .take_existing_table(&header)
             .unwrap_or_else(|| self.document.add_table(TableOrigin::default()));
-        let is_inline = self.document.origin(self.table).is_inline;
-        self.document.set_origin(self.table, TableOrigin { is_inline, ..TableOrigin::default() });
+        let is_inline = self.document.table_origin(self.table).is_inline;
+        self.document.set_table_origin(self.table, TableOrigin { is_inline, ..TableOrigin::default() });
         self.header = Some(header);
     }
 
@@ -153,11 +153,11 @@ impl<'s> DocumentBuilder<'s> {
         if header.is_list {
             return None;
         }
-        let parent = self.descend(Document::ROOT, &header.path, false)?;
+        let parent = self.find_or_create_table(Document::ROOT, &header.path, false)?;
         let key = header.key.as_ref()?;
-        let old = self.document.remove(parent, &key.text)?;
+        let old = self.document.remove_entry(parent, &key.text)?;
         let table = if let NodeKind::Table(table) = old.kind { Some(table) } else { None };
-        let origin = table.map(|table| self.document.origin(table));
+        let origin = table.map(|table| self.document.table_origin(table));
         if !origin.is_some_and(|origin| origin.is_implicit && !origin.is_dotted) {
             self.report_duplicate(key.span);
         }
@@ -169,26 +169,26 @@ impl<'s> DocumentBuilder<'s> {
         let Some(TableHeader { path, key, span, is_list }) = self.header.take() else { return };
         let node = ValueNode { span, kind: NodeKind::Table(self.table) };
         let Some(key) = key else { return };
-        let Some(parent) = self.descend(Document::ROOT, &path, false) else { return };
+        let Some(parent) = self.find_or_create_table(Document::ROOT, &path, false) else { return };
         if !is_list {
             self.document.add_entry(parent, key, node);
             return;
         }
         match self.document.find(parent, &key.text).map(|found| found.kind) {
-            Some(NodeKind::List(list)) => self.document.list_mut(list).push(node),
+            Some(NodeKind::List(list)) => self.document.table_list_mut(list).push(node),
             Some(_) => self.report_duplicate(key.span),
             None => {
-                let list = self.document.add_list();
+                let list = self.document.add_table_list();
                 self.document.add_entry(parent, key, ValueNode { span, kind: list });
                 if let NodeKind::List(list) = list {
-                    self.document.list_mut(list).push(node);
+                    self.document.table_list_mut(list).push(node);
                 }
             }
         }
     }
 
     /// Returns the table at `path`. Creates missing tables.
-    fn descend(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
+    fn find_or_create_table(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted, is_inline: false };
@@ -197,7 +197,7 @@ impl<'s> DocumentBuilder<'s> {
             match found.kind {
                 NodeKind::Table(inner) => self.extendable_table(inner, name, is_dotted),
                 NodeKind::List(list) => {
-                    let last = self.document.list_mut(list).last()?.kind;
+                    let last = self.document.table_list_mut(list).last()?.kind;
                     if let NodeKind::Table(last) = last { Some(last) } else { None }
                 }
                 other => self.report_not_extendable(name, other),
@@ -207,7 +207,7 @@ impl<'s> DocumentBuilder<'s> {
 
     /// Returns the table if a header or dotted key may add keys to it.
     fn extendable_table(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
-        let origin = self.document.origin(table);
+        let origin = self.document.table_origin(table);
         if origin.is_inline {
             self.add_error(name.span, "cannot extend value of type inline table with a dotted key");
             return None;
@@ -217,20 +217,20 @@ impl<'s> DocumentBuilder<'s> {
             return None;
         }
         if is_dotted {
-            self.document.set_origin(table, TableOrigin { is_dotted, ..origin });
+            self.document.set_table_origin(table, TableOrigin { is_dotted, ..origin });
         }
         Some(table)
     }
 
-    /// Like [`Self::descend`], but within an inline table.
-    fn descend_inline(&mut self, from: TableId, path: &[Name<'s>]) -> Option<TableId> {
+    /// Like [`Self::find_or_create_table`], but within an inline table.
+    fn find_or_create_inline_table(&mut self, from: TableId, path: &[Name<'s>]) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted: true, is_inline: true };
                 return Some(self.create_implicit_table(table, name, origin));
             };
             match found.kind {
-                NodeKind::Table(inner) if self.document.origin(inner).is_implicit => Some(inner),
+                NodeKind::Table(inner) if self.document.table_origin(inner).is_implicit => Some(inner),
                 NodeKind::Table(_) => {
                     self.report_duplicate(name.span);
                     None

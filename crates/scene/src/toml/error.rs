@@ -17,7 +17,7 @@ pub(crate) struct SyntaxError {
 
 impl SyntaxError {
     /// Converts a parser error in the part of the text that starts at byte `base`.
-    pub(super) fn new(error: &ParseError, base: usize) -> Self {
+    pub(super) fn from_parse_error(error: &ParseError, base: usize) -> Self {
         let span = error.unexpected().map_or(0..0, |span| base + span.start()..base + span.end());
         Self {
             span,

@@ -15,7 +15,7 @@ use super::error::SyntaxError;
 use super::tree::{Name, NodeKind, Radix, Span, TableOrigin, ValueNode};
 
 /// The events of one expression.
-pub(super) struct ExpressionEvents<'e, 's> {
+pub(super) struct ExpressionEventReader<'e, 's> {
     pub(super) events: &'e [Event],
     /// The text into which the events index. `base` is the text's offset in the document.
     pub(super) source: Source<'s>,
@@ -23,7 +23,7 @@ pub(super) struct ExpressionEvents<'e, 's> {
     pub(super) assembly: &'e mut DocumentBuilder<'s>,
 }
 
-impl<'s> ExpressionEvents<'_, 's> {
+impl<'s> ExpressionEventReader<'_, 's> {
     /// Reads all events.
     pub(super) fn read_all(mut self) {
         if self.assembly.open.is_some() {
@@ -86,12 +86,12 @@ impl<'s> ExpressionEvents<'_, 's> {
         };
         self.next_if(EventKind::Whitespace);
         let value =
-            self.next().and_then(|event| self.read_value(event)).unwrap_or_else(|| self.missing_value());
+            self.next().and_then(|event| self.read_value(event)).unwrap_or_else(|| self.placeholder_value());
         self.assembly.add_key_value(&path, key, value);
     }
 
     /// Returns a placeholder for a missing value.
-    fn missing_value(&mut self) -> ValueNode {
+    fn placeholder_value(&mut self) -> ValueNode {
         let span = Span::default();
         let text = self.assembly.store_string(span, Cow::Borrowed("0"));
         ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
@@ -103,7 +103,7 @@ impl<'s> ExpressionEvents<'_, 's> {
         let mut path = Vec::new();
         let mut last = event;
         let mut parts = 1;
-        while self.has_separator() {
+        while self.is_before_key_separator() {
             while let Some(event) = self.next() {
                 if event.kind() != EventKind::SimpleKey {
                     continue;
@@ -126,7 +126,7 @@ impl<'s> ExpressionEvents<'_, 's> {
         (path, Some(name))
     }
 
-    fn has_separator(&self) -> bool {
+    fn is_before_key_separator(&self) -> bool {
         let kind = |at: usize| self.events.get(at).map(|event: &Event| event.kind());
         match kind(0) {
             Some(EventKind::KeySep) => true,

@@ -8,7 +8,7 @@ use toml_parser::parser::{Event, RecursionGuard, ValidateWhitespace, parse_docum
 use toml_parser::{ErrorSink, Source};
 
 use super::assembly::{DocumentBuilder, ErrorCollector};
-use super::events::ExpressionEvents;
+use super::events::ExpressionEventReader;
 use super::{MARK, MAX_DEPTH};
 
 /// Expression parser with reusable buffers.
@@ -34,10 +34,10 @@ impl ExpressionParser {
         let first = at == if source.starts_with(MARK) { MARK.len() } else { 0 };
         let base = if first { 0 } else { at - 1 };
         let part = Source::new(source.get(base..).unwrap_or_default());
-        let mut end = ExpressionScanner::default();
+        let mut end = ExpressionEndFinder::default();
         for token in part.lex().skip(usize::from(!first)) {
             self.tokens.push(token);
-            if end.ends_with(token.kind()) {
+            if end.process_token(token.kind()) {
                 break;
             }
         }
@@ -45,7 +45,7 @@ impl ExpressionParser {
         parse(&self.tokens, part, &mut self.events, &mut sink);
         let next = self.tokens.last().map_or(source.len(), |token| base + token.span().end());
         if !assembly.is_lost {
-            ExpressionEvents { events: &self.events, source: part, base, assembly }.read_all();
+            ExpressionEventReader { events: &self.events, source: part, base, assembly }.read_all();
         }
         next
     }
@@ -63,7 +63,7 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
 /// closes a bracket. With mismatched brackets, the parser may finish earlier, but it is never inside a value
 /// while `open` is empty.
 #[derive(Default)]
-struct ExpressionScanner {
+struct ExpressionEndFinder {
     phase: ExpressionPhase,
     open: Vec<TokenKind>,
 }
@@ -83,9 +83,9 @@ enum ExpressionPhase {
     Rest,
 }
 
-impl ExpressionScanner {
+impl ExpressionEndFinder {
     /// Processes the next token. Returns whether it ends the expression.
-    fn ends_with(&mut self, token: TokenKind) -> bool {
+    fn process_token(&mut self, token: TokenKind) -> bool {
         use TokenKind as T;
         let is_end = token == T::Newline && self.open.is_empty();
         self.phase = match (self.phase, token) {
@@ -108,7 +108,9 @@ impl ExpressionScanner {
                 self.open.push(token);
                 ExpressionPhase::Value
             }
-            (ExpressionPhase::Value, T::RightSquareBracket | T::RightCurlyBracket) => self.close(token),
+            (ExpressionPhase::Value, T::RightSquareBracket | T::RightCurlyBracket) => {
+                self.close_bracket(token)
+            }
             (ExpressionPhase::Value, _) => ExpressionPhase::Value,
             (
                 ExpressionPhase::Start
@@ -121,7 +123,7 @@ impl ExpressionScanner {
         is_end
     }
 
-    fn close(&mut self, token: TokenKind) -> ExpressionPhase {
+    fn close_bracket(&mut self, token: TokenKind) -> ExpressionPhase {
         let opened = if token == TokenKind::RightSquareBracket {
             TokenKind::LeftSquareBracket
         } else {

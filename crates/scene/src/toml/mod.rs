@@ -33,7 +33,7 @@ mod tree;
 use assembly::DocumentBuilder;
 use expression::ExpressionParser;
 
-pub(super) use brackets::{Bracket, brackets, last_open};
+pub(super) use brackets::{Bracket, find_array_brackets, innermost_open_bracket};
 pub(super) use error::SyntaxError;
 pub(super) use set::{KeyError, KeyErrorKind, TopLevelLayout};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
@@ -47,7 +47,7 @@ const MARK: &str = "\u{feff}";
 /// Whether a text consists of exactly one dotted key and its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
-    errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
+    errors.is_empty() && document.single_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
 /// Applies a `KEY = VALUE` assignment to the document. The assignment is at byte `at` of `source`, and
@@ -55,7 +55,7 @@ pub(super) fn is_key_value(text: &str) -> bool {
 ///
 /// # Errors
 /// Returns the part of the key that cannot be resolved.
-pub(super) fn set<'s>(
+pub(super) fn apply_assignment<'s>(
     document: Document<'s>,
     source: &'s str,
     at: usize,
@@ -64,7 +64,7 @@ pub(super) fn set<'s>(
     let (mut assembly, detached) = DocumentBuilder::with_detached_table(document.with_source(source));
     ExpressionParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
-    let placed = match document.only_value(detached) {
+    let placed = match document.single_value(detached) {
         Some((keys, value)) => document.set_at_path(&keys, value, layout),
         None => Ok(()),
     };

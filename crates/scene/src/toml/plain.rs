@@ -29,7 +29,7 @@ pub(super) fn read_plain_line<'s>(
                 assembly.start_table(header);
             }
         }
-        first if is_bare(first) => {
+        first if is_bare_key_byte(first) => {
             let key = line.read_name()?;
             line.skip_whitespace();
             line.expect_byte(b'=')?;
@@ -107,7 +107,7 @@ impl<'s> LineScanner<'s> {
 
     fn read_name(&mut self) -> Option<Name<'s>> {
         let start = self.at;
-        if self.skip_while(is_bare) == 0 {
+        if self.skip_while(is_bare_key_byte) == 0 {
             return None;
         }
         let text = Cow::Borrowed(self.source.get(start..self.at)?);
@@ -222,6 +222,6 @@ impl<'s> LineScanner<'s> {
     }
 }
 
-fn is_bare(byte: u8) -> bool {
+fn is_bare_key_byte(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-'
 }

@@ -62,7 +62,7 @@ impl<'s> Document<'s> {
         let mut depth = 0;
         while depth + 1 < keys.len() {
             let next = depth + 1;
-            match self.resolve_part(keys, depth, table, layout)? {
+            match self.resolve_key_part(keys, depth, table, layout)? {
                 KeyTarget::Table(inner) => table = inner,
                 KeyTarget::Element(list, index) if next + 1 == keys.len() => {
                     self.set_element(list, index, value);
@@ -76,7 +76,7 @@ impl<'s> Document<'s> {
             }
             depth += 1;
         }
-        self.check_group(keys, depth, table, layout)?;
+        self.check_group_member_exists(keys, depth, table, layout)?;
         if let Some(last) = keys.get(depth) {
             self.set_value(table, last.clone(), value);
         }
@@ -84,7 +84,7 @@ impl<'s> Document<'s> {
     }
 
     /// Resolves any part of a key except the last.
-    fn resolve_part(
+    fn resolve_key_part(
         &mut self,
         keys: &[Name<'s>],
         depth: usize,
@@ -93,7 +93,7 @@ impl<'s> Document<'s> {
     ) -> Result<KeyTarget, KeyError> {
         let (name, next) = (&keys[depth], &keys[depth + 1]);
         let is_list = depth == 0 && (layout.is_list)(&name.text);
-        self.check_group(keys, depth, table, layout)?;
+        self.check_group_member_exists(keys, depth, table, layout)?;
         let found = self.find(table, &name.text).map(|node| node.kind);
         if let Some(inner) = found.and_then(NodeKind::table) {
             return Ok(KeyTarget::Table(inner));
@@ -118,7 +118,7 @@ impl<'s> Document<'s> {
     }
 
     /// Returns an error if a part of a key refers to a missing table in a group.
-    fn check_group(
+    fn check_group_member_exists(
         &self,
         keys: &[Name<'s>],
         depth: usize,

@@ -29,7 +29,7 @@ fn assert_same_table(text: &str, ours: Entries<'_>, theirs: &DeTable<'_>) {
 
 #[track_caller]
 fn assert_same_value(text: &str, ours: Value<'_>, theirs: &DeValue<'_>) {
-    match (ours.item(), theirs) {
+    match (ours.decode(), theirs) {
         (TomlValue::String(ours), DeValue::String(theirs)) => assert_eq!(ours, theirs, "{text:?}"),
         (TomlValue::Integer { digits, radix }, DeValue::Integer(theirs)) => {
             assert_eq!((digits, radix), (theirs.as_str(), theirs.radix()), "{text:?}");
@@ -317,7 +317,7 @@ proptest! {
     fn mutated_scenes_match_the_crate(
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, line()), 1..5),
     ) {
-        let mut text: Vec<char> = super::super::starter().chars().collect();
+        let mut text: Vec<char> = super::super::starter_scene().chars().collect();
         for (at, removed, inserted) in changes {
             let at = at.index(text.len() + 1);
             let end = (at + removed).min(text.len());

@@ -168,14 +168,14 @@ impl<'s> Document<'s> {
 
     pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
         self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
-        TableId(index(self.tables.len() - 1))
+        TableId(index_to_u32(self.tables.len() - 1))
     }
 
-    pub(super) fn origin(&self, table: TableId) -> TableOrigin {
+    pub(super) fn table_origin(&self, table: TableId) -> TableOrigin {
         self.tables[table.0 as usize].origin
     }
 
-    pub(super) fn set_origin(&mut self, table: TableId, origin: TableOrigin) {
+    pub(super) fn set_table_origin(&mut self, table: TableId, origin: TableOrigin) {
         self.tables[table.0 as usize].origin = origin;
     }
 
@@ -184,16 +184,16 @@ impl<'s> Document<'s> {
         let start = self.elements.len();
         self.elements.extend_from_slice(elements);
         self.arrays.push(Span::new(start, self.elements.len()));
-        NodeKind::Array(index(self.arrays.len() - 1))
+        NodeKind::Array(index_to_u32(self.arrays.len() - 1))
     }
 
     /// Adds an empty list of tables.
-    pub(super) fn add_list(&mut self) -> NodeKind {
+    pub(super) fn add_table_list(&mut self) -> NodeKind {
         self.lists.push(Vec::new());
-        NodeKind::List(index(self.lists.len() - 1))
+        NodeKind::List(index_to_u32(self.lists.len() - 1))
     }
 
-    pub(super) fn list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
+    pub(super) fn table_list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
         &mut self.lists[list as usize]
     }
 
@@ -207,10 +207,10 @@ impl<'s> Document<'s> {
             return StringRef::QUOTED;
         }
         self.texts.push(text.into_owned());
-        StringRef(index(self.texts.len() - 1))
+        StringRef(index_to_u32(self.texts.len() - 1))
     }
 
-    fn text(&self, span: Span, text: StringRef) -> &str {
+    fn resolve_string(&self, span: Span, text: StringRef) -> &str {
         let range = span.range();
         match text {
             StringRef::WHOLE => self.source.get(range).unwrap_or_default(),
@@ -221,7 +221,7 @@ impl<'s> Document<'s> {
 
     /// Appends an entry to a table that does not contain its key.
     pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
-        let entry = index(self.entries.len());
+        let entry = index_to_u32(self.entries.len());
         let text = self.add_text(name.span, name.text.clone());
         self.entries.push(TableEntry { key: name.span, text, node, next: NONE, is_removed: false });
         let TableRecord { first, last, length, .. } = &mut self.tables[table.0 as usize];
@@ -232,20 +232,20 @@ impl<'s> Document<'s> {
             _ => self.entries[before as usize].next = entry,
         }
         if *length == MAX_LINEAR + 1 {
-            self.index_all(table);
+            self.index_entries(table);
         } else if *length > MAX_LINEAR {
             self.index.insert((table, name.text), entry);
         }
     }
 
     /// Adds all entries of a table to the hash index.
-    fn index_all(&mut self, table: TableId) {
+    fn index_entries(&mut self, table: TableId) {
         let mut next = self.tables[table.0 as usize].first;
         while let Some(entry) = self.entries.get(next as usize).copied() {
             if !entry.is_removed {
                 let text = match entry.text {
                     StringRef::WHOLE => Cow::Borrowed(self.source.get(entry.key.range()).unwrap_or_default()),
-                    _ => Cow::Owned(self.text(entry.key, entry.text).to_owned()),
+                    _ => Cow::Owned(self.resolve_string(entry.key, entry.text).to_owned()),
                 };
                 self.index.insert((table, text), next);
             }
@@ -260,7 +260,7 @@ impl<'s> Document<'s> {
         }
         let mut next = first;
         while let Some(entry) = self.entries.get(next as usize) {
-            if !entry.is_removed && self.text(entry.key, entry.text) == name {
+            if !entry.is_removed && self.resolve_string(entry.key, entry.text) == name {
                 return Some(next);
             }
             next = entry.next;
@@ -285,7 +285,7 @@ impl<'s> Document<'s> {
 
     /// Returns the only value in a table and its dotted key. `None` if there are several values or if the
     /// value has a header.
-    pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
+    pub(super) fn single_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
         let mut value = None;
@@ -293,12 +293,12 @@ impl<'s> Document<'s> {
             let TableRecord { first, length, .. } = self.tables[above.0 as usize];
             let TableEntry { key, text, node, .. } =
                 *self.entries.get(first as usize).filter(|_| length == 1)?;
-            keys.push(Name { span: key, text: Cow::Owned(self.text(key, text).to_owned()) });
-            table = node.kind.table().filter(|table| self.origin(*table).is_dotted);
+            keys.push(Name { span: key, text: Cow::Owned(self.resolve_string(key, text).to_owned()) });
+            table = node.kind.table().filter(|table| self.table_origin(*table).is_dotted);
             value = Some(node);
         }
         value
-            .filter(|node| node.kind.table().is_none_or(|table| self.origin(table).is_inline))
+            .filter(|node| node.kind.table().is_none_or(|table| self.table_origin(table).is_inline))
             .map(|node| (keys, node))
     }
 
@@ -310,7 +310,7 @@ impl<'s> Document<'s> {
     /// Finds the value of a key. `None` if it is absent or not a string.
     pub(super) fn find_text(&self, table: TableId, name: &str) -> Option<&str> {
         let node = self.find(table, name)?;
-        if let NodeKind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
+        if let NodeKind::String(text) = node.kind { Some(self.resolve_string(node.span, text)) } else { None }
     }
 
     /// Returns the elements of an array or list. Empty for other values.
@@ -340,7 +340,7 @@ impl<'s> Document<'s> {
     }
 
     /// Removes an entry from its table.
-    pub(super) fn remove(&mut self, table: TableId, name: &str) -> Option<ValueNode> {
+    pub(super) fn remove_entry(&mut self, table: TableId, name: &str) -> Option<ValueNode> {
         let found = self.find_entry(table, name)?;
         // Only large tables have an index.
         if self.tables[table.0 as usize].length > MAX_LINEAR {
@@ -363,7 +363,7 @@ impl<'s> Document<'s> {
     }
 }
 
-fn index(index: usize) -> u32 {
+fn index_to_u32(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
 
@@ -401,18 +401,18 @@ impl<'d> Value<'d> {
 
     /// The elements of an array. `None` if the value is not an array.
     pub(crate) fn array(&self) -> Option<Elements<'d>> {
-        if let TomlValue::Array(array) = self.item() { Some(array) } else { None }
+        if let TomlValue::Array(array) = self.decode() { Some(array) } else { None }
     }
 
     /// Decodes the value.
-    pub(crate) fn item(&self) -> TomlValue<'d> {
+    pub(crate) fn decode(&self) -> TomlValue<'d> {
         let (document, span) = (self.document, self.node.span);
         match self.node.kind {
-            NodeKind::String(text) => TomlValue::String(document.text(span, text)),
+            NodeKind::String(text) => TomlValue::String(document.resolve_string(span, text)),
             NodeKind::Integer(text, radix) => {
-                TomlValue::Integer { digits: document.text(span, text), radix: radix as u32 }
+                TomlValue::Integer { digits: document.resolve_string(span, text), radix: radix as u32 }
             }
-            NodeKind::Float(text) => TomlValue::Float(document.text(span, text)),
+            NodeKind::Float(text) => TomlValue::Float(document.resolve_string(span, text)),
             NodeKind::Boolean(value) => TomlValue::Boolean(value),
             NodeKind::Datetime => TomlValue::Datetime,
             NodeKind::Array(array) => {
@@ -447,7 +447,7 @@ impl<'d> Elements<'d> {
     }
 
     /// Whether the first element is a table.
-    pub(crate) fn is_of_tables(&self) -> bool {
+    pub(crate) fn starts_with_table(&self) -> bool {
         self.nodes.first().is_some_and(|node| matches!(node.kind, NodeKind::Table(_)))
     }
 }
@@ -491,6 +491,10 @@ impl<'d> Entries<'d> {
     fn entry(&self, entry: u32) -> KeyValue<'d> {
         let document = self.document;
         let TableEntry { key, text, node, .. } = document.entries[entry as usize];
-        KeyValue { key: document.text(key, text), span: key.range(), value: Value { document, node } }
+        KeyValue {
+            key: document.resolve_string(key, text),
+            span: key.range(),
+            value: Value { document, node },
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::photons::{GatherPoint, PhotonMaps};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::Vertex;
-use super::{FirstHit, RayCounters};
+use super::{FirstHitQuantity, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
 use crate::math::lanes::PortableSimd;
@@ -14,7 +14,7 @@ use crate::math::{DVec2, Vec3};
 /// there is no hit.
 pub fn shade_aov(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
-    quantity: FirstHit,
+    quantity: FirstHitQuantity,
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
@@ -32,14 +32,14 @@ pub fn shade_aov(
         let vertex = Vertex::new(tile, path, hit);
         let surface = &vertex.surface;
         let value = match quantity {
-            FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
-            FirstHit::Depth => Vec3::splat(view_depth(tile, surface)),
-            FirstHit::Barycentric => surface.barycentric,
-            FirstHit::Photons => {
-                Vec3::splat(maps.map_or(0.0, |maps| count_photons(maps, tile, path.slot, &vertex)))
+            FirstHitQuantity::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
+            FirstHitQuantity::Depth => Vec3::splat(view_depth(tile, surface)),
+            FirstHitQuantity::Barycentric => surface.barycentric,
+            FirstHitQuantity::Photons => {
+                Vec3::splat(maps.map_or(0.0, |maps| count_nearby_photons(maps, tile, path.slot, &vertex)))
             }
-            FirstHit::Uv => fractional_uv(surface.uv).as_vec2().extend(0.0),
-            FirstHit::Albedo => {
+            FirstHitQuantity::Uv => fractional_uv(surface.uv).as_vec2().extend(0.0),
+            FirstHitQuantity::Albedo => {
                 let albedo =
                     vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
                 vertex.times_vertex_color(albedo)
@@ -51,10 +51,10 @@ pub fn shade_aov(
 }
 
 /// Counts the photons within the kernels around a vertex, using the sample's photon pass.
-fn count_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
+fn count_nearby_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);
-    let pass = maps.pass(sample);
+    let pass = maps.pass_for_sample(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }
 

@@ -2,8 +2,8 @@
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
-use crate::lights::SamplingMode;
-use crate::scene::description::Method;
+use crate::lights::LightSamplingPurpose;
+use crate::scene::description::IntegratorProperties;
 
 /// How camera paths continue at surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,26 +19,27 @@ pub struct PathBehavior {
     /// glass ignores this light.
     pub gathers: bool,
     /// How lights are sampled.
-    pub receivers: SamplingMode,
+    pub receivers: LightSamplingPurpose,
 }
 
 impl PathBehavior {
     /// Derives the path behavior from the settings and the presence of photon maps.
-    pub fn of(settings: &RenderSettings, has_photons: bool) -> Self {
-        let Method { splits, scatters, gathers, .. } = settings.render.integrator.method();
+    pub fn from_settings(settings: &RenderSettings, has_photons: bool) -> Self {
+        let IntegratorProperties { splits, scatters, gathers, .. } = settings.render.integrator.properties();
         let gathers = gathers && has_photons;
-        match settings.view.source().aov() {
+        match settings.view.aov_source().light_aov() {
             // The lit fraction is measured at the first visible surface, where all lights are sampled.
             LightAov::LitFraction => Self {
                 splits: true,
                 scatters: gathers,
                 mirrors: false,
                 gathers,
-                receivers: SamplingMode::Eye,
+                receivers: LightSamplingPurpose::Eye,
             },
             LightAov::Radiance(_) | LightAov::TraversalCost => {
                 let scatters = scatters || gathers;
-                let receivers = if scatters { SamplingMode::Paths } else { SamplingMode::Eye };
+                let receivers =
+                    if scatters { LightSamplingPurpose::Paths } else { LightSamplingPurpose::Eye };
                 Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
@@ -46,6 +47,6 @@ impl PathBehavior {
 }
 
 /// Determines how lights are sampled, based on the settings and on whether photons are gathered.
-pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
-    PathBehavior::of(settings, are_gathered).receivers
+pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> LightSamplingPurpose {
+    PathBehavior::from_settings(settings, are_gathered).receivers
 }

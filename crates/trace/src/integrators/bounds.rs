@@ -46,7 +46,7 @@ pub fn draw_box_edges(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(BoxEdge { is_behind, depth }) = nearest_edge(tile, &path.ray, end, spread) {
+        if let Some(BoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, spread) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
             *own = own.lerp(color, if is_behind { HIDDEN_OPACITY } else { 1.0 });
@@ -57,9 +57,9 @@ pub fn draw_box_edges(
 
 /// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it.
 /// Otherwise, larger boxes take priority over smaller boxes.
-fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
+fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
     let mut best: Option<BoxEdge> = None;
-    tile.world.geometry.visit_nodes(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
+    tile.world.geometry.visit_nodes_along_ray(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
         let RayInterval { enter, leave } = *stretch;

@@ -13,7 +13,7 @@ use super::direct::queue::{DirectLightQueue, ShadingSides};
 use super::memory::ThreadMemory;
 use super::photons::PhotonMaps;
 use super::photons::gather::GatherPhotons;
-use super::transport::accumulator::{Accumulator, LocalTerm};
+use super::transport::accumulator::{Accumulator, NonReflectedTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
@@ -25,17 +25,19 @@ use super::transport::scatter::Continuation;
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
-use super::transport::walk::{Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk};
+use super::transport::walk::{
+    Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk_to_interaction,
+};
 use super::view::LightAov;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::packet::{RayPacket, lane_indices};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Rough, RoughBsdf, ThinDielectric};
+use crate::materials::{Bsdf, BxdfPoint, Coated, Mirror, NonSpecular, RoughDielectricPoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Hit, PACKET_SIZE};
 
 /// A path splits only if its weaker branch contributes at least this much. Otherwise, one branch is chosen at
@@ -145,11 +147,11 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         self.tile
     }
 
-    fn crossing(&mut self) -> &mut CrossingMemory {
+    fn crossing_memory(&mut self) -> &mut CrossingMemory {
         self.crossing
     }
 
-    fn record_pass(&mut self, path: &PathRay, next: Option<Hit>) {
+    fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>) {
         if self.accumulator.aov == LightAov::TraversalCost {
             self.accumulator.add_traversal_cost(path.slot, traversal_cost(self.tile, path, next));
         }
@@ -161,7 +163,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
             Interaction::Opaque(vertex, hit, far) => {
                 if self.add_emission(path, vertex, hit) {
                     match &vertex.material.bsdf {
-                        Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, far),
+                        Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
                         Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
                         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
@@ -182,11 +184,11 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         }
     }
 
-    fn texture_lookups(&mut self) -> &mut u64 {
+    fn texture_lookup_counter(&mut self) -> &mut u64 {
         &mut self.counters.texture_lookups
     }
 
-    fn hit_pane(
+    fn handle_pane(
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'a>,
@@ -200,7 +202,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         if !self.add_emission(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
-        let shading = vertex.shading(self.counters);
+        let shading = vertex.shading_normals(self.counters);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -222,7 +224,7 @@ impl CameraWavefront<'_, '_> {
         let (tile, maps, depth, aov) = (self.tile, self.maps, self.depth, self.accumulator.aov);
         let gather = |row: &VertexBatch| {
             let maps = maps?;
-            Some(tile.world.geometry.instructions().run(GatherPhotons { tile, row, maps, depth, aov }))
+            Some(tile.world.geometry.instruction_set().run(GatherPhotons { tile, row, maps, depth, aov }))
         };
         let rays =
             self.direct.compute_direct_light(tile, aov, (self.continuation, depth), gather, self.next)?;
@@ -251,11 +253,11 @@ impl CameraWavefront<'_, '_> {
         let (tile, bit) = (self.tile, 1 << lane);
         match packet.hit(lane) {
             Some(hit) if packet.plain & bit != 0 => {
-                self.add_local_light(&path, &hit, packet.shining & bit != 0);
+                self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
                 let surface = packet.surface(self.surfaces, lane);
-                walk(self, &mut path, (hit, surface));
+                walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
@@ -285,7 +287,9 @@ impl CameraWavefront<'_, '_> {
         if are_lit {
             self.direct.commit_spare_batch();
             if tile.pixel_spread > 0.0 {
-                for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
+                for (lane, hit) in
+                    lane_indices(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?)))
+                {
                     let cone = packet.path(tile, &rays, lane).cone.at_distance(hit.shape.t);
                     self.direct.store_cone(rays.queue_index(lane), cone);
                 }
@@ -306,7 +310,7 @@ impl CameraWavefront<'_, '_> {
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
         // Shade in path order because the contributions to a sample are added in this order.
-        for lane in lanes(wanted) {
+        for lane in lane_indices(wanted) {
             self.place = rays.queue_index(lane);
             self.shade(packet.path(tile, &rays, lane), (&packet, lane));
         }
@@ -330,7 +334,7 @@ impl CameraWavefront<'_, '_> {
         let render = &tile.settings.render;
         // Add the emission and ambient light of plain surfaces.
         let mut known = None;
-        for lane in lanes(plain) {
+        for lane in lane_indices(plain) {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
@@ -339,28 +343,32 @@ impl CameraWavefront<'_, '_> {
             let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
             if packet.shining & 1 << lane != 0 {
-                self.accumulator.add(slot, LocalTerm::Emitted, material.emission);
+                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Emitted, material.emission);
             }
             if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
                 let Some(ambient) = material.ambient else { continue };
-                self.accumulator.add(slot, LocalTerm::Ambient, render.ambient * ambient);
+                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Ambient, render.ambient * ambient);
             }
         }
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
-        for lane in lanes(beyond) {
+        for lane in lane_indices(beyond) {
             let sky = lights.environment().map(|_| packet.sky(lane));
             let beyond = lights.radiance_from_infinity_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
-            self.accumulator.add(first + lane as u32, LocalTerm::Emitted, render.background + beyond);
+            self.accumulator.add_non_reflected(
+                first + lane as u32,
+                NonReflectedTerm::Emitted,
+                render.background + beyond,
+            );
         }
     }
 
     /// Adds a plain surface's emission and ambient light.
-    fn add_local_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
+    fn add_emission_and_ambient(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
         let Some((material, _)) = self.tile.plain_material(index) else { return };
         if is_shining {
-            self.add_emitted(path, material.emission, self.tile.emitter_weight(path, hit));
+            self.add_weighted_emission(path, material.emission, self.tile.emitter_weight(path, hit));
         }
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
@@ -371,14 +379,18 @@ impl CameraWavefront<'_, '_> {
 
     /// Adds the emission found by a path, multiplied by the path's MIS weight. Light samples contribute the
     /// rest.
-    fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
+    fn add_weighted_emission(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
         if self.is_light_counted_elsewhere(path) {
             return;
         }
         if path.state.only_specular_before {
-            self.accumulator.add(path.slot, LocalTerm::Emitted, path.throughput * radiance);
+            self.accumulator.add_non_reflected(
+                path.slot,
+                NonReflectedTerm::Emitted,
+                path.throughput * radiance,
+            );
         } else {
-            self.accumulator.add_hit_light(path, path.throughput * radiance * weight);
+            self.accumulator.add_emitter_hit(path, path.throughput * radiance * weight);
         }
     }
 
@@ -387,7 +399,7 @@ impl CameraWavefront<'_, '_> {
     fn is_light_counted_elsewhere(&self, path: &PathRay) -> bool {
         let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;
         let is_shared = path.state.pdf > 0.0;
-        let is_soft = self.tile.settings.render.shadows == Shadows::Soft;
+        let is_soft = self.tile.settings.render.shadows == ShadowMode::Soft;
         !path.state.only_specular_before && (gathers || mirrors && is_shared) && !(is_shared && is_soft)
     }
 
@@ -400,9 +412,13 @@ impl CameraWavefront<'_, '_> {
     fn add_infinite_light(&mut self, path: &PathRay, beyond: Vec3) {
         if path.state.only_specular_before {
             let background = self.tile.settings.render.background;
-            self.accumulator.add(path.slot, LocalTerm::Emitted, path.throughput * (background + beyond));
+            self.accumulator.add_non_reflected(
+                path.slot,
+                NonReflectedTerm::Emitted,
+                path.throughput * (background + beyond),
+            );
         } else if beyond != Vec3::ZERO && !self.is_light_counted_elsewhere(path) {
-            self.accumulator.add_hit_light(path, path.throughput * beyond);
+            self.accumulator.add_emitter_hit(path, path.throughput * beyond);
         }
     }
 
@@ -416,34 +432,35 @@ impl CameraWavefront<'_, '_> {
         if vertex.emits() {
             let weight = match hit {
                 OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                OpaqueHit::Touching(hit) => self.tile.touching_emitter_weight(path, &hit),
+                OpaqueHit::Touching(hit) => self.tile.coincident_emitter_weight(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
-            self.add_emitted(path, radiance, weight);
+            self.add_weighted_emission(path, radiance, weight);
         }
         self.may_scatter()
     }
 
     /// Shades a non-specular surface. `far` is the medium behind the surface.
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &InteriorList) {
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &NonSpecular, far: &InteriorList) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let accepts_ambient = ambient != Vec3::ZERO && self.accumulator.accepts_ambient(path);
         // Look up only the textures needed for the displayed quantity.
         if !self.accumulator.accepts_reflected() {
             if accepts_ambient {
-                let reflectance = vertex.times_vertex_color(rough.ambient_at(at, lookups));
+                let reflectance = vertex.times_vertex_color(rough.look_up_ambient(at, lookups));
                 self.accumulator.add_ambient(path, path.throughput * ambient * reflectance);
             }
             return;
         }
         let is_colored = self.accumulator.aov.is_colored();
-        let mut bsdf = if is_colored { rough.at(at, lookups) } else { rough.with_white_textures() };
+        let mut bsdf =
+            if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
             vertex.tint(&mut bsdf);
         }
         if accepts_ambient {
-            self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient());
+            self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient_reflectance());
         }
         if bsdf.is_black() {
             return;
@@ -454,10 +471,10 @@ impl CameraWavefront<'_, '_> {
     /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
-    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &InteriorList) {
+    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &BxdfPoint, far: &InteriorList) {
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading(self.counters);
-        let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
+        let shading = vertex.shading_normals(self.counters);
+        let behind = bsdf.transmission().map(|bsdf| (bsdf, shading.far_side()));
         let aov = self.light_aov_at(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
@@ -465,7 +482,7 @@ impl CameraWavefront<'_, '_> {
         // viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
             let throughput = path.throughput * sheet_transmission(tile.world, &path.interiors, far);
-            let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.behind());
+            let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.far_side());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
@@ -477,18 +494,18 @@ impl CameraWavefront<'_, '_> {
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'_>,
-        rough: GlassPoint,
+        rough: RoughDielectricPoint,
         far: &InteriorList,
     ) {
         if !self.accumulator.accepts_reflected() {
             return;
         }
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading(self.counters);
+        let shading = vertex.shading_normals(self.counters);
         let aov = self.light_aov_at(path);
         let near = &path.interiors;
-        let reflection = RoughBsdf::GlassReflection(rough);
-        let transmission = RoughBsdf::GlassTransmission(rough);
+        let reflection = BxdfPoint::DielectricReflection(rough);
+        let transmission = BxdfPoint::DielectricTransmission(rough);
         // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
         // sampled like any other.
         if aov == LightAov::LitFraction {
@@ -496,7 +513,7 @@ impl CameraWavefront<'_, '_> {
             return self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
         // Without shadows, lights also illuminate the inside of solids.
-        let has_shadows = tile.settings.render.shadows != Shadows::Off;
+        let has_shadows = tile.settings.render.shadows != ShadowMode::Off;
         let is_dark = |interiors: &InteriorList| {
             interiors.glass().is_some_and(|inside| tile.world.is_unlit_glass(inside.body))
         };
@@ -509,7 +526,7 @@ impl CameraWavefront<'_, '_> {
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };
         // Queue the viewer's side, unless the vertex on the other side represents both sides.
-        let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
+        let behind = (!is_one || is_behind).then(|| (vertex.far_side(), shading.far_side()));
         if !is_behind {
             let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             self.direct.push(tile, &lit, aov, sides(vertex, dark[0], far));
@@ -528,7 +545,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
-        let shading = vertex.shading(self.counters);
+        let shading = vertex.shading_normals(self.counters);
         let is_colored = self.accumulator.aov.is_colored();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.push_reflected(reflected_path(path, vertex, &shading, reflectance));
@@ -537,7 +554,7 @@ impl CameraWavefront<'_, '_> {
     /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
     /// the coat is its Fresnel reflectance.
     fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &InteriorList) {
-        let shading = vertex.shading(self.counters);
+        let shading = vertex.shading_normals(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -545,7 +562,8 @@ impl CameraWavefront<'_, '_> {
         let is_coat = !both && self.tile.chooses_reflection(path, fresnel);
         if both || is_coat {
             let lookups = &mut self.counters.texture_lookups;
-            let specular = coated.specular(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+            let specular =
+                coated.specular_factor(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.push_reflected(reflected_path(path, vertex, &shading, specular));
             }
@@ -561,7 +579,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &InteriorList) {
-        let shading = vertex.shading(self.counters);
+        let shading = vertex.shading_normals(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));

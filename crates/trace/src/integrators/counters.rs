@@ -19,7 +19,7 @@ pub struct RayCounters {
 
 impl RayCounters {
     /// Total number of rays.
-    pub fn all(&self) -> u64 {
+    pub fn total_rays(&self) -> u64 {
         let Self {
             camera_rays,
             shadow_rays,

@@ -39,11 +39,11 @@ use behavior::PathBehavior;
 pub use behavior::light_sampling_mode;
 pub use counters::RayCounters;
 use memory::ThreadMemory;
-pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, Photons};
+pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::Accumulator;
 use transport::tile::{SampleBlock, TileContext};
-pub use view::{AovSource, Components, FirstHit, LightAov, View};
+pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponents, ViewMode};
 
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
@@ -84,23 +84,26 @@ pub fn render_tile_with_photons(
     // Prepare the context shared by all rays.
     let settings = &settings.effective();
     let photons = photons.filter(|_| settings.gathers_photons());
-    let behavior = PathBehavior::of(settings, photons.is_some());
+    let behavior = PathBehavior::from_settings(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
-    let clamp =
-        if settings.view.source().aov() == LightAov::TraversalCost { 0.0 } else { settings.render.clamp };
+    let clamp = if settings.view.aov_source().light_aov() == LightAov::TraversalCost {
+        0.0
+    } else {
+        settings.render.clamp
+    };
     // Render one batch after another.
     let mut memory = ThreadMemory::take_from_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
         counters.camera_rays += slots.len() as u64;
-        let negative = |first: u32, bits: u32| mark(&mut is_negative, first, bits);
-        match settings.view.source() {
+        let negative = |first: u32, bits: u32| write_mask_bits(&mut is_negative, first, bits);
+        match settings.view.aov_source() {
             AovSource::FirstHit(number) => {
                 tile.camera_rays(slots, &mut memory.scratch.rays, negative);
                 aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
-                let accumulator = Accumulator { aov: shown.aov(), radiance: &mut radiance, clamp };
+                let accumulator = Accumulator { aov: shown.light_aov(), radiance: &mut radiance, clamp };
                 camera_paths::trace_camera_paths(
                     (&tile, photons),
                     slots.clone(),
@@ -124,7 +127,7 @@ pub fn render_tile_with_photons(
 }
 
 /// Copies the bits of a mask to `marked`, starting at slot `first`.
-fn mark(marked: &mut [bool], first: u32, bits: u32) {
+fn write_mask_bits(marked: &mut [bool], first: u32, bits: u32) {
     for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET_SIZE).enumerate() {
         *marked = bits & 1 << lane != 0;
     }

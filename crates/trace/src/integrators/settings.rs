@@ -1,8 +1,8 @@
 //! Render settings.
 
-use super::{AovSource, FirstHit, LightAov, View};
+use super::{AovSource, FirstHitQuantity, LightAov, ViewMode};
 use crate::math::{DVec2, Vec3};
-use crate::scene::description::Render;
+use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use crate::world::TextureNeeds;
 
@@ -10,11 +10,11 @@ use crate::world::TextureNeeds;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
     /// The scene's `[render]` settings after this run's overrides.
-    pub render: Render,
+    pub render: RenderOptions,
     /// Whether the lens has an aperture. False for a pinhole camera.
     pub dof: bool,
     /// The view to render.
-    pub view: View,
+    pub view: ViewMode,
     /// Photon mapping settings. `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
 }
@@ -33,8 +33,8 @@ pub struct PhotonSettings {
 impl RenderSettings {
     /// Returns the effective settings. Settings that have no effect are reset to their defaults.
     pub fn effective(&self) -> Self {
-        let mut render = self.render.effective();
-        let photons = self.photons.filter(|_| render.integrator.method().gathers);
+        let mut render = self.render.reset_ignored();
+        let photons = self.photons.filter(|_| render.integrator.properties().gathers);
         if photons.is_some() {
             render.ambient = Vec3::ZERO;
         }
@@ -45,8 +45,8 @@ impl RenderSettings {
     /// at least twice: at the mirror or glass that the photon hit, and at the point where the photon is
     /// gathered.
     pub fn gathers_photons(&self) -> bool {
-        let shows = match self.view.source() {
-            AovSource::FirstHit(number) => number == FirstHit::Photons,
+        let shows = match self.view.aov_source() {
+            AovSource::FirstHit(number) => number == FirstHitQuantity::Photons,
             AovSource::Light(LightAov::LitFraction) => false,
             AovSource::Light(LightAov::Radiance(parts)) => parts.has_reflected() && self.render.max_depth > 1,
             AovSource::Light(LightAov::TraversalCost) | AovSource::Film(_) | AovSource::Bounds => {
@@ -57,14 +57,21 @@ impl RenderSettings {
     }
 
     /// Textures needed for images with these settings.
-    pub fn lookups(&self) -> TextureNeeds {
-        match self.view.source() {
-            AovSource::FirstHit(FirstHit::Normal) => TextureNeeds { normals: true, ..TextureNeeds::NONE },
-            AovSource::FirstHit(FirstHit::Albedo) => TextureNeeds { diffuse: true, ..TextureNeeds::NONE },
+    pub fn texture_needs(&self) -> TextureNeeds {
+        match self.view.aov_source() {
+            AovSource::FirstHit(FirstHitQuantity::Normal) => {
+                TextureNeeds { normals: true, ..TextureNeeds::NONE }
+            }
+            AovSource::FirstHit(FirstHitQuantity::Albedo) => {
+                TextureNeeds { diffuse: true, ..TextureNeeds::NONE }
+            }
             // Photons may be scattered by any surface.
-            AovSource::FirstHit(FirstHit::Photons) if self.gathers_photons() => TextureNeeds::ALL,
+            AovSource::FirstHit(FirstHitQuantity::Photons) if self.gathers_photons() => TextureNeeds::ALL,
             AovSource::FirstHit(
-                FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons,
+                FirstHitQuantity::Depth
+                | FirstHitQuantity::Barycentric
+                | FirstHitQuantity::Uv
+                | FirstHitQuantity::Photons,
             ) => TextureNeeds::NONE,
             // Normals and emission are needed, but not surface colors.
             AovSource::Light(LightAov::LitFraction) => {
@@ -86,7 +93,7 @@ impl RenderSettings {
     /// right of and above the image center, in units of half the image height.
     #[inline(always)]
     pub fn pixel_to_camera(&self, from_corner: DVec2) -> DVec2 {
-        let Render { width, height, .. } = self.render;
+        let RenderOptions { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * (1.0 / half_height)
     }
@@ -95,18 +102,18 @@ impl RenderSettings {
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { render, dof, view, photons } = self.effective();
-        key.add(&render, of).flag(dof).choice(view.sampled());
+        key.add(&render, of).add_bool(dof).add_choice(view.sampled_view());
         // All acceleration structures return the same hits, but these two views show the structures
         // themselves.
-        match view.source() {
+        match view.aov_source() {
             // The brightness of the lines depends on the exposure.
-            AovSource::Bounds => key.choice(render.accel).f32(render.exposure),
-            AovSource::Light(LightAov::TraversalCost) => key.choice(render.accel),
+            AovSource::Bounds => key.add_choice(render.accel).add_f32(render.exposure),
+            AovSource::Light(LightAov::TraversalCost) => key.add_choice(render.accel),
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Film(_) => &mut *key,
         };
-        key.flag(photons.is_some());
+        key.add_bool(photons.is_some());
         if let Some(PhotonSettings { count, radius, bounces }) = photons {
-            key.u64(count.into()).f32(radius).u64(bounces.into());
+            key.add_u64(count.into()).add_f32(radius).add_u64(bounces.into());
         }
     }
 }

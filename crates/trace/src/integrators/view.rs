@@ -2,11 +2,11 @@
 
 use crate::choice;
 use crate::film::Quantity;
-use crate::materials::bsdf::ShownLobes;
+use crate::materials::bsdf::LobeFilter;
 
 choice! {
     /// Content of an image.
-    pub enum View {
+    pub enum ViewMode {
         /// The rendered image.
         Beauty = "beauty",
         /// Shading normals, as (n + 1)/2.
@@ -48,39 +48,40 @@ choice! {
     }
 }
 
-impl View {
+impl ViewMode {
     /// Source of this view's values.
-    pub fn source(self) -> AovSource {
-        let of = |parts: Components| AovSource::Light(LightAov::Radiance(parts));
-        let by =
-            |paths: PathClasses| of(Components { diffuse: true, specular: true, paths, ..Components::NONE });
+    pub fn aov_source(self) -> AovSource {
+        let of = |parts: RadianceComponents| AovSource::Light(LightAov::Radiance(parts));
+        let by = |paths: PathClasses| {
+            of(RadianceComponents { diffuse: true, specular: true, paths, ..RadianceComponents::NONE })
+        };
         match self {
-            Self::Beauty => of(Components::ALL),
-            Self::Ambient => of(Components { ambient: true, ..Components::NONE }),
-            Self::Diffuse => of(Components { diffuse: true, ..Components::NONE }),
-            Self::Specular => of(Components { specular: true, ..Components::NONE }),
-            Self::Emission => of(Components { emitted: true, ..Components::NONE }),
+            Self::Beauty => of(RadianceComponents::ALL),
+            Self::Ambient => of(RadianceComponents { ambient: true, ..RadianceComponents::NONE }),
+            Self::Diffuse => of(RadianceComponents { diffuse: true, ..RadianceComponents::NONE }),
+            Self::Specular => of(RadianceComponents { specular: true, ..RadianceComponents::NONE }),
+            Self::Emission => of(RadianceComponents { emitted: true, ..RadianceComponents::NONE }),
             Self::Indirect => by(PathClasses { indirect: true, ..PathClasses::NONE }),
             Self::Caustic => by(PathClasses { caustic: true, ..PathClasses::NONE }),
-            Self::Photons => AovSource::FirstHit(FirstHit::Photons),
+            Self::Photons => AovSource::FirstHit(FirstHitQuantity::Photons),
             Self::Shadow => AovSource::Light(LightAov::LitFraction),
             Self::Bounds => AovSource::Bounds,
             Self::Cost => AovSource::Light(LightAov::TraversalCost),
             Self::Samples => AovSource::Film(Quantity::Samples),
             Self::Error => AovSource::Film(Quantity::Error),
-            Self::Normal => AovSource::FirstHit(FirstHit::Normal),
-            Self::Depth => AovSource::FirstHit(FirstHit::Depth),
-            Self::Barycentric => AovSource::FirstHit(FirstHit::Barycentric),
-            Self::Uv => AovSource::FirstHit(FirstHit::Uv),
-            Self::Albedo => AovSource::FirstHit(FirstHit::Albedo),
+            Self::Normal => AovSource::FirstHit(FirstHitQuantity::Normal),
+            Self::Depth => AovSource::FirstHit(FirstHitQuantity::Depth),
+            Self::Barycentric => AovSource::FirstHit(FirstHitQuantity::Barycentric),
+            Self::Uv => AovSource::FirstHit(FirstHitQuantity::Uv),
+            Self::Albedo => AovSource::FirstHit(FirstHitQuantity::Albedo),
         }
     }
 }
 
-impl View {
+impl ViewMode {
     /// View whose samples are used to compute this view.
-    pub fn sampled(self) -> Self {
-        match self.source() {
+    pub fn sampled_view(self) -> Self {
+        match self.aov_source() {
             AovSource::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => self,
         }
@@ -88,7 +89,7 @@ impl View {
 
     /// Film quantity shown by this view.
     pub fn quantity(self) -> Quantity {
-        match self.source() {
+        match self.aov_source() {
             AovSource::Film(quantity) => quantity,
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => Quantity::Radiance,
         }
@@ -102,7 +103,7 @@ pub enum AovSource {
     Light(LightAov),
     /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are displayed
     /// unchanged.
-    FirstHit(FirstHit),
+    FirstHit(FirstHitQuantity),
     /// The beauty image with the acceleration structures' bounding boxes drawn over it.
     Bounds,
     /// A statistic of the beauty image's samples.
@@ -111,7 +112,7 @@ pub enum AovSource {
 
 impl AovSource {
     /// Light AOV accumulated by paths. Not used by first-hit views.
-    pub fn aov(self) -> LightAov {
+    pub fn light_aov(self) -> LightAov {
         match self {
             Self::Light(aov) => aov,
             Self::FirstHit(_) | Self::Bounds | Self::Film(_) => LightAov::ALL,
@@ -123,7 +124,7 @@ impl AovSource {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightAov {
     /// Radiance of these components.
-    Radiance(Components),
+    Radiance(RadianceComponents),
     /// Fraction of the lights' radiance that is not occluded, from 0 to 1.
     LitFraction,
     /// Traversal cost of all rays in the sample: number of boxes and shapes visited.
@@ -132,7 +133,7 @@ pub enum LightAov {
 
 impl LightAov {
     /// The beauty image.
-    pub const ALL: Self = Self::Radiance(Components::ALL);
+    pub const ALL: Self = Self::Radiance(RadianceComponents::ALL);
 
     /// Whether surface colors are applied to reflected light.
     pub fn is_colored(self) -> bool {
@@ -144,11 +145,13 @@ impl LightAov {
 
     /// The non-specular lobes that contribute.
     #[inline(always)]
-    pub fn lobes(self) -> ShownLobes {
+    pub fn lobes(self) -> LobeFilter {
         match self {
-            Self::Radiance(Components { diffuse, specular, .. }) => ShownLobes::Of { diffuse, specular },
-            Self::TraversalCost => ShownLobes::ALL,
-            Self::LitFraction => ShownLobes::Unit,
+            Self::Radiance(RadianceComponents { diffuse, specular, .. }) => {
+                LobeFilter::Of { diffuse, specular }
+            }
+            Self::TraversalCost => LobeFilter::ALL,
+            Self::LitFraction => LobeFilter::Unit,
         }
     }
 
@@ -163,7 +166,7 @@ impl LightAov {
 
 /// Components of a sample's radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Components {
+pub struct RadianceComponents {
     /// Emission of surfaces, and the background.
     pub emitted: bool,
     /// The ambient term.
@@ -195,7 +198,7 @@ impl PathClasses {
     pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
-impl Components {
+impl RadianceComponents {
     /// Whether any reflected light contributes.
     pub fn has_reflected(self) -> bool {
         self.diffuse || self.specular
@@ -211,7 +214,7 @@ impl Components {
 
 /// A quantity at the first hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FirstHit {
+pub enum FirstHitQuantity {
     /// Shading normal.
     Normal,
     /// Depth along the view axis.

@@ -17,15 +17,17 @@ impl World {
         let (materials, object_materials) = lower_materials(scene, inputs);
         let camera = inputs.camera.as_ref().unwrap_or(&scene.camera);
         let camera = Camera::new(camera, inputs.orbiter.as_ref()).relative_to(geometry.origin());
-        let is_rough = |material: &Material| material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
+        let is_rough =
+            |material: &Material| material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);
-        let has_glass = materials.iter().any(|material| material.bsdf.glass().is_some());
-        let solids = inputs.glass_solids.clone().unwrap_or_else(|| Arc::new(find_solids(scene, inputs)));
+        let has_glass = materials.iter().any(|material| material.bsdf.as_dielectric().is_some());
+        let solids =
+            inputs.glass_solids.clone().unwrap_or_else(|| Arc::new(find_glass_solids(scene, inputs)));
         let world = Self {
             camera,
             geometry,
-            packet_material: materials.iter().map(PacketMaterial::of).collect(),
-            has_directions: materials.iter().any(|material| material.bsdf.has_direction()),
+            packet_material: materials.iter().map(PacketMaterial::from_material).collect(),
+            has_directions: materials.iter().any(|material| material.bsdf.is_anisotropic()),
             textured: materials.iter().map(Material::is_textured).collect(),
             mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
             materials,
@@ -40,15 +42,15 @@ impl World {
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
             has_second_uvs: has_second_uvs(scene, inputs),
-            colored: uses_vertex_colors(scene),
+            colored: objects_with_vertex_colors(scene),
             see_through: None,
         };
         Self {
             unlit_glass: world.find_unlit_glass(),
             lens_glass: world.find_lens_glass(),
             enclosing_glass: world.find_enclosing_glass(),
-            camera_solids: world.find_camera_solids(),
-            see_through: SeeThroughObjects::of(&world).map(Box::new),
+            camera_solids: world.find_solids_around_camera(),
+            see_through: SeeThroughObjects::from_world(&world).map(Box::new),
             ..world
         }
     }
@@ -60,14 +62,14 @@ fn has_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }
 
-fn find_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
+fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = inputs.meshes.iter().map(|mesh| mesh.loaded()).collect();
     // This token is never canceled.
     GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
 /// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
-fn uses_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
+fn objects_with_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
     let all: Box<[bool]> = scene.objects.iter().map(is_colored).collect();
@@ -77,12 +79,17 @@ fn uses_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
 /// The scene's materials, followed by the materials of each mesh file and the fallback for triangles without
 /// a material.
 fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<ObjectMaterial>) {
-    let mut materials: Vec<_> =
-        scene.materials.iter().map(|material| lower::material(scene, &inputs.images, material)).collect();
+    let mut materials: Vec<_> = scene
+        .materials
+        .iter()
+        .map(|material| lower::lower_material(scene, &inputs.images, material))
+        .collect();
     let mut first_of_file = Vec::new();
     for mesh in &inputs.meshes {
         first_of_file.push(materials.len() as u32);
-        materials.extend(mesh.loaded().materials.iter().map(|own| lower::file_material(&inputs.images, own)));
+        materials.extend(
+            mesh.loaded().materials.iter().map(|own| lower::lower_file_material(&inputs.images, own)),
+        );
     }
     let fallback = materials.len() as u32;
     materials.push(lower::fallback_material());

@@ -6,7 +6,7 @@ use crate::geometry::Aabb;
 impl Geometry {
     /// Calls `visit` for every object that may intersect the box until `visit` returns false. Returns whether
     /// all objects were visited.
-    pub fn visit_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
+    pub fn visit_objects_in_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
         let mut goes_on = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
         self.tree()
             .visit_overlapping(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
@@ -18,7 +18,7 @@ impl MeshInstance {
     /// Calls `visit` for every triangle that intersects a world-space box until `visit` returns false. Nearby
     /// triangles may also be visited, and triangles may be visited more than once. Returns whether all
     /// triangles were visited.
-    pub fn visit_box(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
-        self.tree.triangles().visit_overlapping_while(&self.local_box(bounds), visit)
+    pub fn visit_triangles_in_box(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
+        self.tree.triangles().visit_triangles_in_box_while(&self.local_box(bounds), visit)
     }
 }

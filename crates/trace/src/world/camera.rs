@@ -2,7 +2,7 @@
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
-use crate::math::decimal::{decimal_step, rounded};
+use crate::math::decimal::{decimal_step, round_to_step};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description::{self, Pose, Viewpoint};
@@ -54,7 +54,10 @@ impl Camera {
     }
 
     /// Returns the point that the camera orbits, and the distance to it.
-    pub fn aim(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> (DVec3, f64) {
+    pub fn target_and_distance(
+        camera: &description::Camera,
+        orbiter: Option<&OrbiterCamera>,
+    ) -> (DVec3, f64) {
         match camera {
             description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
             description::Camera::Orbiter { .. } => {
@@ -80,7 +83,7 @@ impl Camera {
                 let Self { position, up, forward, aperture, .. } = Self::new(camera, Some(&file));
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
-                    DVec3::from_array(place.to_array().map(|at| rounded(at, decimal_step(file.size))))
+                    DVec3::from_array(place.to_array().map(|at| round_to_step(at, decimal_step(file.size))))
                 };
                 let (position, look_at) = (short(position), short(look_at));
                 // An orbiter does not roll. Unless it is upside down, y points up in the image.
@@ -222,7 +225,7 @@ mod tests {
 
     #[test]
     fn orbiter_viewpoint_matches_the_camera() {
-        let file = description::Located { value: "camera.txt".into(), span: 0..0 };
+        let file = description::Spanned { value: "camera.txt".into(), span: 0..0 };
         for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
             let orbiter = OrbiterCamera {
                 center: [1.0, 2.0, 3.0],

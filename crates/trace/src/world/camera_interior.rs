@@ -35,7 +35,7 @@ pub struct CompoundSolid {
 impl World {
     /// Glass around a point on the lens, with its materials: closed shapes that contain the point, and other
     /// solids that contain the camera.
-    pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
+    pub fn glass_around_lens_point(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
@@ -55,15 +55,16 @@ impl World {
         let lens = Aabb { min: eye, max: eye }.expanded(lens + eye.abs() * f32::EPSILON);
         let objects = (0_u32..).zip(self.geometry.objects());
         let near = objects.filter_map(|(id, object)| {
-            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             let is_near = object.bounds().is_none_or(|bounds| bounds.overlaps(&lens));
-            (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+            (is_near && self.is_closed_shape(id) && self.is_glass_material(material))
+                .then_some((id, material))
         });
         near.collect()
     }
 
     /// Other glass solids that contain the camera, each with its material at the camera.
-    pub(super) fn find_camera_solids(&self) -> Vec<(u32, u32)> {
+    pub(super) fn find_solids_around_camera(&self) -> Vec<(u32, u32)> {
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
         let near =
@@ -76,16 +77,16 @@ impl World {
         if !self.has_glass {
             return Vec::new();
         }
-        let covered = self.glass_solids.open().iter().filter(|open| open.is_covered);
+        let covered = self.glass_solids.open_objects().iter().filter(|open| open.is_covered);
         let covered: BTreeSet<u32> = covered.map(|open| self.solid_id(open.object)).collect();
         let mut solids: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for object in 0..self.geometry.objects().len() as u32 {
             let may_be_glass = match self.object_materials[object as usize] {
-                ObjectMaterial::One(material) => self.is_glass(material),
+                ObjectMaterial::One(material) => self.is_glass_material(material),
                 ObjectMaterial::OfFile { .. } => true,
             };
             let body = self.solid_id(object);
-            if may_be_glass && !self.is_closed(object) && !self.is_open(body) {
+            if may_be_glass && !self.is_closed_shape(object) && !self.is_open_solid(body) {
                 solids.entry(body).or_default().push(object);
             }
         }
@@ -128,14 +129,14 @@ impl World {
     ) -> Option<(bool, u32)> {
         let mut ray = Ray::new(point, (target - point.as_dvec3()).as_vec3());
         for _ in 0..MAX_PASSED {
-            let hit = self.geometry.closest(&ray)?;
+            let hit = self.geometry.closest_hit(&ray)?;
             let material = self.material_index(&hit) as u32;
-            if body.is_covered && !self.is_glass(material) && Some(hit.object) != of {
+            if body.is_covered && !self.is_glass_material(material) && Some(hit.object) != of {
                 return None;
             }
             let bare = SurfaceRequest { uv: false, shadow_point: false };
             let surface = self.geometry.requested_surface(&ray, &hit, bare);
-            if self.is_glass(material) && self.solid_id(hit.object) == body.body {
+            if self.is_glass_material(material) && self.solid_id(hit.object) == body.body {
                 let is_back = surface.normal.dot(ray.direction) > 0.0;
                 return Some((is_back != self.glass_solids.is_inside_out(hit.object), material));
             }

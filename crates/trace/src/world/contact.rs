@@ -89,7 +89,7 @@ struct CoincidenceProbe {
 
 impl CoincidenceProbe {
     /// Value of t at `close` along the segment.
-    fn lead_end(&self) -> f32 {
+    fn close_point_t(&self) -> f32 {
         let way = self.sides.ray().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
     }
@@ -105,12 +105,12 @@ impl World {
         memory: &mut CoincidenceScratch,
         visit: impl FnMut(CoincidentSurface),
     ) -> OffsetPoints {
-        let margin = self.geometry.margin(at);
+        let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
             if self.is_far_side_away(at, margin) {
-                return self.single_sided_contact(at, visit);
+                return self.classify_isolated_hit(at, visit);
             }
-            self.geometry.hit_candidate(at, memory)
+            self.geometry.set_hit_as_candidate(at, memory)
         } else {
             self.geometry.find_candidates(at, memory, &self.enclosing_glass)
         };
@@ -124,12 +124,12 @@ impl World {
             Object::Shape(shape) => shape.is_thicker_than(at.surface.point.as_dvec3(), far),
             Object::Mesh(_) => false,
         };
-        is_away && self.is_glass(self.material_index(at.hit) as u32)
+        is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
     /// Fast path for [`World::classify_candidates`] if [`World::is_far_side_away`] is true and nothing else
     /// is nearby. In this case, only the incoming ray's side matters.
-    fn single_sided_contact(
+    fn classify_isolated_hit(
         &self,
         at: &CoincidenceQuery<'_>,
         mut visit: impl FnMut(CoincidentSurface),
@@ -160,7 +160,7 @@ impl World {
             beyond: offset_origin(point, error, normal, -normal),
         };
         let probe = CoincidenceProbe { sides, close: offset_origin(point, error, normal, normal) };
-        let lead_end = probe.lead_end();
+        let lead_end = probe.close_point_t();
         let mut is_led = false;
         let mut found = |near: CoincidentSurface| {
             is_led |= match near {
@@ -176,7 +176,7 @@ impl World {
                 let inside = shape.encloses_points(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
-                self.near_shape(shape, id, (&sides, is_around)).into_iter().for_each(&mut found);
+                self.test_shape_coincidence(shape, id, (&sides, is_around)).into_iter().for_each(&mut found);
             }
         }
         let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
@@ -184,7 +184,7 @@ impl World {
             let mesh = geometry.objects()[object as usize].mesh();
             if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.intersect_segment(triangle, ends)) {
                 let hit = Hit { shape, object };
-                found(self.surface_near(hit, self.material_index(&hit) as u32, is_front));
+                found(self.coincident_surface(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -192,25 +192,26 @@ impl World {
 
     /// Returns the shape if its surface is between the points, or if it is glass and encloses
     /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
-    fn near_shape(
+    fn test_shape_coincidence(
         &self,
         shape: &Shape,
         object: u32,
         (sides, is_around): (&OffsetPoints, Option<bool>),
     ) -> Option<CoincidentSurface> {
-        let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
-        if let (true, Some(is_around)) = (self.is_glass(material), is_around) {
+        let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object }) as u32;
+        if let (true, Some(is_around)) = (self.is_glass_material(material), is_around) {
             return is_around.then_some(CoincidentSurface::Around { object, material });
         }
         let ray = sides.ray().to_f64();
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
-        let is_front = shape.requested_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.surface_near(Hit { shape: own, object }, material, is_front))
+        let is_front =
+            shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
+        Some(self.coincident_surface(Hit { shape: own, object }, material, is_front))
     }
 
-    fn surface_near(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
-        let is_inside_out = self.is_glass(material) && self.glass_solids.is_inside_out(hit.object);
+    fn coincident_surface(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
+        let is_inside_out = self.is_glass_material(material) && self.glass_solids.is_inside_out(hit.object);
         CoincidentSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }
 
@@ -225,18 +226,18 @@ impl World {
     }
 
     /// Whether a glass solid is open.
-    pub fn is_open(&self, body: u32) -> bool {
+    pub fn is_open_solid(&self, body: u32) -> bool {
         self.glass_solids.is_open(body)
     }
 
     /// Whether a material is glass.
-    pub fn is_glass(&self, material: u32) -> bool {
-        self.materials[material as usize].bsdf.glass().is_some()
+    pub fn is_glass_material(&self, material: u32) -> bool {
+        self.materials[material as usize].bsdf.as_dielectric().is_some()
     }
 
     /// Whether the object is a closed shape, for which point containment can be tested. For other objects,
     /// rays must track the glass they have entered.
-    pub fn is_closed(&self, object: u32) -> bool {
+    pub fn is_closed_shape(&self, object: u32) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.is_closed(),
             Object::Mesh(_) => false,
@@ -244,18 +245,18 @@ impl World {
     }
 
     /// Closed glass shapes and their materials.
-    pub fn closed_glasses(&self) -> impl Iterator<Item = (u32, u32)> {
+    pub fn closed_glass_shapes(&self) -> impl Iterator<Item = (u32, u32)> {
         (0..self.geometry.objects().len() as u32).filter_map(|id| {
-            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
-            (self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+            let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
+            (self.is_closed_shape(id) && self.is_glass_material(material)).then_some((id, material))
         })
     }
 
     /// The [`EnclosingGlass`] of each subtree. Empty if few objects are nested.
     pub(super) fn find_enclosing_glass(&self) -> Box<[EnclosingGlass]> {
         let is_glass = |id: u32| {
-            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
-            self.is_closed(id) && self.is_glass(material)
+            let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
+            self.is_closed_shape(id) && self.is_glass_material(material)
         };
         self.geometry.tree().last_primitives_of_subtrees(is_glass).into()
     }
@@ -274,12 +275,16 @@ impl Geometry {
     const REACH: f32 = 16.0;
 
     /// Search distance for coincident surfaces along each axis.
-    pub(super) fn margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
-        (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
+    pub(super) fn coincidence_margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
+        (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding_error() + 2.0 * at.lead))
     }
 
     /// Makes the hit itself the only candidate. Returns its error bound per axis.
-    pub(super) fn hit_candidate(&self, at: &CoincidenceQuery<'_>, memory: &mut CoincidenceScratch) -> Vec3 {
+    pub(super) fn set_hit_as_candidate(
+        &self,
+        at: &CoincidenceQuery<'_>,
+        memory: &mut CoincidenceScratch,
+    ) -> Vec3 {
         let Hit { shape, object } = *at.hit;
         memory.objects.clear();
         memory.triangles.clear();
@@ -290,7 +295,7 @@ impl Geometry {
             }
             Object::Mesh(mesh) => {
                 memory.triangles.push((object, shape.primitive));
-                at.surface.error.max(mesh.touch_error(shape.primitive, at.surface.point))
+                at.surface.error.max(mesh.triangle_position_error(shape.primitive, at.surface.point))
             }
         }
     }
@@ -308,7 +313,7 @@ impl Geometry {
         objects.clear();
         triangles.clear();
         let point = at.surface.point;
-        let near = Aabb { min: point, max: point }.expanded(self.margin(at));
+        let near = Aabb { min: point, max: point }.expanded(self.coincidence_margin(at));
         objects.extend(self.unbounded());
         self.tree().visit_overlapping_surfaces(&near, |met| {
             match met {
@@ -322,10 +327,10 @@ impl Geometry {
         let mut error = at.surface.error;
         for &id in &*objects {
             let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };
-            mesh.tree.triangles().visit_overlapping(&mesh.local_box(&near), |triangle| {
+            mesh.tree.triangles().visit_triangles_in_box(&mesh.local_box(&near), |triangle| {
                 if triangle_meets_box(mesh.world_corners(triangle), &near) {
                     triangles.push((id, triangle));
-                    error = error.max(mesh.touch_error(triangle, point));
+                    error = error.max(mesh.triangle_position_error(triangle, point));
                 }
             });
         }
@@ -348,11 +353,11 @@ impl MeshInstance {
 
     /// Position error of a triangle near a point, caused by rounding its corners in the file and in the ray
     /// test.
-    fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
+    fn triangle_position_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
-        let of_tests = self.with_placement(&self.transform).error(point, local, corners);
+        let of_tests = self.with_placement(&self.transform).point_error_bound(point, local, corners);
         of_tests + self.transform.abs_bound(reach).as_vec3() * f32::EPSILON
     }
 

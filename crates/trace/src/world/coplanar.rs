@@ -76,15 +76,15 @@ impl FlatFace {
     }
 
     /// Whether two faces are identical, or are duplicates within one mesh. Duplicate faces emit only once;
-    /// see [`with_distinct_lights`](super::with_distinct_lights).
-    fn is_same(&self, other: &Self) -> bool {
+    /// see [`separate_coincident_emitters`](super::separate_coincident_emitters).
+    fn is_duplicate_of(&self, other: &Self) -> bool {
         self.object == other.object
             && self.corners.iter().all(|corner| other.corners.contains(corner))
-            && !self.faces_against(other)
+            && !self.has_opposite_normal(other)
     }
 
     /// Whether the fronts of two coplanar faces are on opposite sides.
-    pub(super) fn faces_against(&self, other: &Self) -> bool {
+    pub(super) fn has_opposite_normal(&self, other: &Self) -> bool {
         self.normal.dot(other.normal) < 0.0
     }
 
@@ -154,7 +154,7 @@ impl EmissiveFaces {
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
-        each_flat_face(scene, meshes, (object, origin), None, |face| {
+        visit_flat_faces(scene, meshes, (object, origin), None, |face| {
             if face.emits.is_some() && !face.corners.is_empty() {
                 faces.push(face.clone());
             }
@@ -169,7 +169,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
         scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
     };
     for object in (0..scene.objects.len()).filter(|object| !is_glass(object)) {
-        each_flat_face(scene, meshes, (object, origin), Some(&lights), |face| {
+        visit_flat_faces(scene, meshes, (object, origin), Some(&lights), |face| {
             if pairs > MAX_PAIRS {
                 return;
             }
@@ -177,7 +177,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
                 let is_lifted = must_lift(light, face);
                 // Report each overlap of two lights only once.
                 let is_reported = is_lifted
-                    || face.object <= light.object && !must_lift(face, light) && !light.is_same(face);
+                    || face.object <= light.object && !must_lift(face, light) && !light.is_duplicate_of(face);
                 if is_reported && are_coplanar_and_overlap(light, face) {
                     add_coplanar_pair(&mut found, (light, face), is_lifted);
                 }
@@ -243,7 +243,7 @@ fn add_coplanar_pair(
 /// The light is not lifted if the face also emits on that side, unless it is the reverse of the light in the
 /// same mesh: there, each face emits on its own side.
 fn must_lift(light: &FlatFace, face: &FlatFace) -> bool {
-    !face.emits_along(light.normal) || light.object == face.object && light.faces_against(face)
+    !face.emits_along(light.normal) || light.object == face.object && light.has_opposite_normal(face)
 }
 
 /// Whether two faces are coplanar and overlap.
@@ -278,7 +278,7 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
 }
 
 /// Visits an object's flat faces. If `near` is given, skips mesh faces that are not near these lights.
-fn each_flat_face(
+fn visit_flat_faces(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     (number, origin): (usize, DVec3),

@@ -9,13 +9,13 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::lights::LightGeometry;
 use crate::math::Vec3;
 use crate::math::origin::origin_near;
-use crate::math::random::signed as random;
+use crate::math::random::signed_generator as random;
 use crate::scene::description::Accel;
 use crate::world::packet::tests::assert_packets;
-use crate::world::{Geometry, MeshTree, with_distinct_lights};
+use crate::world::{Geometry, MeshTree, separate_coincident_emitters};
 
 /// A square mesh, centered at the origin and facing up.
-fn square() -> TriangleMesh {
+fn square_mesh() -> TriangleMesh {
     let at = |x: f32, z: f32| Vec3::new(x, 0.0, z);
     TriangleMesh {
         positions: vec![at(-0.5, 0.5), at(0.5, 0.5), at(0.5, -0.5), at(-0.5, -0.5)],
@@ -24,7 +24,7 @@ fn square() -> TriangleMesh {
     }
 }
 
-fn scene(tables: &str) -> Scene {
+fn scene_from_toml(tables: &str) -> Scene {
     let text = format!(
         "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n[materials.w]\ndiffuse = 0.5\n\
          [materials.l]\nemission = 1\n[materials.both]\nemission = 1\nemission_sides = \"both\"\n{tables}"
@@ -35,22 +35,22 @@ fn scene(tables: &str) -> Scene {
     outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics))
 }
 
-fn loaded() -> LoadedMesh {
-    LoadedMesh { mesh: square(), ..LoadedMesh::default() }
+fn loaded_square_mesh() -> LoadedMesh {
+    LoadedMesh { mesh: square_mesh(), ..LoadedMesh::default() }
 }
 
 /// Each light that is lifted off a surface, paired with the surface.
-fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
-    found(scene, true)
+fn lifted_light_pairs(scene: &Scene) -> Vec<(usize, usize)> {
+    coplanar_light_pairs(scene, true)
 }
 
 /// Each light that overlaps another light, paired with the other light.
-fn doubled(scene: &Scene) -> Vec<(usize, usize)> {
-    found(scene, false)
+fn overlapping_light_pairs(scene: &Scene) -> Vec<(usize, usize)> {
+    coplanar_light_pairs(scene, false)
 }
 
-fn found(scene: &Scene, are_lifted: bool) -> Vec<(usize, usize)> {
-    let mesh = loaded();
+fn coplanar_light_pairs(scene: &Scene, are_lifted: bool) -> Vec<(usize, usize)> {
+    let mesh = loaded_square_mesh();
     let meshes = vec![&mesh; scene.mesh_files.len()];
     let found = coplanar_lights(scene, &meshes, DVec3::ZERO).into_iter();
     found.filter(|pair| pair.lift.is_some() == are_lifted).map(|pair| (pair.light, pair.surface)).collect()
@@ -76,15 +76,23 @@ const SURFACES: [&str; 6] = [
 ];
 
 fn distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
-    with_distinct_lights(loaded, all_emit, &CancelToken::new()).expect("never canceled")
+    separate_coincident_emitters(loaded, all_emit, &CancelToken::new()).expect("never canceled")
 }
 
 #[test]
 fn coplanar_lights_are_found_in_any_order() {
     for light in LIGHTS {
         for surface in SURFACES {
-            assert_eq!(pairs(&scene(&format!("{light}{surface}"))), [(0, 1)], "{light}{surface}");
-            assert_eq!(pairs(&scene(&format!("{surface}{light}"))), [(1, 0)], "{surface}{light}");
+            assert_eq!(
+                lifted_light_pairs(&scene_from_toml(&format!("{light}{surface}"))),
+                [(0, 1)],
+                "{light}{surface}"
+            );
+            assert_eq!(
+                lifted_light_pairs(&scene_from_toml(&format!("{surface}{light}"))),
+                [(1, 0)],
+                "{surface}{light}"
+            );
         }
     }
 }
@@ -101,11 +109,14 @@ fn non_coplanar_lights_are_not_lifted() {
         LIGHTS[0].replace("[0, 0, -1]", "[0, 1, 0]"),
         LIGHTS[0].replace("'l'", "'w'"),
     ] {
-        assert!(pairs(&scene(&format!("{surface}{light}"))).is_empty(), "{light}");
+        assert!(lifted_light_pairs(&scene_from_toml(&format!("{surface}{light}"))).is_empty(), "{light}");
     }
     // Two lights that face the same direction.
-    assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2]))).is_empty());
-    assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2].replace("'l'", "'both'")))).is_empty());
+    assert!(lifted_light_pairs(&scene_from_toml(&format!("{}{}", LIGHTS[0], LIGHTS[2]))).is_empty());
+    assert!(
+        lifted_light_pairs(&scene_from_toml(&format!("{}{}", LIGHTS[0], LIGHTS[2].replace("'l'", "'both'"))))
+            .is_empty()
+    );
 }
 
 #[test]
@@ -129,27 +140,34 @@ fn lights_are_compared_only_with_nearby_faces() {
 fn overlapping_lights_are_reported_once() {
     let both = LIGHTS.map(|light| light.replace("'l'", "'both'"));
     for first in LIGHTS {
-        assert!(doubled(&scene(first)).is_empty(), "{first}");
+        assert!(overlapping_light_pairs(&scene_from_toml(first)).is_empty(), "{first}");
         for second in LIGHTS.map(str::to_owned).iter().chain(&both) {
-            assert_eq!(doubled(&scene(&format!("{first}{second}"))), [(1, 0)], "{first}{second}");
+            assert_eq!(
+                overlapping_light_pairs(&scene_from_toml(&format!("{first}{second}"))),
+                [(1, 0)],
+                "{first}{second}"
+            );
         }
-        assert!(doubled(&scene(&format!("{first}{}", SURFACES[0]))).is_empty(), "{first}");
+        assert!(
+            overlapping_light_pairs(&scene_from_toml(&format!("{first}{}", SURFACES[0]))).is_empty(),
+            "{first}"
+        );
     }
     // Lights that touch, and lights that face away from each other.
     for second in [
         "corner = [0.5, 0, 0.5]\nu = [1, 0, 0]\nv = [0, 0, -1]",
         "corner = [0, 0, 0]\nu = [0, 0, -1]\nv = [1, 0, 0]",
     ] {
-        let scene = scene(&format!("{}[[quad]]\n{second}\nmaterial = 'l'\n", LIGHTS[0]));
-        assert!(doubled(&scene).is_empty(), "{second}");
+        let scene = scene_from_toml(&format!("{}[[quad]]\n{second}\nmaterial = 'l'\n", LIGHTS[0]));
+        assert!(overlapping_light_pairs(&scene).is_empty(), "{second}");
     }
 }
 
 #[test]
 fn overlapping_faces_of_one_light_are_reported() {
-    let light = scene(LIGHTS[4]);
+    let light = scene_from_toml(LIGHTS[4]);
     let reported = |triangles: &[[u32; 3]]| {
-        let mesh = TriangleMesh { triangles: triangles.to_vec(), ..square() };
+        let mesh = TriangleMesh { triangles: triangles.to_vec(), ..square_mesh() };
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
         let found = coplanar_lights(&light, &[&loaded], DVec3::ZERO);
         found
@@ -180,11 +198,11 @@ fn rays_hit_the_first_of_repeated_faces() {
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
         assert!(distinct_lights(&loaded, false).is_none());
         let distinct = distinct_lights(&loaded, true).expect("repeated faces");
-        let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct.clone());
+        let geometry = build_geometry_with_mesh(&scene_from_toml(LIGHTS[4]), Accel::Bvh, distinct.clone());
         let mut hits = 0;
         for _ in 0..4000 {
             let from = vertex() * 9.0;
-            let Some(hit) = geometry.closest(&Ray::new(from, vertex() * 0.5 - from)) else { continue };
+            let Some(hit) = geometry.closest_hit(&Ray::new(from, vertex() * 0.5 - from)) else { continue };
             assert!(hit.shape.primitive < 2, "{hit:?} {distinct:?}");
             hits += 1;
         }
@@ -207,7 +225,7 @@ fn opposite_faces_are_hit_from_their_fronts() {
             let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
             let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
             let distinct = distinct_lights(&loaded, true).expect("reversed faces");
-            let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct);
+            let geometry = build_geometry_with_mesh(&scene_from_toml(LIGHTS[4]), Accel::Bvh, distinct);
             for round in 0..100 {
                 let target = corner([0.5, 0.5]).as_dvec3() + (x * vector().x + y * vector().x) * 0.45;
                 let from = target + vector().normalize() * f64::from(1 + round);
@@ -215,7 +233,7 @@ fn opposite_faces_are_hit_from_their_fronts() {
                     continue;
                 }
                 let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
-                let hit = geometry.closest(&ray).expect("a hit");
+                let hit = geometry.closest_hit(&ray).expect("a hit");
                 let is_front = hit.shape.primitive < 2;
                 assert_eq!(is_front, (from - target).dot(x.cross(y)) > 0.0, "{hit:?} {from} {target}");
             }
@@ -252,33 +270,33 @@ fn lights_far_from_the_origin_are_lifted() {
         };
         let cells = [1, 7][round / 4 % 2];
         let [ceiling, light] = [grid(3.0, [0.4, 0.7], cells), grid(0.5, [0.0, 0.0], 1)];
-        let scene = scene(
+        let scene = scene_from_toml(
             "[[mesh]]\nfile = '../../assets/gem.off'\nmaterial = 'w'\n[[mesh]]\nfile = '../../assets/vase.obj'\nmaterial = 'l'\n",
         );
         let token = CancelToken::new();
         let tree = |mesh| Arc::new(MeshTree::build(mesh, Accel::Bvh, &token).expect("never canceled"));
         let (meshes, origin) = ([ceiling, light].map(tree), origin_near(at, 5.0));
-        let geometry = Geometry::of_scene(&scene, &meshes, origin, &token).expect("never canceled");
+        let geometry = Geometry::from_scene(&scene, &meshes, origin, &token).expect("never canceled");
         for _ in 0..50 {
             let target = at + (x * vector().x + y * vector().x) * 0.45;
             let from = target + x.cross(y) * 2.0 + vector();
             let ray = Ray::new((from - origin).as_vec3(), (target - from).as_vec3());
-            assert_eq!(geometry.closest(&ray).expect("a hit").object, 1, "{round} {at} {from}");
+            assert_eq!(geometry.closest_hit(&ray).expect("a hit").object, 1, "{round} {at} {from}");
         }
     }
 }
 
 /// Geometry of a scene whose mesh files are all [`square`].
-fn built(scene: &Scene, accel: Accel) -> Geometry {
-    built_of(scene, accel, loaded())
+fn build_geometry(scene: &Scene, accel: Accel) -> Geometry {
+    build_geometry_with_mesh(scene, accel, loaded_square_mesh())
 }
 
 /// Geometry of a scene whose mesh files all have this content.
-fn built_of(scene: &Scene, accel: Accel, loaded: LoadedMesh) -> Geometry {
+fn build_geometry_with_mesh(scene: &Scene, accel: Accel, loaded: LoadedMesh) -> Geometry {
     let (token, loaded) = (CancelToken::new(), Arc::new(loaded));
     let tree = || Arc::new(MeshTree::build(Arc::clone(&loaded), accel, &token).expect("never canceled"));
     let meshes: Vec<_> = scene.mesh_files.iter().map(|_| tree()).collect();
-    Geometry::of_scene(scene, &meshes, DVec3::ZERO, &token).expect("never canceled")
+    Geometry::from_scene(scene, &meshes, DVec3::ZERO, &token).expect("never canceled")
 }
 
 #[test]
@@ -288,14 +306,14 @@ fn lifted_lights_are_hit_only_from_the_front() {
     let lights = LIGHTS.map(str::to_owned).into_iter().chain(two_sided);
     for (light, surface) in lights.flat_map(|light| SURFACES.map(|surface| (light.clone(), surface))) {
         for (tables, number) in [(format!("{light}{surface}"), 0), (format!("{surface}{light}"), 1)] {
-            let scene = scene(&tables);
+            let scene = scene_from_toml(&tables);
             for accel in [Accel::Bvh, Accel::KdTree] {
-                let geometry = built(&scene, accel);
-                assert_eq!(geometry.lifts().len(), 2);
+                let geometry = build_geometry(&scene, accel);
+                assert_eq!(geometry.light_lifts().len(), 2);
                 for _ in 0..50 {
                     let target = Vec3::new(next() * 0.1, 0.0, next() * 0.1);
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
-                    let hit = geometry.closest(&Ray::new(from, target - from)).expect("a hit");
+                    let hit = geometry.closest_hit(&Ray::new(from, target - from)).expect("a hit");
                     assert_eq!(hit.object, number, "{tables} {from}");
                     // Shadow rays that ignore the light reach it because the surface below does not occlude
                     // it.
@@ -303,10 +321,10 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     assert!(!geometry.occluded(&shadow, LightGeometry::Object(number)), "{tables} {from}");
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
-                    let hit = geometry.closest(&Ray::new(below, target - below)).expect("a hit");
+                    let hit = geometry.closest_hit(&Ray::new(below, target - below)).expect("a hit");
                     assert!(is_closed || hit.object != number, "{tables} {below}");
                     // Light samples are occluded from the same positions as hits.
-                    let lift = geometry.lifts()[number as usize].as_vec3();
+                    let lift = geometry.light_lifts()[number as usize].as_vec3();
                     let hidden = Ray::segment(below, target + lift);
                     assert!(geometry.occluded(&hidden, LightGeometry::Object(number)), "{tables} {below}");
                 }
@@ -319,13 +337,14 @@ fn lifted_lights_are_hit_only_from_the_front() {
 fn packets_match_single_rays_at_lifted_lights() {
     // Every light on every surface, another copy of every light, and a mesh with duplicate faces.
     let tables = [LIGHTS.concat(), SURFACES.concat(), LIGHTS.concat().replace("'l'", "'both'")].concat();
-    let mut mesh = square();
+    let mut mesh = square_mesh();
     mesh.triangles = mesh.triangles.repeat(2);
     for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
         for instructions in InstructionSet::ALL {
             let loaded = LoadedMesh { mesh: mesh.clone(), ..LoadedMesh::default() };
-            let geometry = built_of(&scene(&tables), accel, loaded).with(instructions);
-            assert!(!geometry.lifts().is_empty());
+            let geometry =
+                build_geometry_with_mesh(&scene_from_toml(&tables), accel, loaded).with(instructions);
+            assert!(!geometry.light_lifts().is_empty());
             assert_packets(&geometry);
         }
     }
@@ -346,13 +365,13 @@ fn lights_in_tilted_and_distant_planes_are_lifted() {
             format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
         };
         let tables = format!("{}{}", quad(3.0, "w"), quad(1.0, "l"));
-        let geometry = built(&scene(&tables), Accel::Bvh);
-        assert_eq!(geometry.lifts().len(), 2, "{tables}");
+        let geometry = build_geometry(&scene_from_toml(&tables), Accel::Bvh);
+        assert_eq!(geometry.light_lifts().len(), 2, "{tables}");
         for _ in 0..50 {
             let target = center + (x * vector().x + y * vector().x) * 0.9;
             let from = target + x.cross(y) * (2.0 + f64::from(round)) + vector() * 2.0;
             let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
-            assert_eq!(geometry.closest(&ray).expect("a hit").object, 1, "{tables} {from}");
+            assert_eq!(geometry.closest_hit(&ray).expect("a hit").object, 1, "{tables} {from}");
         }
     }
 }

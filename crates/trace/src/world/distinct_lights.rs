@@ -33,7 +33,7 @@ pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn with_distinct_lights(
+pub fn separate_coincident_emitters(
     loaded: &LoadedMesh,
     all_emit: bool,
     token: &CancelToken,
@@ -47,13 +47,13 @@ pub fn with_distinct_lights(
     };
     let emits = |triangle: u32| all_emit || emits_in_file(triangle);
     let mut mesh = Cow::Borrowed(&loaded.mesh);
-    let repeated = repeated_triangles(&loaded.mesh, emits);
+    let repeated = duplicate_emissive_triangles(&loaded.mesh, emits);
     for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
         mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
     }
-    let (lifts, height) = lifted_triangles(&mesh, emits, emits_in_file, token)?;
+    let (lifts, height) = find_triangles_to_lift(&mesh, emits, emits_in_file, token)?;
     if !lifts.is_empty() {
-        lift(mesh.to_mut(), &lifts, height);
+        lift_triangles(mesh.to_mut(), &lifts, height);
     }
     Ok(match mesh {
         Cow::Borrowed(_) => None,
@@ -63,7 +63,7 @@ pub fn with_distinct_lights(
 
 /// Emissive triangles with the same corners and orientation as an earlier triangle, and the rotation that
 /// gives their corners the same order.
-pub(super) fn repeated_triangles(
+pub(super) fn duplicate_emissive_triangles(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
 ) -> impl Iterator<Item = (u32, usize)> {
@@ -81,7 +81,7 @@ pub(super) fn repeated_triangles(
 
 /// Finds the emissive triangles that must be moved off the plane of other faces. Returns their normals and
 /// the distance to move them.
-fn lifted_triangles(
+fn find_triangles_to_lift(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
     emits_in_file: impl Fn(u32) -> bool,
@@ -107,7 +107,7 @@ fn lifted_triangles(
             // Other instances of the mesh may use the file's materials, in which only some faces emit.
             let is_dark =
                 !is_light || emits_in_file(light.object as u32) && !emits_in_file(other.object as u32);
-            let is_against = light.faces_against(&other);
+            let is_against = light.has_opposite_normal(&other);
             if (is_dark || is_against) && are_coplanar_and_overlap(light, &other) {
                 found.insert(light.object, light.normal);
                 // A light that consists of two sheets may be seen from a distance much greater than its size.
@@ -120,7 +120,7 @@ fn lifted_triangles(
 }
 
 /// Moves triangles along these directions. The moved triangles get separate vertices.
-fn lift(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
+fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
     let mut known = HashMap::new();
     for (triangle, normal) in lifts {
         let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
@@ -136,14 +136,14 @@ fn lift(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
 
 /// Adds a copy of a vertex at position `at`.
 fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
-    fn copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+    fn push_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
         values.extend(values.get(vertex).copied());
     }
     mesh.positions.push(at);
-    copy(&mut mesh.normals, vertex);
-    copy(&mut mesh.normal_groups, vertex);
-    copy(&mut mesh.uvs, vertex);
-    copy(&mut mesh.second_uvs, vertex);
-    copy(&mut mesh.colors, vertex);
+    push_copy(&mut mesh.normals, vertex);
+    push_copy(&mut mesh.normal_groups, vertex);
+    push_copy(&mut mesh.uvs, vertex);
+    push_copy(&mut mesh.second_uvs, vertex);
+    push_copy(&mut mesh.colors, vertex);
     (mesh.positions.len() - 1) as u32
 }

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use super::distinct_lights::repeated_triangles;
-use super::lower::{emission, file_emission, file_opacity, opacity};
+use super::distinct_lights::duplicate_emissive_triangles;
+use super::lower::{file_emission, file_opacity, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
@@ -13,10 +13,10 @@ use crate::lights::MeshEmitter;
 use crate::lights::delta::{PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvChart,
-    UvTriangle, area_light, back_light, see_through_light,
+    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvMapping,
+    UvTriangle, back_area_light, front_area_light, see_through_area_light,
 };
-use crate::lights::{Emitter, LightPart};
+use crate::lights::{Emitter, LightCoverage};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
@@ -33,7 +33,7 @@ pub fn sky_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
-pub fn lights(
+pub fn build_lights(
     scene: &Scene,
     geometry: &Geometry,
     images: &Images,
@@ -44,8 +44,8 @@ pub fn lights(
     let points = points.map(|light| delta_or_directional_light(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
-        let emission = without_black_texture(emission(scene, images, material));
-        EmissiveMaterial::new(emission, opacity(scene, images, material))
+        let emission = discard_black_emission(lower_emission(scene, images, material));
+        EmissiveMaterial::new(emission, lower_opacity(scene, images, material))
     });
     let emissive: Vec<EmissiveMaterial> = emissive.collect();
     let environment = scene.environment.as_ref().and_then(|environment| environment_light(environment, sky));
@@ -70,7 +70,7 @@ pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<Photon
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
     let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
-    PhotonSource::new(lights, emitter_geometry, BoundingSphere::around(&balls))
+    PhotonSource::new(lights, emitter_geometry, BoundingSphere::enclosing(&balls))
 }
 
 /// Environment light. `None` if it is black.
@@ -83,7 +83,7 @@ fn environment_light(
     }
     let description::Environment { color, file, rotate } = environment;
     match file {
-        Some(_) => Some(Environment::map(sky?, *color, *rotate)),
+        Some(_) => Some(Environment::from_map(sky?, *color, *rotate)),
         None => Some(Environment::Constant(*color)),
     }
 }
@@ -109,7 +109,7 @@ fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Ligh
 }
 
 /// Returns the emission, or [`Emission::NONE`] if its texture is entirely black.
-fn without_black_texture(emission: Emission) -> Emission {
+fn discard_black_emission(emission: Emission) -> Emission {
     match &emission.texture {
         Some(texture) if emission.is_emissive() && texture.is_black() => Emission::NONE,
         Some(_) | None => emission,
@@ -129,7 +129,7 @@ struct EmissiveMaterial {
 
 impl EmissiveMaterial {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
-        match opacity.as_ref().and_then(Opacity::constant) {
+        match opacity.as_ref().and_then(Opacity::as_constant) {
             Some(part) => {
                 let emission = Emission { scale: emission.scale * part, ..emission };
                 Self { emission, opacity: None, is_sheer: true }
@@ -148,16 +148,16 @@ impl EmissiveMaterial {
     }
 
     /// Scales light bounds by the means of the emission and opacity textures.
-    fn scaled_by_mean(&self, bounds: LightBounds) -> LightBounds {
+    fn scale_bounds_by_mean(&self, bounds: LightBounds) -> LightBounds {
         let texture = self.emission.texture.as_ref();
         let bounds = texture.map_or(bounds, |texture| bounds.scaled_by(texture.mean()));
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.scaled_by(Vec3::splat(opacity.mean())))
     }
 
     /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
-    fn texture(&self, chart: UvChart) -> Option<EmissionTexture> {
+    fn texture(&self, chart: UvMapping) -> Option<EmissionTexture> {
         let Emission { texture, coat, .. } = &self.emission;
-        EmissionTexture::under_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
+        EmissionTexture::with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
 
     /// Whether emission varies with position or direction.
@@ -171,12 +171,12 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
     let of_side = move |side: &Side| {
         let radiance = emissive.emission.scale;
         let light = match (emissive.is_sheer, side) {
-            (true, side) => see_through_light(shape, *side, radiance, object)?,
-            (false, Side::Front) => area_light(shape, radiance, object)?,
-            (false, Side::Back) => back_light(shape, radiance, object)?,
+            (true, side) => see_through_area_light(shape, *side, radiance, object)?,
+            (false, Side::Front) => front_area_light(shape, radiance, object)?,
+            (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
-        let light = AreaLight { bounds: emissive.scaled_by_mean(light.bounds), ..light };
-        Some(match emissive.texture(UvChart::Shape(*shape)) {
+        let light = AreaLight { bounds: emissive.scale_bounds_by_mean(light.bounds), ..light };
+        Some(match emissive.texture(UvMapping::Shape(*shape)) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })
@@ -198,7 +198,7 @@ fn mesh_lights(
         None => {
             let of_file = |material| {
                 EmissiveMaterial::new(
-                    without_black_texture(file_emission(images, material)),
+                    discard_black_emission(file_emission(images, material)),
                     file_opacity(images, material),
                 )
             };
@@ -212,7 +212,7 @@ fn mesh_lights(
     };
     let is_lit = all.iter().any(|(_, emissive)| !emissive.sides().is_empty());
     let repeated: HashSet<u32> = if is_lit {
-        repeated_triangles(&loaded.mesh, emits).map(|(id, _)| id).collect()
+        duplicate_emissive_triangles(&loaded.mesh, emits).map(|(id, _)| id).collect()
     } else {
         HashSet::new()
     };
@@ -222,11 +222,11 @@ fn mesh_lights(
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
             };
-            let distinct = triangles_of(mesh, own).filter(|id| !repeated.contains(id));
+            let distinct = triangles_with_material(mesh, own).filter(|id| !repeated.contains(id));
             let triangles = distinct.map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = emissive.emission.scale;
-            let bounds = emissive.scaled_by_mean(emitter.bounds().scaled_by(radiance));
+            let bounds = emissive.scale_bounds_by_mean(emitter.bounds().scaled_by(radiance));
             let patches = || {
                 let patch = |id| UvTriangle {
                     primitive: id,
@@ -234,10 +234,10 @@ fn mesh_lights(
                     uvs: mesh.corner_uvs(id),
                     second_uvs: mesh.second_corner_uvs(id),
                 };
-                UvChart::Triangles(triangles_of(mesh, own).map(patch).collect())
+                UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
             let texture = if emissive.is_textured() { emissive.texture(patches()).map(Box::new) } else { None };
-            let (shape, part) = (Emitter::Mesh(emitter), LightPart::Listed);
+            let (shape, part) = (Emitter::Mesh(emitter), LightCoverage::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
     let of_sides = all
@@ -247,7 +247,7 @@ fn mesh_lights(
 }
 
 /// Triangles with one of the mesh file's materials, or all triangles if `own` is `None`.
-fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
+fn triangles_with_material(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
@@ -282,7 +282,7 @@ mod tests {
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            let emissive = EmissiveMaterial::new(Emission::constant(Vec3::ONE), None);
+            let emissive = EmissiveMaterial::new(Emission::from_constant(Vec3::ONE), None);
             let lights = mesh_lights(0, &mesh, Some(&emissive), &Images::default(), &CancelToken::new())
                 .expect("never canceled");
             let lights = lights.into_iter().map(Light::Area).collect();
@@ -290,14 +290,14 @@ mod tests {
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
             let geometry = geometry.expect("never canceled");
             let source = photon_source(&geometry, &lights).expect("a photon source");
-            let mut next = random::unit(1);
+            let mut next = random::unit_generator(1);
             for _ in 0..20_000 {
                 let mut pair = || [next(), next()];
                 let u =
                     PhotonRandomNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
                 let photon = source.emit(&u).expect("a photon");
                 assert!(matches!(photon.start, PhotonOrigin::Surface { .. }));
-                assert_eq!(geometry.closest(&photon.ray()), None, "{scale} {at}: {photon:?}");
+                assert_eq!(geometry.closest_hit(&photon.ray()), None, "{scale} {at}: {photon:?}");
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::accel::{Bvh, InstructionSet, Shell};
+use crate::accel::{Bvh, InstructionSet, SphericalShell};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::LightGeometry;
@@ -59,20 +59,20 @@ impl Geometry {
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn of_scene(
+    pub fn from_scene(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
         origin: DVec3,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        Self::with_lifts(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
+        Self::from_scene_with_light_lifts(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
     }
 
-    /// Like [`Self::of_scene`], but also applies translations from [`light_lifts`].
+    /// Like [`Self::from_scene`], but also applies translations from [`light_lifts`].
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn with_lifts(
+    pub fn from_scene_with_light_lifts(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
         (origin, lifts): (DVec3, Vec<DVec3>),
@@ -80,13 +80,13 @@ impl Geometry {
     ) -> Result<Self, Cancelled> {
         let lift = |object: usize| lifts.get(object).copied().unwrap_or(DVec3::ZERO);
         let objects = scene.objects.iter().enumerate();
-        let built = objects.map(|(id, object)| lowered(&object.shape, meshes, origin - lift(id), token));
+        let built = objects.map(|(id, object)| lower_shape(&object.shape, meshes, origin - lift(id), token));
         let built = built.collect::<Result<_, _>>()?;
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
     /// One translation per object; see [`super::coplanar_lights`]. Empty if no objects are moved.
-    pub fn lifts(&self) -> &[DVec3] {
+    pub fn light_lifts(&self) -> &[DVec3] {
         &self.lifts
     }
 
@@ -95,19 +95,21 @@ impl Geometry {
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
     pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
-        let merged = MergedMeshes::of_objects(&mut objects, token)?;
+        let merged = MergedMeshes::merge_small_meshes(&mut objects, token)?;
         number_triangles(&mut objects);
         let bounds: Vec<Option<Aabb>> = objects.iter().map(Object::bounds).collect();
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
-        let shell = |id: u32| shell(&objects[id as usize], &boxes[id as usize]);
+        let shell = |id: u32| object_shell(&objects[id as usize], &boxes[id as usize]);
         let (tree, instructions) = (Bvh::build(&boxes, token)?.with_shells(shell), InstructionSet::best());
         let merged = merged.map(|meshes| -> Result<_, Cancelled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
             let of_merged = meshes.bounds();
-            let shell = |id: u32| objects.get(id as usize).map_or(Shell::around(&of_merged), |_| shell(id));
+            let shell = |id: u32| {
+                objects.get(id as usize).map_or(SphericalShell::from_bounds(&of_merged), |_| shell(id))
+            };
             Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells(shell), meshes })
         });
         let merged = merged.transpose()?;
@@ -152,14 +154,14 @@ impl Geometry {
     /// Returns the merged meshes if they are represented by `id`, which is an id from
     /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
     #[inline(always)]
-    pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
+    pub(super) fn merged_meshes(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
         (id as usize == self.objects.len()).then_some(&merged.meshes)
     }
 
     /// Whether any meshes are merged.
     #[inline(always)]
-    pub(super) fn has_merged(&self) -> bool {
+    pub(super) fn has_merged_meshes(&self) -> bool {
         self.merged.is_some()
     }
 
@@ -194,7 +196,7 @@ impl Geometry {
     }
 
     /// Upper bound on the position error of mesh triangles, including the error of ray tests.
-    pub(super) fn mesh_rounding(&self) -> f32 {
+    pub(super) fn mesh_rounding_error(&self) -> f32 {
         self.mesh_rounding
     }
 
@@ -211,32 +213,34 @@ impl Geometry {
     }
 
     /// The instruction set used to trace packets.
-    pub fn instructions(&self) -> InstructionSet {
+    pub fn instruction_set(&self) -> InstructionSet {
         self.instructions
     }
 
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
-    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_in(self.traced_tree(), ray, |id, segment| match self.merged(id) {
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_hit_in_tree(self.traced_tree(), ray, |id, segment| match self.merged_meshes(id) {
             Some(merged) => {
-                let shape = merged.closest(segment)?;
+                let shape = merged.closest_hit(segment)?;
                 let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
                 Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
             }
-            None => self.hit(id, segment),
+            None => self.intersect_object(id, segment),
         })
     }
 
     /// Returns the nearest hit among the objects for which `counts` returns true. At equal distances, the
     /// lowest object id wins.
-    pub fn closest_of(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
-        self.closest_in(&self.tree, ray, |id, segment| if counts(id) { self.hit(id, segment) } else { None })
+    pub fn closest_hit_among(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
+        self.closest_hit_in_tree(&self.tree, ray, |id, segment| {
+            if counts(id) { self.intersect_object(id, segment) } else { None }
+        })
     }
 
     /// Returns the nearest hit among a tree's objects and the infinite objects. `hit` intersects one object
     /// with a ray segment.
     #[inline]
-    fn closest_in(
+    fn closest_hit_in_tree(
         &self,
         tree: &Bvh,
         ray: &Ray,
@@ -255,38 +259,40 @@ impl Geometry {
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        tree.closest(&Ray { t_max: end, ..*ray }, test);
+        tree.closest_hit(&Ray { t_max: end, ..*ray }, test);
         best
     }
 
     /// Returns the nearest hit on one object.
     #[inline]
-    fn hit(&self, id: u32, ray: &Ray) -> Option<Hit> {
-        let shape = self.objects[id as usize].closest(ray, &ray.to_f64())?;
+    fn intersect_object(&self, id: u32, ray: &Ray) -> Option<Hit> {
+        let shape = self.objects[id as usize].closest_hit(ray, &ray.to_f64())?;
         Some(Hit { shape, object: id })
     }
 
     /// Whether anything other than the light itself blocks a shadow ray.
     pub fn occluded(&self, ray: &Ray, source: LightGeometry) -> bool {
         let ray_f64 = ray.to_f64();
-        let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
+        let any = |id: u32, except: Option<u32>| self.objects[id as usize].any_hit(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
             LightGeometry::Nothing => any(id, None),
             LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
             LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        let test = |id: u32| match (self.merged(id), source) {
+        let test = |id: u32| match (self.merged_meshes(id), source) {
             (
                 Some(merged),
                 LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
-            ) => merged.any(ray, None),
-            (Some(merged), LightGeometry::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
+            ) => merged.any_hit(ray, None),
+            (Some(merged), LightGeometry::Primitive(own, part)) => {
+                merged.any_hit(ray, merged.tree_index(own, part))
+            }
             (None, _) => of_object(id),
         };
         if self.is_merged_mesh_light(source) {
-            return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any(ray, of_object);
+            return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any_hit(ray, of_object);
         }
-        self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any(ray, test)
+        self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any_hit(ray, test)
     }
 
     /// Scene-wide number of the hit triangle, for [`Ray::start`]. [`Ray::NO_TRIANGLE`] for other shapes.
@@ -294,7 +300,7 @@ impl Geometry {
     pub fn triangle_number(&self, hit: &Hit) -> u32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(_) => Ray::NO_TRIANGLE,
-            Object::Mesh(mesh) => mesh.scene_number(hit.shape.primitive),
+            Object::Mesh(mesh) => mesh.scene_triangle_number(hit.shape.primitive),
         }
     }
 
@@ -339,7 +345,7 @@ impl Geometry {
     }
 
     /// Memory used by the objects and the trees over them, in bytes. Excludes per-mesh trees.
-    pub fn own_memory_bytes(&self) -> usize {
+    pub fn top_level_memory_bytes(&self) -> usize {
         let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
@@ -348,7 +354,7 @@ impl Geometry {
     /// Memory used by all trees, in bytes. Each mesh tree is counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
-        let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());
+        let mut bytes = self.top_level_memory_bytes() - size_of_val(self.objects.as_slice());
         for mesh in self.objects.iter().filter_map(Object::mesh) {
             if !seen.contains(&Arc::as_ptr(&mesh.tree)) {
                 seen.push(Arc::as_ptr(&mesh.tree));
@@ -360,10 +366,10 @@ impl Geometry {
 }
 
 /// Shell around an object with this bounding box.
-fn shell(object: &Object, bounds: &Aabb) -> Shell {
+fn object_shell(object: &Object, bounds: &Aabb) -> SphericalShell {
     match object {
-        Object::Shape(Shape::Sphere(sphere)) => Shell::sphere(sphere.center, sphere.radius),
-        Object::Shape(_) | Object::Mesh(_) => Shell::around(bounds),
+        Object::Shape(Shape::Sphere(sphere)) => SphericalShell::from_sphere(sphere.center, sphere.radius),
+        Object::Shape(_) | Object::Mesh(_) => SphericalShell::from_bounds(bounds),
     }
 }
 
@@ -382,7 +388,7 @@ fn number_triangles(objects: &mut [Object]) {
     }
 }
 
-fn lowered(
+fn lower_shape(
     shape: &description::Shape,
     meshes: &[Arc<MeshTree>],
     origin: DVec3,
@@ -393,7 +399,7 @@ fn lowered(
         LoweredShape::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
-    let transform = mesh.placed.transform().between(tree.loaded().mesh.origin, origin);
+    let transform = mesh.placed.transform().relative_to_origins(tree.loaded().mesh.origin, origin);
     let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;
@@ -405,7 +411,7 @@ fn lowered(
 mod tests {
     use super::*;
     use crate::geometry::ray::offset_origin;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 
@@ -428,7 +434,7 @@ mod tests {
         let mut seen = std::collections::HashSet::new();
         for (object, own) in (0..).zip(geometry.objects()) {
             for primitive in 0..own.triangle_count() as u32 {
-                let hit = Hit { shape: ShapeHit { primitive, ..ShapeHit::at(1.0) }, object };
+                let hit = Hit { shape: ShapeHit { primitive, ..ShapeHit::from_t(1.0) }, object };
                 assert!(seen.insert(geometry.triangle_number(&hit)), "{object} {primitive}");
             }
         }
@@ -444,13 +450,13 @@ mod tests {
             let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
             let place = Vec3::X * (4 * (started as u32 % 5)) as f32;
             let ray = Ray::new(place + vector(3.0), vector(1.0));
-            let Some(hit) = geometry.closest(&ray) else { continue };
+            let Some(hit) = geometry.closest_hit(&ray) else { continue };
             let surface = geometry.surface(&ray, &hit);
             let direction = vector(1.0).normalize();
             let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
             let leaving = Ray::new(origin, direction).with_start_triangle(geometry.triangle_number(&hit));
-            let found = geometry.closest(&leaving);
-            assert_eq!(found, geometry.closest(&Ray::new(origin, direction)), "{hit:?} {leaving:?}");
+            let found = geometry.closest_hit(&leaving);
+            assert_eq!(found, geometry.closest_hit(&Ray::new(origin, direction)), "{hit:?} {leaving:?}");
             started += 1;
             hits[hit.object as usize] += u32::from(found.is_some());
         }

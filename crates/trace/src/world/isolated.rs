@@ -70,7 +70,7 @@ impl IsolationTable {
     }
 
     /// Creates a table with one state per grid cell of a shape's bounding box.
-    fn of_cells(margin: f32, bounds: &Aabb) -> Self {
+    fn for_grid_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
         let dense = Vec3::from(dense.to_array().map(|dense| if dense.is_finite() { dense } else { 0.0 }));
@@ -85,7 +85,7 @@ impl IsolationTable {
     }
 
     #[inline]
-    fn state(&self, number: usize, find: impl FnOnce() -> u8) -> u8 {
+    fn get_or_compute_state(&self, number: usize, find: impl FnOnce() -> u8) -> u8 {
         let state = &self.states[number];
         let known = state.load(Ordering::Relaxed);
         if known != UNKNOWN {
@@ -114,15 +114,16 @@ impl Geometry {
     /// hit triangle.
     pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
-        let table = self.isolation_cache().tables[hit.object as usize].get_or_init(|| self.table(object));
+        let table = self.isolation_cache().tables[hit.object as usize]
+            .get_or_init(|| self.new_isolation_table(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
         match object {
             Object::Mesh(mesh) => {
                 let triangle = hit.shape.primitive;
-                let find = || self.triangle_state(hit.object, mesh, triangle, table.margin);
-                let state = table.state(triangle as usize, find);
+                let find = || self.triangle_isolation_state(hit.object, mesh, triangle, table.margin);
+                let state = table.get_or_compute_state(triangle as usize, find);
                 state != NEVER && surface.barycentric.min_element() * STATE_STEPS >= f32::from(state)
             }
             Object::Shape(shape) => {
@@ -136,15 +137,15 @@ impl Geometry {
                         NEVER
                     }
                 };
-                table.state(cell.number(), find) != NEVER
+                table.get_or_compute_state(cell.index(), find) != NEVER
             }
         }
     }
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn table(&self, object: &Object) -> IsolationTable {
-        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
+    fn new_isolation_table(&self, object: &Object) -> IsolationTable {
+        let of_rays = self.mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.max_rounding_error());
@@ -153,7 +154,7 @@ impl Geometry {
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    IsolationTable::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
+                    IsolationTable::for_grid_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
                 // With a negative margin, the table of an unbounded shape is never used.
                 None => IsolationTable::new(-1.0, [Vec3::ZERO; 2], 0),
@@ -162,7 +163,7 @@ impl Geometry {
     }
 
     /// Computes a triangle's state.
-    fn triangle_state(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
+    fn triangle_isolation_state(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
         let corners = mesh.world_corners(triangle);
         let own_corners = mesh.local_corners(triangle);
         let growth = mesh.transform.max_inverse_stretch();
@@ -200,7 +201,7 @@ impl Geometry {
             Object::Shape(shape) => shape_is_near(shape, around, region),
             Object::Mesh(mesh) => {
                 let is_far = |other: u32| !region.is_near(mesh.world_corners(other), around);
-                !mesh.tree.triangles().visit_overlapping_while(&mesh.local_box(around), is_far)
+                !mesh.tree.triangles().visit_triangles_in_box_while(&mesh.local_box(around), is_far)
             }
         };
         let is_near = |id: u32| id != own && is_near(id);
@@ -223,7 +224,7 @@ impl Geometry {
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
 fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
-    mesh.tree.triangles().visit_overlapping_while(&around, |other| {
+    mesh.tree.triangles().visit_triangles_in_box_while(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
     })
 }
@@ -271,7 +272,7 @@ impl SurfaceRegion {
 struct GridCell([usize; 3]);
 
 impl GridCell {
-    fn number(&self) -> usize {
+    fn index(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x
     }

@@ -2,13 +2,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, OffsetPoints};
-use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, lights};
+use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, build_lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Accel, Mesh, MeshFile, MeshTransform, Object, Scene, Shape};
+use crate::scene::description::{Accel, MeshFile, MeshReference, MeshTransform, Object, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -22,7 +22,7 @@ impl SceneRandom {
         ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
     }
 
-    fn place(&mut self) -> DVec3 {
+    fn random_point(&mut self) -> DVec3 {
         v(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 }
@@ -54,14 +54,15 @@ impl SceneBuilder {
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let file = self.meshes.len() - 1;
         let placed = MeshTransform::Steps { scale, rotate, translate };
-        self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
+        self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
     fn world(self) -> World {
         let token = CancelToken::new();
-        let geometry = Geometry::of_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
+        let geometry = Geometry::from_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
         let geometry = Arc::new(geometry.expect("never canceled"));
-        let lights = lights(&self.scene, &geometry, &Images::new(), None, &token).expect("never canceled");
+        let lights =
+            build_lights(&self.scene, &geometry, &Images::new(), None, &token).expect("never canceled");
         World::new(
             &self.scene,
             &WorldInputs { meshes: self.meshes, ..WorldInputs::default() },
@@ -72,7 +73,7 @@ impl SceneBuilder {
 }
 
 /// The cube from −1 to 1, each face divided into `steps` × `steps` squares.
-fn block(steps: u32) -> TriangleMesh {
+fn cube_mesh(steps: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for axis in 0..3 {
         for side in [-1.0_f32, 1.0] {
@@ -95,8 +96,8 @@ fn block(steps: u32) -> TriangleMesh {
 }
 
 /// The cube projected onto the unit sphere.
-fn ball(steps: u32) -> TriangleMesh {
-    let mut mesh = block(steps);
+fn sphere_mesh(steps: u32) -> TriangleMesh {
+    let mut mesh = cube_mesh(steps);
     mesh.positions.iter_mut().for_each(|place| *place = place.normalize());
     mesh
 }
@@ -115,13 +116,13 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
         mesh.positions.iter().map(|own| own.as_dvec3() + at).collect()
     };
     let plane = Shape::Plane { point: v(0.0, 0.0, -1.0), normal: DVec3::Z };
-    let (fine, coarse) = (ball(9), block(3));
+    let (fine, coarse) = (sphere_mesh(9), cube_mesh(3));
     let corners = |half: f64| {
         (0..8)
             .map(|i| v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * (2.0 * half) - half)
             .collect::<Vec<_>>()
     };
-    let turned = random.place() * 90.0;
+    let turned = random.random_point() * 90.0;
     let rotated = crate::math::transform::rotation_xyz(turned);
     let scenes = vec![
         // Blocks on a floor, side by side.
@@ -242,14 +243,14 @@ fn isolated_regions_match_the_full_search() {
             let target = match round % 4 {
                 0 => one,
                 1 => one + (other - one) * random.unit(),
-                2 => one + random.place() * 0.1_f64.powf(1.0 + 5.0 * random.unit()),
-                _ => random.place() * 1.2,
+                2 => one + random.random_point() * 0.1_f64.powf(1.0 + 5.0 * random.unit()),
+                _ => random.random_point() * 1.2,
             };
-            let from = random.place().normalize()
+            let from = random.random_point().normalize()
                 * if round % 3 == 0 { 0.2 } else { 3.0 + 40.0 * random.unit().powi(4) };
             let ray = Ray::new(from.as_vec3(), (target - from).normalize().as_vec3());
-            let Some(hit) = world.geometry.closest(&ray) else { continue };
-            if !world.is_glass(world.material_index(&hit) as u32) {
+            let Some(hit) = world.geometry.closest_hit(&ray) else { continue };
+            if !world.is_glass_material(world.material_index(&hit) as u32) {
                 continue;
             }
             let surface = world.geometry.requested_surface(&ray, &hit, SurfaceRequest::ALL);
@@ -264,14 +265,15 @@ fn isolated_regions_match_the_full_search() {
             let found = |only_hit: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
                 let (mut memory, mut near) = (CoincidenceScratch::default(), Vec::new());
                 let error = if only_hit {
-                    world.geometry.hit_candidate(&at, &mut memory)
+                    world.geometry.set_hit_as_candidate(&at, &mut memory)
                 } else {
                     world.geometry.find_candidates(&at, &mut memory, &world.enclosing_glass)
                 };
                 (world.classify_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
-            let is_isolated = world.geometry.is_isolated(&hit, at.surface, world.geometry.margin(&at));
+            let is_isolated =
+                world.geometry.is_isolated(&hit, at.surface, world.geometry.coincidence_margin(&at));
             if is_isolated {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
@@ -304,9 +306,9 @@ fn nested_sphere_search_takes_log_squared_time() {
         let mut random = SceneRandom(3);
         let mut memory = CoincidenceScratch::default();
         for _ in 0..200 {
-            let from = (v(0.1, 0.2, 0.3) + random.place() * 1.5).as_vec3();
-            let ray = Ray::new(from, random.place().normalize().as_vec3());
-            let Some(hit) = world.geometry.closest(&ray) else { continue };
+            let from = (v(0.1, 0.2, 0.3) + random.random_point() * 1.5).as_vec3();
+            let ray = Ray::new(from, random.random_point().normalize().as_vec3());
+            let Some(hit) = world.geometry.closest_hit(&ray) else { continue };
             let surface = world.geometry.surface(&ray, &hit);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
@@ -324,7 +326,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             let bound = 1.5 * f64::from(count).log2().powi(2);
             assert!(f64::from(found) <= bound, "{found} of {count}");
             // Check that the listed spheres include the spheres that determine the medium.
-            let glasses = world.closed_glasses().map(|(object, _)| object);
+            let glasses = world.closed_glass_shapes().map(|(object, _)| object);
             let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
             let enclosing: Vec<_> = enclosing.collect();
             around.sort_unstable();

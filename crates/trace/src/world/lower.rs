@@ -3,38 +3,41 @@
 use std::sync::Arc;
 
 use super::textures::{
-    CutoffBits, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_use, file_opacity_use, file_source,
-    material_source,
+    CutoffBits, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_use, file_opacity_use,
+    file_texture_source, material_texture_source,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, ScaleAndOffset, Texture, TextureFilter, UvTransform, Wrap};
+use crate::materials::texture::{ColorParameter, ScaleAndOffset, Texture, TextureFilter, UvTransform, Wrap};
 use crate::materials::{
     Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
-    NormalMap, NormalPerturbation, Number, Opacity, Phong, Plastic, Principled, PrincipledInputs, Rough,
-    ThinDielectric, UvSet,
+    NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled, PrincipledInputs,
+    ScalarParameter, ThinDielectric, UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelValue, Scene, TextureRole, TextureUse,
+    self, ChannelSelector, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelInterpretation,
+    Scene, TextureRole,
 };
 
 /// Converts a material from the scene file.
-pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
+pub fn lower_material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let of = SceneTextureLookup { scene, images, material };
     let color = |source: &ColorSource| of.color(source);
     let number = |source: &NumberSource| of.number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
-        MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Rough(Rough::Phong(Phong {
-            diffuse: color(diffuse),
-            specular: color(specular),
-            shininess: *shininess,
-            ambient: ambient.as_ref().map(color),
-        })),
+        MaterialKind::Phong { diffuse, specular, shininess, ambient } => {
+            Bsdf::NonSpecular(NonSpecular::Phong(Phong {
+                diffuse: color(diffuse),
+                specular: color(specular),
+                shininess: *shininess,
+                ambient: ambient.as_ref().map(color),
+            }))
+        }
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy } => {
-            metal(fresnel_of(fresnel, color), number(roughness), number(anisotropy))
+            metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy))
         }
         MaterialKind::Plastic { diffuse, specular, ior, roughness } => {
             plastic(color(diffuse), color(specular), number(roughness), *ior)
@@ -49,7 +52,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             transmission,
             clearcoat,
             clearcoat_roughness,
-        } => Bsdf::Rough(Rough::Principled(Box::new(Principled::new(PrincipledInputs {
+        } => Bsdf::NonSpecular(NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
             color: color(base),
             metallic: number(metallic),
             roughness: number(roughness),
@@ -67,27 +70,27 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             Bsdf::ThinDielectric(ThinDielectric { ior: *ior, tint: color(tint) })
         }
     };
-    let emission = emission(scene, images, material);
+    let emission = lower_emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
         texture: of.texture(map.texture, TextureRole::NormalMap),
         strength: map.strength,
     });
     let bump = material.bump.map(|bump| Bump {
-        texture: of.texture(bump.texture, TextureRole::Bump(bump.number())),
+        texture: of.texture(bump.texture, TextureRole::Bump(bump.pixel_value())),
         scale: bump.scale,
     });
     let normal_perturbation = NormalPerturbation::new(normal_map, bump);
-    Material { bsdf, emission, normal_perturbation, opacity: opacity(scene, images, material) }
+    Material { bsdf, emission, normal_perturbation, opacity: lower_opacity(scene, images, material) }
 }
 
 /// Opacity of a material from the scene file. `None` if it is fully opaque.
-pub fn opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
+pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
     let source = &material.opacity;
     if source.is_opaque() {
         return None;
     }
     let (value, cutoff) = match source.texture() {
-        None => (Number::Constant(source.value.constant()?), source.cutoff),
+        None => (ScalarParameter::Constant(source.value.constant()?), source.cutoff),
         Some((index, number)) => {
             let of = SceneTextureLookup { scene, images, material };
             let texture = of.texture(index, TextureRole::Opacity(number));
@@ -95,30 +98,34 @@ pub fn opacity(scene: &Scene, images: &Images, material: &description::Material)
             let coverage = coverage_cutoff(scene, index, source.cutoff);
             let factor = texture.factor.filter(|_| coverage.is_none());
             let texture = Arc::new(Texture { factor, ..(*texture).clone() });
-            (Number::Texture(texture), coverage.map_or(source.cutoff, CutoffBits::value))
+            (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, CutoffBits::value))
         }
     };
     Some(Opacity { value, cutoff })
 }
 
 /// A metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
-fn metal(fresnel: ConductorFresnel, roughness: Number, anisotropy: Number) -> Bsdf {
-    if roughness.constant() == Some(0.0) {
+fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: ScalarParameter) -> Bsdf {
+    if roughness.as_constant() == Some(0.0) {
         return Bsdf::Mirror(Mirror::Conductor(fresnel));
     }
-    let is_brushed = anisotropy.constant() != Some(0.0);
+    let is_brushed = anisotropy.as_constant() != Some(0.0);
     let metal = Conductor { fresnel, roughness, anisotropy };
-    Bsdf::Rough(if is_brushed { Rough::BrushedConductor(metal) } else { Rough::Conductor(metal) })
+    Bsdf::NonSpecular(if is_brushed {
+        NonSpecular::BrushedConductor(metal)
+    } else {
+        NonSpecular::Conductor(metal)
+    })
 }
 
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
-fn plastic(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Bsdf {
-    let is_smooth = roughness.constant() == Some(0.0);
-    let base = Rough::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
-    if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::Rough(base) }
+fn plastic(diffuse: ColorParameter, specular: ColorParameter, roughness: ScalarParameter, ior: f32) -> Bsdf {
+    let is_smooth = roughness.as_constant() == Some(0.0);
+    let base = NonSpecular::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
+    if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::NonSpecular(base) }
 }
 
-fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> ConductorFresnel {
+fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorParameter) -> ConductorFresnel {
     match source {
         FresnelSource::Schlick(reflectance) => ConductorFresnel::Schlick(color(reflectance)),
         FresnelSource::Index { eta, k } => ConductorFresnel::Index { eta: color(eta), k: color(k) },
@@ -126,7 +133,7 @@ fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> 
 }
 
 /// Emission of a material from the scene file.
-pub fn emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
+pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
     let (emission, of) = (&material.emission, SceneTextureLookup { scene, images, material });
     let coat = material.emission_coat().and_then(|numbers| {
         let [weight, roughness] = numbers.map(|number| of.number(&number, TextureRole::EmissionCoat));
@@ -137,7 +144,7 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
 }
 
 /// Index of refraction and transmittance per unit length of a mesh file's glass. `None` for other materials.
-pub fn file_glass(own: &FileMaterial) -> Option<(f32, DVec3)> {
+pub fn file_glass_properties(own: &FileMaterial) -> Option<(f32, DVec3)> {
     own.is_glass().then(|| (own.ior.clamp(1.0, FileMaterial::MAX_IOR), DVec3::ONE))
 }
 
@@ -147,11 +154,11 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
         return Emission::NONE;
     }
     match &own.emission_texture {
-        None => Emission::constant(own.emission),
+        None => Emission::from_constant(own.emission),
         // If the emission map could not be read, do not emit. Otherwise, the whole surface would emit.
         Some(texture) => match file_texture(images, texture, file_color_use(own, texture)) {
             None => Emission::NONE,
-            texture => Emission { texture, ..Emission::constant(own.emission) },
+            texture => Emission { texture, ..Emission::from_constant(own.emission) },
         },
     }
 }
@@ -164,53 +171,58 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     let texture = own.opacity_texture.as_ref();
     let value =
         match texture.and_then(|texture| file_texture(images, texture, file_opacity_use(own, texture))) {
-            Some(texture) => Number::Texture(texture),
-            None if own.opacity < 1.0 => Number::Constant(own.opacity),
+            Some(texture) => ScalarParameter::Texture(texture),
+            None if own.opacity < 1.0 => ScalarParameter::Constant(own.opacity),
             None => return None,
         };
     Some(Opacity { value, cutoff: 0.0 })
 }
 
 /// Converts a material from a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
-pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
-    let bsdf = match (own.kind(), file_glass(own)) {
+pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
+    let bsdf = match (own.kind(), file_glass_properties(own)) {
         (FileMaterialKind::Mirror, _) => {
-            Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE))))
+            Bsdf::Mirror(Mirror::Constant(ColorParameter::Constant(own.specular.min(Vec3::ONE))))
         }
         (FileMaterialKind::Coated, _) => file_coated(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
-            Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(Number::Constant(roughness)))
+            Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(ScalarParameter::Constant(roughness)))
         }
         (FileMaterialKind::Principled(physical), _) => {
-            return file_surface(images, own, file_principled(images, own, physical));
+            return file_rough_material(images, own, file_principled(images, own, physical));
         }
         (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
-            return file_surface(images, own, file_phong(images, own));
+            return file_rough_material(images, own, file_phong(images, own));
         }
     };
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
-fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
+fn file_rough_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
-        let texture = file_texture(images, texture, TextureUse::Normal)?;
+        let texture = file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Gray images are height maps. Ignore them because the file does not specify the scale.
     let normals = normals.filter(|map| !map.texture.texels.is_gray());
     Material {
-        bsdf: Bsdf::Rough(rough),
+        bsdf: Bsdf::NonSpecular(rough),
         emission: file_emission(images, own),
         normal_perturbation: NormalPerturbation::new(normals, None),
         opacity: file_opacity(images, own),
     }
 }
 
-fn file_color(images: &Images, own: &FileMaterial, texture: Option<&FileTexture>, constant: Vec3) -> Color {
+fn file_color(
+    images: &Images,
+    own: &FileMaterial,
+    texture: Option<&FileTexture>,
+    constant: Vec3,
+) -> ColorParameter {
     let texture = texture.and_then(|texture| file_texture(images, texture, file_color_use(own, texture)));
-    texture.map_or(Color::Constant(constant), Color::Texture)
+    texture.map_or(ColorParameter::Constant(constant), ColorParameter::Texture)
 }
 
 /// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
@@ -219,24 +231,24 @@ fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
     let specular = own.specular.min(Vec3::ONE);
     let root = specular.max_element().min(FileMaterial::MAX_COAT).sqrt();
     let diffuse = file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
-    let tint = Color::Constant(specular / specular.max_element());
-    plastic(diffuse, tint, Number::Constant(0.0), (1.0 + root) / (1.0 - root))
+    let tint = ColorParameter::Constant(specular / specular.max_element());
+    plastic(diffuse, tint, ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root))
 }
 
-fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
+fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
     let scale = 2.0 / (own.shininess + 2.0);
     let specular = match own.has_highlight() {
         true => match file_color(images, own, own.specular_texture.as_ref(), own.specular) {
-            Color::Constant(specular) => Color::Constant(specular * scale),
-            Color::Texture(texture) => {
+            ColorParameter::Constant(specular) => ColorParameter::Constant(specular * scale),
+            ColorParameter::Texture(texture) => {
                 let mut texture = Arc::unwrap_or_clone(texture);
                 texture.factor = Some(texture.factor.unwrap_or(ScaleAndOffset::IDENTITY).scaled_by(scale));
-                Color::Texture(Arc::new(texture))
+                ColorParameter::Texture(Arc::new(texture))
             }
         },
-        false => Color::Constant(Vec3::ZERO),
+        false => ColorParameter::Constant(Vec3::ZERO),
     };
-    Rough::Phong(Phong {
+    NonSpecular::Phong(Phong {
         diffuse: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse),
         specular,
         shininess: own.shininess,
@@ -245,34 +257,34 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
 }
 
 /// Principled material from a mesh file. An index of refraction of 1 or less means "unspecified".
-fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
+fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> NonSpecular {
     let number = |texture: &Option<FileTexture>, constant: f32| {
         let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
-        texture.map_or(Number::Constant(constant), Number::Texture)
+        texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
     };
-    Rough::Principled(Box::new(Principled::new(PrincipledInputs {
+    NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
         color: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE)),
         metallic: number(&physical.metallic_texture, physical.metallic),
         roughness: number(&physical.roughness_texture, physical.roughness),
         ior: if own.ior > 1.0 { own.ior.min(FileMaterial::MAX_IOR) } else { FileMaterial::DEFAULT_IOR },
-        specular: Number::Constant(1.0),
-        specular_color: Color::Constant(Vec3::ONE),
-        transmission: Number::Constant(0.0),
-        clearcoat: Number::Constant(physical.clearcoat),
-        clearcoat_roughness: Number::Constant(physical.clearcoat_roughness),
+        specular: ScalarParameter::Constant(1.0),
+        specular_color: ColorParameter::Constant(Vec3::ONE),
+        transmission: ScalarParameter::Constant(0.0),
+        clearcoat: ScalarParameter::Constant(physical.clearcoat),
+        clearcoat_roughness: ScalarParameter::Constant(physical.clearcoat_roughness),
     })))
 }
 
 /// Material for triangles to which the mesh file does not assign a material.
 pub fn fallback_material() -> Material {
     let phong = Phong {
-        diffuse: Color::Constant(Vec3::splat(0.7)),
-        specular: Color::Constant(Vec3::ZERO),
+        diffuse: ColorParameter::Constant(Vec3::splat(0.7)),
+        specular: ColorParameter::Constant(Vec3::ZERO),
         shininess: 1.0,
         ambient: None,
     };
     Material {
-        bsdf: Bsdf::Rough(Rough::Phong(phong)),
+        bsdf: Bsdf::NonSpecular(NonSpecular::Phong(phong)),
         emission: Emission::NONE,
         normal_perturbation: None,
         opacity: None,
@@ -288,20 +300,20 @@ struct SceneTextureLookup<'a> {
 }
 
 impl SceneTextureLookup<'_> {
-    fn color(self, source: &ColorSource) -> Color {
+    fn color(self, source: &ColorSource) -> ColorParameter {
         match source {
-            ColorSource::Constant(color) => Color::Constant(*color),
+            ColorSource::Constant(color) => ColorParameter::Constant(*color),
             // Textures are used in the same way for all color roles.
-            ColorSource::Texture(index) => Color::Texture(self.texture(*index, TextureRole::Facets)),
+            ColorSource::Texture(index) => ColorParameter::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
 
     /// Scalar parameter. Uses the texture's luminance if the scene does not specify a channel.
-    fn number(self, source: &NumberSource, role: fn(PixelValue) -> TextureRole) -> Number {
-        match (source.constant(), source.texture(PixelValue::Luminance)) {
-            (Some(number), _) => Number::Constant(number),
-            (None, Some((texture, number))) => Number::Texture(self.texture(texture, role(number))),
-            (None, None) => Number::Constant(1.0),
+    fn number(self, source: &NumberSource, role: fn(ChannelSelector) -> TextureRole) -> ScalarParameter {
+        match (source.constant(), source.texture(ChannelSelector::Luminance)) {
+            (Some(number), _) => ScalarParameter::Constant(number),
+            (None, Some((texture, number))) => ScalarParameter::Texture(self.texture(texture, role(number))),
+            (None, None) => ScalarParameter::Constant(1.0),
         }
     }
 
@@ -310,15 +322,17 @@ impl SceneTextureLookup<'_> {
         let declared = &scene.textures[index];
         let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
         let Image { texels, mipmaps } =
-            loaded_image(images, &material_source(scene, material, (index, role)));
+            loaded_image(images, &material_texture_source(scene, material, (index, role)));
         let mipmaps = match filter {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
             TextureFilter::Mipmap => mipmaps,
         };
         let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
-        let factor = match role.texture_use() {
-            TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => ScaleAndOffset::new(factor),
-            TextureUse::Normal => None,
+        let factor = match role.pixel_interpretation() {
+            PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
+                ScaleAndOffset::new(factor)
+            }
+            PixelInterpretation::Normal => None,
         };
         Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
     }
@@ -326,14 +340,14 @@ impl SceneTextureLookup<'_> {
 
 /// Texture from a mesh file. `None` if the image was not loaded, either because it is not needed or because
 /// it could not be read.
-fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Option<Arc<Texture>> {
-    let texels = images.get(&file_source(texture, used))?.texels.clone();
+fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretation) -> Option<Arc<Texture>> {
+    let texels = images.get(&file_texture_source(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
     let factor = match used {
-        TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => {
-            ScaleAndOffset::with_base(Vec3::splat(gain), Vec3::splat(base))
+        PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
+            ScaleAndOffset::with_offset(Vec3::splat(gain), Vec3::splat(base))
         }
-        TextureUse::Normal => None,
+        PixelInterpretation::Normal => None,
     };
     Some(Arc::new(Texture {
         texels,

@@ -2,14 +2,14 @@
 //! there are few triangles in total, packets test them using a [`TriangleList`] without a tree.
 //!
 //! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
-//! [`Geometry::visit_nodes`](super::Geometry::visit_nodes) use the per-mesh trees. Hits on untransformed
+//! [`Geometry::visit_nodes_along_ray`](super::Geometry::visit_nodes_along_ray) use the per-mesh trees. Hits on untransformed
 //! instances are bit-identical to those on unmerged meshes.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
 use crate::geometry::triangle_list::{self, TriangleList};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -64,10 +64,13 @@ impl MergedMeshes {
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
+    pub fn merge_small_meshes(
+        objects: &mut [Object],
+        token: &CancelToken,
+    ) -> Result<Option<Self>, Cancelled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
-        let least = least_size(objects);
+        let least = min_object_size(objects);
         let mut chosen: Vec<usize> =
             (0..objects.len()).filter(|&id| may_be_merged(&objects[id], least)).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
@@ -145,19 +148,19 @@ impl MergedMeshes {
 
     /// Tree index of an object's triangle, or `None` if the object is not merged.
     #[inline(always)]
-    pub fn number(&self, object: u32, primitive: u32) -> Option<u32> {
+    pub fn tree_index(&self, object: u32, primitive: u32) -> Option<u32> {
         let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
         Some(first + primitive)
     }
 
     /// Returns the nearest hit. The hit's primitive is a triangle index into the tree.
-    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
-        self.tree.closest(ray)
+    pub fn closest_hit(&self, ray: &Ray) -> Option<ShapeHit> {
+        self.tree.closest_hit(ray)
     }
 
     /// Whether the ray hits any triangle except `except`.
-    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
-        self.tree.any(ray, except)
+    pub fn any_hit(&self, ray: &Ray, except: Option<u32>) -> bool {
+        self.tree.any_hit(ray, except)
     }
 
     /// Invalid triangle number.
@@ -166,37 +169,37 @@ impl MergedMeshes {
     /// Finds the nearest hits of the rays in `met`. The hits' primitives are triangle indices into the tree.
     /// Other lanes have negative `ends`.
     #[inline(never)]
-    pub fn closest_rows(
+    pub fn closest_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
         (met, ends): (u32, &F32x16),
         found: &mut HitPacket,
     ) {
-        let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
+        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, met, ends, found) };
         let size = self.bounds().extent();
-        match by.run(ClosestFacet { facets, size, rows, met, ends, found }) {
+        match by.run(ClosestFacetKernel { facets, size, rows, met, ends, found }) {
             Some(0) => {}
-            Some(undecided) => self.closest_of_each(rows, undecided, ends, found),
-            None => self.closest_by_tree(rows, met, ends, found),
+            Some(undecided) => self.closest_hit_one_by_one(rows, undecided, ends, found),
+            None => self.closest_hit_by_tree(rows, met, ends, found),
         }
     }
 
     /// Traces the rays in `these` one by one.
     #[cold]
     #[inline(never)]
-    fn closest_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
-        for lane in lanes(these) {
-            if let Some(hit) = self.tree.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
+    fn closest_hit_one_by_one(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
+        for lane in lane_indices(these) {
+            if let Some(hit) = self.tree.closest_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 found.set(lane, &hit);
             }
         }
     }
 
     #[inline(never)]
-    fn closest_by_tree(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn closest_hit_by_tree(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
+        self.tree.closest_hit_packet(&unpack_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -207,24 +210,24 @@ impl MergedMeshes {
     /// Returns the mask of rays in `met` that hit any triangle other than the lane's entry in `except`, which
     /// may be [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
-    pub fn any_rows(
+    pub fn any_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
         (met, ends): (u32, &F32x16),
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
+        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(AnyFacet { facets, size, rows, met, ends, except: own }) {
+        match by.run(AnyFacetKernel { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
-            None => self.any_by_tree(rows, met, ends, except),
+            None => self.any_hit_by_tree(rows, met, ends, except),
         }
     }
 
-    /// Traces the rays in `these` one by one. See [`MergedMeshes::any_rows`].
+    /// Traces the rays in `these` one by one. See [`MergedMeshes::any_hit_packet`].
     #[cold]
     #[inline(never)]
     fn any_hit_one_by_one(
@@ -236,23 +239,23 @@ impl MergedMeshes {
     ) -> u32 {
         let is_hit = |&lane: &usize| {
             let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
-            self.tree.any(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
+            self.tree.any_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
         };
-        lanes(these).filter(is_hit).fold(0, |bits, lane| bits | 1 << lane)
+        lane_indices(these).filter(is_hit).fold(0, |bits, lane| bits | 1 << lane)
     }
 
     #[inline(never)]
-    fn any_by_tree(
+    fn any_hit_by_tree(
         &self,
         rows: &RayPacket,
         met: u32,
         ends: &F32x16,
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let rays = rays(rows, met);
-        let Some(numbers) = except else { return self.tree.any_packet(&rays, ends, &[]) };
+        let rays = unpack_rays(rows, met);
+        let Some(numbers) = except else { return self.tree.any_hit_packet(&rays, ends, &[]) };
         let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
-        self.tree.any_packet(&rays, ends, &own)
+        self.tree.any_hit_packet(&rays, ends, &own)
     }
 
     /// Memory used by the tree and its tables, in bytes.
@@ -285,9 +288,9 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
 /// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// Calls [`TriangleList::closest`] for incoherent rays. Returns the lanes that need an exact test, or `None`
+/// Calls [`TriangleList::closest_hit_packet`] for incoherent rays. Returns the lanes that need an exact test, or `None`
 /// for coherent rays.
-struct ClosestFacet<'a> {
+struct ClosestFacetKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -296,7 +299,7 @@ struct ClosestFacet<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for ClosestFacet<'_> {
+impl SimdKernel for ClosestFacetKernel<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]
@@ -305,13 +308,13 @@ impl SimdKernel for ClosestFacet<'_> {
         if are_coherent(rows, met, size, simd) {
             return None;
         }
-        Some(facets.closest(rows, (met, ends), found, simd))
+        Some(facets.closest_hit_packet(rows, (met, ends), found, simd))
     }
 }
 
-/// Calls [`TriangleList::any`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
+/// Calls [`TriangleList::any_hit_packet`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
 /// test, or `None` for coherent rays.
-struct AnyFacet<'a> {
+struct AnyFacetKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -320,7 +323,7 @@ struct AnyFacet<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for AnyFacet<'_> {
+impl SimdKernel for AnyFacetKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]
@@ -329,23 +332,23 @@ impl SimdKernel for AnyFacet<'_> {
         if are_coherent(rows, met, size, simd) {
             return None;
         }
-        Some(facets.any(rows, (met, ends), except, simd))
+        Some(facets.any_hit_packet(rows, (met, ends), except, simd))
     }
 }
 
 /// Returns the rays of a packet. Lanes outside `met` contain a copy of the first ray in `met`, whose
 /// direction is likely similar.
 #[inline]
-fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
+fn unpack_rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
-    for lane in lanes(met & met.wrapping_sub(1)) {
+    for lane in lane_indices(met & met.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);
     }
     rays
 }
 
 /// Size of the smallest finite object, or infinity if there is none.
-fn least_size(objects: &[Object]) -> f32 {
+fn min_object_size(objects: &[Object]) -> f32 {
     let bounds = objects.iter().filter_map(Object::bounds).filter(|bounds| !bounds.is_empty());
     let sizes = bounds.map(|bounds| bounds.extent().max_element());
     sizes.filter(|size| *size > 0.0).fold(f32::INFINITY, f32::min)
@@ -375,7 +378,7 @@ pub(super) mod tests {
     use crate::geometry::ray::offset_origin;
     use crate::lights::LightGeometry;
     use crate::math::DVec3;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
     use crate::world::{Geometry, Hit, MeshTree};
@@ -432,10 +435,10 @@ pub(super) mod tests {
         let below = turned.point(DVec3::NEG_Y * 9.0);
         let away = Transform::scale_rotate_translate(DVec3::ONE, DVec3::ZERO, below);
         let geometry = geometry(objects(&[(&ground, turned), (&small, away), (&small, away)]));
-        assert!(geometry.has_merged());
+        assert!(geometry.has_merged_meshes());
         let up = turned.point(DVec3::Y) - shift;
         for ray in rays(8).iter().map(|ray| Ray::new(ray.origin + up.as_vec3() * 5.0, -up.as_vec3())) {
-            let hit = geometry.closest(&ray).expect("the ground");
+            let hit = geometry.closest_hit(&ray).expect("the ground");
             let exact = (ray.origin.as_dvec3() - shift).dot(up);
             assert_eq!(hit.object, 0);
             assert!((f64::from(hit.shape.t) - exact).abs() < 1e-4, "{} {exact}", hit.shape.t);
@@ -449,25 +452,25 @@ pub(super) mod tests {
         let of: Vec<_> = [0, 1, 1, 2].iter().map(|&i| (&trees[i], Transform::IDENTITY)).collect();
         let geometry = geometry(objects(&of));
         let alone = objects(&of);
-        assert!(geometry.has_merged());
+        assert!(geometry.has_merged_meshes());
         let (mut hits, mut blocked) = (0, 0);
         for ray in rays(4) {
-            let each = (0_u32..)
-                .zip(&alone)
-                .filter_map(|(object, own)| Some(Hit { shape: own.closest(&ray, &ray.to_f64())?, object }));
+            let each = (0_u32..).zip(&alone).filter_map(|(object, own)| {
+                Some(Hit { shape: own.closest_hit(&ray, &ray.to_f64())?, object })
+            });
             let expected = each.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
-            let found = geometry.closest(&ray);
+            let found = geometry.closest_hit(&ray);
             assert_eq!(found, expected, "{ray:?}");
             // Ignoring the hit triangle results in a hit on another triangle.
             if let Some(hit) = found {
-                let next = geometry.closest(&ray.with_start_triangle(geometry.triangle_number(&hit)));
+                let next = geometry.closest_hit(&ray.with_start_triangle(geometry.triangle_number(&hit)));
                 let is_own =
                     |next: Hit| (next.object, next.shape.primitive) == (hit.object, hit.shape.primitive);
                 assert!(!next.is_some_and(is_own), "{ray:?}");
                 assert!(next.is_none_or(|next| next.shape.t >= hit.shape.t), "{ray:?}");
             }
             hits += u32::from(found.is_some());
-            let nothing = Hit { shape: ShapeHit::at(0.0), object: 3 };
+            let nothing = Hit { shape: ShapeHit::from_t(0.0), object: 3 };
             let Hit { shape, object } = found.unwrap_or(nothing);
             for source in [
                 LightGeometry::Nothing,
@@ -475,12 +478,12 @@ pub(super) mod tests {
                 LightGeometry::Primitive(object, shape.primitive),
             ] {
                 let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
-                    LightGeometry::Nothing => own.any(&ray, &ray.to_f64(), None),
+                    LightGeometry::Nothing => own.any_hit(&ray, &ray.to_f64(), None),
                     LightGeometry::Object(except) | LightGeometry::SeeThrough(except) => {
-                        id != except && own.any(&ray, &ray.to_f64(), None)
+                        id != except && own.any_hit(&ray, &ray.to_f64(), None)
                     }
                     LightGeometry::Primitive(of, part) => {
-                        own.any(&ray, &ray.to_f64(), (id == of).then_some(part))
+                        own.any_hit(&ray, &ray.to_f64(), (id == of).then_some(part))
                     }
                 });
                 assert_eq!(geometry.occluded(&ray, source), any, "{ray:?} {source:?}");
@@ -515,20 +518,20 @@ pub(super) mod tests {
             (&tree, turned(DVec3::new(-71.0, 5.0, 19.0), DVec3::splat(1e-3))),
         ];
         let geometry = geometry(objects(&of));
-        assert!(geometry.has_merged());
+        assert!(geometry.has_merged_meshes());
         let mut next = random(9);
         let (mut started, mut again) = (0, 0);
         for _ in 0..4000 {
             let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
             let ray = Ray { t_max: f32::INFINITY, ..Ray::segment(vector(1.0), vector(0.02)) };
-            let Some(hit) = geometry.closest(&ray) else { continue };
+            let Some(hit) = geometry.closest_hit(&ray) else { continue };
             let surface = geometry.surface(&ray, &hit);
             for side in [1.0, -1.0] {
                 let direction = vector(1.0).normalize();
                 let direction =
                     direction * if direction.dot(surface.normal) * side < 0.0 { -1.0 } else { 1.0 };
                 let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
-                let met = geometry.closest(&Ray::new(origin, direction));
+                let met = geometry.closest_hit(&Ray::new(origin, direction));
                 let is_own =
                     |met: Hit| (met.object, met.shape.primitive) == (hit.object, hit.shape.primitive);
                 (started, again) = (started + 1, again + u32::from(met.is_some_and(is_own)));
@@ -545,7 +548,8 @@ pub(super) mod tests {
         let far = Transform::scale_rotate_translate(DVec3::splat(1e-4), DVec3::ZERO, DVec3::splat(9.0));
         let members = |of: &[(&Arc<MeshTree>, Transform)]| {
             let mut objects = objects(of);
-            let merged = MergedMeshes::of_objects(&mut objects, &CancelToken::new()).expect("never canceled");
+            let merged =
+                MergedMeshes::merge_small_meshes(&mut objects, &CancelToken::new()).expect("never canceled");
             merged.map(|merged| (0..of.len() as u32).filter(|&id| merged.has(id)).collect::<Vec<_>>())
         };
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));

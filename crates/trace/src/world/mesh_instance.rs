@@ -7,7 +7,7 @@ use super::mesh_tree::MeshTree;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::{EDGE_MARGIN, PlacedMesh, TrianglePoint};
 use crate::accel::{F32x16, PACKET_SIZE};
-use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::materials::UvSet;
 use crate::math::transform::Transform;
@@ -45,14 +45,14 @@ impl MeshInstance {
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         let start = self.mesh_triangle_number(ray.start);
         if self.is_transformed {
-            self.inverse_transformed(ray).with_start_triangle(start)
+            self.transform_ray_to_mesh(ray).with_start_triangle(start)
         } else {
             ray.with_start_triangle(start)
         }
     }
 
     /// Applies the inverse transform to a ray.
-    fn inverse_transformed(&self, ray: &Ray) -> Ray {
+    fn transform_ray_to_mesh(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
             direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
@@ -62,13 +62,13 @@ impl MeshInstance {
 
     /// Scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::triangle_number).
     #[inline(always)]
-    pub(super) fn scene_number(&self, triangle: u32) -> u32 {
+    pub(super) fn scene_triangle_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
     }
 
-    /// Like `scene_number`, for a packet. Lanes without a triangle contain arbitrary numbers.
+    /// Like `scene_triangle_number`, for a packet. Lanes without a triangle contain arbitrary numbers.
     #[inline(always)]
-    pub fn scene_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+    pub fn scene_triangle_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET_SIZE] };
         triangles.map(|triangle| first.wrapping_add(triangle))
     }
@@ -136,17 +136,21 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.in_corner_order(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
+        self.values_in_corner_order(triangle, self.uvs(UvSet::First)).unwrap_or([
+            Vec2::ZERO,
+            Vec2::X,
+            Vec2::Y,
+        ])
     }
 
     /// UVs of a triangle's corners in the second UV set. `None` without a second set.
     pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
-        self.in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
+        self.values_in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
     }
 
     /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`]. `None` if
     /// `values` is empty.
-    fn in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
+    fn values_in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
         let corners = self.tree.loaded().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
         let (a, b, c) = (a?, b?, c?);
@@ -199,12 +203,12 @@ impl MeshInstance {
     /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => self.surface_in(self.with_placement(&self.transform), ray, hit, asked),
-            false => self.surface_in(self.with_placement(IdentityPlacement), ray, hit, asked),
+            true => self.surface_with_placement(self.with_placement(&self.transform), ray, hit, asked),
+            false => self.surface_with_placement(self.with_placement(IdentityPlacement), ray, hit, asked),
         }
     }
 
-    fn surface_in(
+    fn surface_with_placement(
         &self,
         placed: PlacedMesh<impl MeshPlacement>,
         ray: &RayF64,
@@ -213,9 +217,9 @@ impl MeshInstance {
     ) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
-        let facet = placed.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
+        let facet = placed.triangle_point(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let TrianglePoint { corners: [a, b, c], normal, barycentric, .. } = facet;
-        let [point, error] = match facet.is_doubtful() {
+        let [point, error] = match facet.may_need_correction() {
             true => placed.corrected(&facet, ray, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
@@ -229,8 +233,8 @@ impl MeshInstance {
             let normals = self.tree.normals();
             let normals = vertices.map(|vertex| normals[vertex]);
             shading_normal = placed.shading_normal(&facet, &normals);
-            if asked.shadow_point && !placed.is_on_ray(&facet, ray) {
-                shadow_point = placed.shadow_point(&facet, &normals, ray.direction);
+            if asked.shadow_point && !placed.uses_point_from_ray(&facet, ray) {
+                shadow_point = placed.lifted_shadow_origin(&facet, &normals, ray.direction);
             }
         }
         SurfacePoint {
@@ -272,9 +276,15 @@ impl MeshInstance {
 
     /// Finds the nearest hits of the rays in `met`. Other lanes have negative `ends`.
     #[inline(never)]
-    pub(super) fn closest_rows(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+    pub(super) fn closest_hit_packet(
+        &self,
+        rows: &RayPacket,
+        met: u32,
+        ends: &F32x16,
+        found: &mut HitPacket,
+    ) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.triangles().closest_packet(&self.local_rays(rows, met), ends, &mut hits);
+        self.tree.triangles().closest_hit_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -283,9 +293,9 @@ impl MeshInstance {
     }
 
     /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle (see `except`
-    /// in [`Object::any_rows`](super::Object::any_rows)).
+    /// in [`Object::any_hit_packet`](super::Object::any_hit_packet)).
     #[inline(never)]
-    pub(super) fn any_rows(
+    pub(super) fn any_hit_packet(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -293,10 +303,12 @@ impl MeshInstance {
         except: Option<(u32, &[u32; PACKET_SIZE])>,
     ) -> u32 {
         let local = self.local_rays(rows, met);
-        let Some((own, numbers)) = except else { return self.tree.triangles().any_packet(&local, ends, &[]) };
+        let Some((own, numbers)) = except else {
+            return self.tree.triangles().any_hit_packet(&local, ends, &[]);
+        };
         let mut parts = [None; PACKET_SIZE];
-        lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
-        self.tree.triangles().any_packet(&local, ends, &parts)
+        lane_indices(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
+        self.tree.triangles().any_hit_packet(&local, ends, &parts)
     }
 
     /// Transforms the rays in `met` to mesh coordinates. Other lanes contain a copy of the first ray in
@@ -306,10 +318,10 @@ impl MeshInstance {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
             let ray = ray.with_start_triangle(self.mesh_triangle_number(ray.start));
-            if self.is_transformed { self.inverse_transformed(&ray) } else { ray }
+            if self.is_transformed { self.transform_ray_to_mesh(&ray) } else { ray }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
-        for lane in lanes(met & met.wrapping_sub(1)) {
+        for lane in lane_indices(met & met.wrapping_sub(1)) {
             rays[lane] = local(lane);
         }
         rays
@@ -322,7 +334,7 @@ mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::scene::description::Accel;
 
     #[test]

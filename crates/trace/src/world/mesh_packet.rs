@@ -4,7 +4,7 @@ use super::MeshInstance;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::PlacedMesh;
 use crate::accel::{PACKET_SIZE, SimdKernel};
-use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::UvSet;
 use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
@@ -27,7 +27,7 @@ impl MeshInstance {
     }
 
     #[inline(always)]
-    fn fill_placed(
+    fn fill_placed_surfaces(
         &self,
         placed: PlacedMesh<impl MeshPlacement>,
         surface: &mut SurfacePacket,
@@ -48,11 +48,11 @@ impl MeshInstance {
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
         let (mut found, mut doubtful) = (SurfacePacket::EMPTY, [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+            let facet = placed.triangle_point(corners_of(i), [hits.u[i], hits.v[i]]);
             set_lane(&mut found.point, i, facet.point);
             set_lane(&mut found.error, i, facet.error);
             set_lane(&mut found.normal, i, facet.normal);
-            doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
+            doubtful[i] = if facet.may_need_correction() { TRUE } else { 0 };
         }
         // Hits near an edge or in a huge triangle are rare.
         let doubtful = simd.movemask(&doubtful) & of;
@@ -65,16 +65,16 @@ impl MeshInstance {
             let normals = gather_vertex_attributes(&vertices, self.tree.normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
             for i in 0..PACKET_SIZE {
-                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                let facet = placed.triangle_point(corners_of(i), [hits.u[i], hits.v[i]]);
                 set_lane(&mut found.shading_normal, i, placed.shading_normal(&facet, &normals_of(i)));
             }
             for i in 0..PACKET_SIZE {
-                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                let facet = placed.triangle_point(corners_of(i), [hits.u[i], hits.v[i]]);
                 let direction = lane(&rays.direction, i).as_dvec3();
-                let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
+                let lifted = placed.lifted_shadow_origin(&facet, &normals_of(i), direction);
                 set_lane(&mut found.shadow_point, i, lifted);
             }
-            for i in lanes(on_ray) {
+            for i in lane_indices(on_ray) {
                 set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
             surface.copy_shading_normals(of, &found);
@@ -112,7 +112,7 @@ impl SimdKernel for FillSurfaces<'_> {
     fn run(self, simd: impl Simd) {
         let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
         if mesh.is_transformed {
-            mesh.fill_placed(
+            mesh.fill_placed_surfaces(
                 mesh.with_placement(&mesh.transform),
                 surface,
                 (rays, hits),
@@ -121,7 +121,7 @@ impl SimdKernel for FillSurfaces<'_> {
                 simd,
             );
         } else {
-            mesh.fill_placed(
+            mesh.fill_placed_surfaces(
                 mesh.with_placement(IdentityPlacement),
                 surface,
                 (rays, hits),
@@ -145,13 +145,14 @@ fn correct_points(
     found: &mut SurfacePacket,
 ) -> u32 {
     let mut on_ray = 0;
-    for i in lanes(doubtful) {
+    for i in lane_indices(doubtful) {
         let (ray, uv) = (rays.ray(i).to_f64(), [hits.u[i], hits.v[i]]);
-        let facet = placed.facet([lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)], uv);
+        let facet =
+            placed.triangle_point([lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)], uv);
         let [point, error] = placed.corrected(&facet, &ray, uv);
         set_lane(&mut found.point, i, point);
         set_lane(&mut found.error, i, error);
-        on_ray |= if placed.is_on_ray(&facet, &ray) { 1 << i } else { 0 };
+        on_ray |= if placed.uses_point_from_ray(&facet, &ray) { 1 << i } else { 0 };
     }
     on_ray
 }
@@ -185,7 +186,7 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::{Ray, ShapeHit, SurfaceRequest};
     use crate::math::DVec3;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
@@ -280,7 +281,7 @@ mod tests {
                 let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();
                 let mut hits = HitPacket::without_hits();
                 for (i, ray) in rays.iter().enumerate() {
-                    let hit = mesh.tree.triangles().closest(&mesh.local_ray(ray)).expect("the ground");
+                    let hit = mesh.tree.triangles().closest_hit(&mesh.local_ray(ray)).expect("the ground");
                     hits.set(i, &hit);
                 }
                 let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);

@@ -37,8 +37,8 @@ pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, MAX_INTERIORS, OffsetPoints};
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
-pub use distinct_lights::{emissive_meshes, with_distinct_lights};
-pub use emitters::{lights, photon_source, sky_map};
+pub use distinct_lights::{emissive_meshes, separate_coincident_emitters};
+pub use emitters::{build_lights, photon_source, sky_map};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;
@@ -46,17 +46,17 @@ pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use null_interaction::{MAX_NULL_INTERACTIONS, Transmittance};
 pub use object::Object;
-pub use origin::origin;
+pub use origin::choose_scene_origin;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    CutoffBits, NeededTexture, TextureNeeds, TextureSource, environment_source, material_source,
+    CutoffBits, NeededTexture, TextureNeeds, TextureSource, environment_source, material_texture_source,
     textures_needed,
 };
-pub use unlit_glass::LightBox;
+pub use unlit_glass::LightBoundingBoxes;
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::SurfacePoint;
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint};
@@ -193,7 +193,7 @@ impl World {
             ObjectMaterial::One(index) => [index; PACKET_SIZE],
             ObjectMaterial::OfFile { first, fallback } => {
                 let mut materials = [fallback; PACKET_SIZE];
-                for lane in lanes(of) {
+                for lane in lane_indices(of) {
                     let own = self.geometry.file_material(object, primitives[lane]);
                     materials[lane] = own.map_or(fallback, |own| first + own);
                 }
@@ -216,14 +216,14 @@ impl World {
 
     /// Whether an object's vertex colors are used.
     #[inline]
-    pub fn is_colored(&self, object: u32) -> bool {
+    pub fn has_vertex_colors(&self, object: u32) -> bool {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
     /// The vertex color that tints the material at a hit. `None` if vertex colors are not used.
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
-        self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
+        self.has_vertex_colors(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
     /// Texture coordinates at a hit. `footprint` computes their footprint from the tangents.
@@ -234,14 +234,14 @@ impl World {
         surface: &SurfacePoint,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
     ) -> TexturePoint {
-        let second = if self.has_second_uvs { self.second_point(hit, &footprint) } else { None };
+        let second = if self.has_second_uvs { self.second_texture_point(hit, &footprint) } else { None };
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
     /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
-    fn second_point(
+    fn second_texture_point(
         &self,
         hit: &Hit,
         footprint: impl Fn([Vec3; 2]) -> Footprint,

@@ -5,13 +5,13 @@
 //! unoccluded rays that enter the bounding box of a see-through object are then traced from surface to
 //! surface.
 
-use super::packet::Occluders;
+use super::packet::OcclusionTest;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
 use crate::accel::{AnyHitCallback, F32x16};
-use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::packet::{RayPacket, lane_indices};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
-use crate::lights::{LightGeometry, LightObjectPacket};
+use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
@@ -33,7 +33,7 @@ pub(super) struct SeeThroughObjects {
 
 impl SeeThroughObjects {
     /// Collects the world's see-through objects. `None` if there are none.
-    pub(super) fn of(world: &World) -> Option<Self> {
+    pub(super) fn from_world(world: &World) -> Option<Self> {
         let geometry = &world.geometry;
         let has_null_interaction =
             |object: u32| world.materials_of(object).any(Material::has_null_interaction);
@@ -87,9 +87,9 @@ impl World {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
     ) -> Transmittance {
-        self.geometry.instructions().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
+        self.geometry.instruction_set().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
     }
 
     /// Whether a shadow ray's transmittance is zero.
@@ -104,7 +104,7 @@ impl World {
         };
         let is_own = |object: u32| source == LightGeometry::Object(object);
         let stops = |object: u32| !see_through.has(object) && !is_own(object);
-        if self.geometry.closest_of(ray, stops).is_some() {
+        if self.geometry.closest_hit_among(ray, stops).is_some() {
             return Vec3::ZERO;
         }
         self.see_through_transmittance(see_through, ray, source, lookups)
@@ -139,7 +139,7 @@ impl World {
         // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
         while let Some(hit) =
-            self.geometry.closest_of(&ray, |object| see_through.has(object) && !is_own(object))
+            self.geometry.closest_hit_among(&ray, |object| see_through.has(object) && !is_own(object))
         {
             if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
@@ -168,7 +168,7 @@ struct TransmittanceKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a LightObjectPacket,
+    sources: &'a LightGeometryPacket,
 }
 
 impl SimdKernel for TransmittanceKernel<'_> {
@@ -185,23 +185,24 @@ impl SimdKernel for TransmittanceKernel<'_> {
             see_through.is_any_merged || traced & geometry.rays_to_merged_mesh_lights(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
-            for lane in lanes(traced) {
+            for lane in lane_indices(traced) {
                 let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
-                let left = world.transmittance(&ray, sources.source(lane), &mut transmittance.lookups);
+                let left = world.transmittance(&ray, sources.geometry(lane), &mut transmittance.lookups);
                 transmittance.set(lane, left);
             }
             return transmittance;
         }
-        let occluders = Occluders::new(geometry, rows, sources, simd);
-        let mut solid = OpaqueOccluders { occluders, see_through, near: 0 };
-        transmittance.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
+        let occluders = OcclusionTest::new(geometry, rows, sources, simd);
+        let mut solid = OpaqueOcclusionTest { occluders, see_through, near: 0 };
+        transmittance.occluded =
+            tree.any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
         // Trace the rays that may cross see-through surfaces.
-        for lane in lanes(traced & !transmittance.occluded & solid.near) {
+        for lane in lane_indices(traced & !transmittance.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
             let left = world.see_through_transmittance(
                 see_through,
                 &ray,
-                sources.source(lane),
+                sources.geometry(lane),
                 &mut transmittance.lookups,
             );
             transmittance.set(lane, left);
@@ -211,14 +212,14 @@ impl SimdKernel for TransmittanceKernel<'_> {
 }
 
 /// Any-hit test for opaque occluders.
-struct OpaqueOccluders<'a, F> {
-    occluders: Occluders<'a, F>,
+struct OpaqueOcclusionTest<'a, F> {
+    occluders: OcclusionTest<'a, F>,
     see_through: &'a SeeThroughObjects,
     /// Mask of rays that enter the bounding box of a see-through object.
     near: u32,
 }
 
-impl<F: Simd> AnyHitCallback for OpaqueOccluders<'_, F> {
+impl<F: Simd> AnyHitCallback for OpaqueOcclusionTest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if self.see_through.has(id) {

@@ -19,25 +19,25 @@ pub enum Object {
 
 impl Object {
     /// Returns the nearest hit.
-    pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
+    pub fn closest_hit(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64),
-            Self::Mesh(mesh) => mesh.tree.triangles().closest(&mesh.local_ray(ray)),
+            Self::Mesh(mesh) => mesh.tree.triangles().closest_hit(&mesh.local_ray(ray)),
         }
     }
 
     /// Whether the ray hits any primitive of the object except `except`.
-    pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
+    pub fn any_hit(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
-            Self::Mesh(mesh) => mesh.tree.triangles().any(&mesh.local_ray(ray), except),
+            Self::Mesh(mesh) => mesh.tree.triangles().any_hit(&mesh.local_ray(ray), except),
         }
     }
 
     /// Finds the nearest hits of the rays in `met` and writes them to `found`, which must be empty. Lanes
     /// outside `met` have negative `ends`.
     #[inline(always)]
-    pub fn closest_rows(
+    pub fn closest_hit_packet(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -47,15 +47,17 @@ impl Object {
     ) {
         match self {
             Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
-            Self::Mesh(mesh) if mesh.is_small() => mesh.closest_in_small(rows, met, ends, found, simd),
-            Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
+            Self::Mesh(mesh) if mesh.is_small() => {
+                mesh.closest_hit_without_tree(rows, met, ends, found, simd);
+            }
+            Self::Mesh(mesh) => mesh.closest_hit_packet(rows, met, ends, found),
         }
     }
 
     /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`.
     /// `except` contains a lane mask and the primitive to ignore in each selected lane.
     #[inline(always)]
-    pub fn any_rows(
+    pub fn any_hit_packet(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -65,8 +67,10 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) if mesh.is_small() => return mesh.any_in_small(rows, met, ends, except, simd),
-            Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
+            Self::Mesh(mesh) if mesh.is_small() => {
+                return mesh.any_hit_without_tree(rows, met, ends, except, simd);
+            }
+            Self::Mesh(mesh) => return mesh.any_hit_packet(rows, met, ends, except),
         };
         let mut found = HitPacket::without_hits();
         shape.intersect_packet(rows, met, ends, &mut found, simd);
@@ -84,7 +88,7 @@ impl Object {
     pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.requested_surface(&ray, hit, asked),
+            Self::Shape(shape) => shape.requested_surface_point(&ray, hit, asked),
             Self::Mesh(mesh) => mesh.surface(&ray, hit, asked),
         }
     }

@@ -4,22 +4,22 @@ use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
-use crate::geometry::packet::{HitPacket, RayPacket, active_lanes, lanes};
-use crate::lights::{LightGeometry, LightObjectPacket};
+use crate::geometry::packet::{HitPacket, RayPacket, active_lanes, lane_indices};
+use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
-    /// Like [`Geometry::closest`], for up to [`PACKET_SIZE`] rays. `hits` must have the same length as
+    /// Like [`Geometry::closest_hit`], for up to [`PACKET_SIZE`] rays. `hits` must have the same length as
     /// `rays`.
-    pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    pub fn closest_hit_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
-        self.instructions().run(ClosestKernel { geometry: self, rays, hits });
+        self.instruction_set().run(ClosestKernel { geometry: self, rays, hits });
     }
 
-    /// Like [`Geometry::closest_packet`], for callers inside a SIMD kernel. Returns the hits and their
+    /// Like [`Geometry::closest_hit_packet`], for callers inside a SIMD kernel. Returns the hits and their
     /// objects. `traced` is the mask of rays to trace.
     #[inline(always)]
-    pub fn closest_rows(
+    pub fn closest_hit_packet_simd(
         &self,
         rows: &RayPacket,
         ends: &mut F32x16,
@@ -27,16 +27,16 @@ impl Geometry {
         simd: impl Simd,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
         if self.traced_tree().has_shells() {
-            return self.closest_by_each(rows, ends, traced);
+            return self.closest_hit_one_by_one(rows, ends, traced);
         }
-        let mut nearest = ClosestObject {
+        let mut nearest = ClosestHitTest {
             geometry: self,
             rows,
             hits: HitPacket::without_hits(),
             object: [NONE; PACKET_SIZE],
             simd,
         };
-        self.traced_tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
+        self.traced_tree().closest_hit_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
         (nearest.hits, nearest.object)
     }
 
@@ -48,7 +48,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
         simd: impl Simd,
     ) -> u32 {
         simd.call(OcclusionKernel { geometry: self, rows, ends, traced, sources })
@@ -58,29 +58,29 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn rays_to_merged_mesh_lights(&self, sources: &LightObjectPacket) -> u32 {
-        if !sources.is_any || !self.has_merged() {
+    pub(super) fn rays_to_merged_mesh_lights(&self, sources: &LightGeometryPacket) -> u32 {
+        if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
         let is_whole = |lane: usize| {
-            sources.part[lane] == LightObjectPacket::NONE
+            sources.part[lane] == LightGeometryPacket::NONE
                 && self.is_merged_mesh_light(LightGeometry::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// Like [`Geometry::closest_rows`], but traces the rays one by one.
+    /// Like [`Geometry::closest_hit_packet_simd`], but traces the rays one by one.
     #[cold]
     #[inline(never)]
-    fn closest_by_each(
+    fn closest_hit_one_by_one(
         &self,
         rows: &RayPacket,
         ends: &mut F32x16,
         traced: u32,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
         let (mut hits, mut objects) = (HitPacket::without_hits(), [NONE; PACKET_SIZE]);
-        for lane in lanes(traced) {
-            if let Some(hit) = self.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
+        for lane in lane_indices(traced) {
+            if let Some(hit) = self.closest_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 hits.set(lane, &hit.shape);
                 (objects[lane], ends[lane]) = (hit.object, hit.shape.t);
             }
@@ -91,16 +91,17 @@ impl Geometry {
     /// Calls [`Geometry::occluded`] for each ray.
     #[cold]
     #[inline(never)]
-    fn occluded_by_each(
+    fn occluded_one_by_one(
         &self,
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
     ) -> u32 {
-        let is_occluded =
-            |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
-        lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
+        let is_occluded = |&lane: &usize| {
+            self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.geometry(lane))
+        };
+        lane_indices(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
     }
 }
 
@@ -110,7 +111,7 @@ struct OcclusionKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a LightObjectPacket,
+    sources: &'a LightGeometryPacket,
 }
 
 impl SimdKernel for OcclusionKernel<'_> {
@@ -120,14 +121,14 @@ impl SimdKernel for OcclusionKernel<'_> {
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
         if geometry.traced_tree().has_shells() || traced & geometry.rays_to_merged_mesh_lights(sources) != 0 {
-            return geometry.occluded_by_each(rows, ends, traced, sources);
+            return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }
-        let mut occluders = Occluders::new(geometry, rows, sources, simd);
-        geometry.traced_tree().any_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
+        let mut occluders = OcclusionTest::new(geometry, rows, sources, simd);
+        geometry.traced_tree().any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
     }
 }
 
-/// Kernel of [`Geometry::closest_packet`].
+/// Kernel of [`Geometry::closest_hit_packet`].
 struct ClosestKernel<'a> {
     geometry: &'a Geometry,
     rays: &'a [Ray],
@@ -141,7 +142,7 @@ impl SimdKernel for ClosestKernel<'_> {
     fn run(self, simd: impl Simd) {
         let (rows, mut ends) = RayPacket::new(self.rays);
         let traced = active_lanes(&ends, simd);
-        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, simd);
+        let (hits, object) = self.geometry.closest_hit_packet_simd(&rows, &mut ends, traced, simd);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET_SIZE) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
         }
@@ -152,7 +153,7 @@ impl SimdKernel for ClosestKernel<'_> {
 const NONE: u32 = u32::MAX;
 
 /// Closest-hit test: the nearest hits so far and their objects.
-struct ClosestObject<'a, F> {
+struct ClosestHitTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
     hits: HitPacket,
@@ -160,20 +161,20 @@ struct ClosestObject<'a, F> {
     simd: F,
 }
 
-impl<F: Simd> ClosestHitCallback for ClosestObject<'_, F> {
+impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
-        match self.geometry.merged(id) {
+        match self.geometry.merged_meshes(id) {
             Some(merged) => {
-                let by = self.geometry.instructions();
-                merged.closest_rows(by, self.rows, (met, &these), &mut found);
+                let by = self.geometry.instruction_set();
+                merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
                 objects = renumber_by_object(merged, &mut found);
             }
             None => {
                 let object = &self.geometry.objects()[id as usize];
-                object.closest_rows(self.rows, met, &these, &mut found, self.simd);
+                object.closest_hit_packet(self.rows, met, &these, &mut found, self.simd);
             }
         }
         let mut nearer = [0; PACKET_SIZE];
@@ -205,42 +206,52 @@ fn renumber_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PAC
 }
 
 /// Any-hit test for shadow rays.
-pub(super) struct Occluders<'a, F> {
+pub(super) struct OcclusionTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
-    sources: &'a LightObjectPacket,
+    sources: &'a LightGeometryPacket,
     /// Mask of rays whose light is a single primitive of an object.
     in_part: u32,
     simd: F,
 }
 
-impl<'a, F: Simd> Occluders<'a, F> {
+impl<'a, F: Simd> OcclusionTest<'a, F> {
     /// Creates the test for a packet of shadow rays to these lights.
     #[inline(always)]
     pub(super) fn new(
         geometry: &'a Geometry,
         rows: &'a RayPacket,
-        sources: &'a LightObjectPacket,
+        sources: &'a LightGeometryPacket,
         simd: F,
     ) -> Self {
         Self { geometry, rows, sources, in_part: rays_to_primitive_lights(sources, simd), simd }
     }
 }
 
-impl<F: Simd> AnyHitCallback for Occluders<'_, F> {
+impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
-        if let Some(merged) = self.geometry.merged(id) {
+        if let Some(merged) = self.geometry.merged_meshes(id) {
             let these = masked_ends(met, ends);
             if self.in_part & met == 0 {
-                return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
+                return merged.any_hit_packet(
+                    self.geometry.instruction_set(),
+                    self.rows,
+                    (met, &these),
+                    None,
+                );
             }
             let mut own = [MergedMeshes::NO_TRIANGLE; PACKET_SIZE];
-            for lane in lanes(self.in_part & met) {
-                let number = merged.number(self.sources.object[lane], self.sources.part[lane]);
+            for lane in lane_indices(self.in_part & met) {
+                let number = merged.tree_index(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
-            return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), Some(&own));
+            return merged.any_hit_packet(
+                self.geometry.instruction_set(),
+                self.rows,
+                (met, &these),
+                Some(&own),
+            );
         }
         let own = rays_to_light_on(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
@@ -250,26 +261,26 @@ impl<F: Simd> AnyHitCallback for Occluders<'_, F> {
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rows, met, &masked_ends(met, ends), except, self.simd)
+        object.any_hit_packet(self.rows, met, &masked_ends(met, ends), except, self.simd)
     }
 }
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn rays_to_primitive_lights(sources: &LightObjectPacket, simd: impl Simd) -> u32 {
+fn rays_to_primitive_lights(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
     let mut in_part = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        in_part[lane] = if sources.part[lane] == LightObjectPacket::NONE { 0 } else { TRUE };
+        in_part[lane] = if sources.part[lane] == LightGeometryPacket::NONE { 0 } else { TRUE };
     }
     simd.movemask(&in_part)
 }
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn rays_to_light_on(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
+fn rays_to_light_on(sources: &LightGeometryPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -305,7 +316,7 @@ pub(super) mod tests {
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
     use crate::lights::LightGeometry;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;
@@ -365,7 +376,7 @@ pub(super) mod tests {
     struct Occluded<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
-        sources: &'a LightObjectPacket,
+        sources: &'a LightGeometryPacket,
     }
 
     impl SimdKernel for Occluded<'_> {
@@ -393,12 +404,12 @@ pub(super) mod tests {
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
             // Let some rays ignore the triangle they would hit.
             for ray in rays.iter_mut().step_by(4) {
-                let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));
+                let start = geometry.closest_hit(ray).map_or(7, |hit| geometry.triangle_number(&hit));
                 *ray = ray.with_start_triangle(start);
             }
             let mut found = vec![None; rays.len()];
-            geometry.closest_packet(&rays, &mut found);
-            let alone: Vec<_> = rays.iter().map(|ray| geometry.closest(ray)).collect();
+            geometry.closest_hit_packet(&rays, &mut found);
+            let alone: Vec<_> = rays.iter().map(|ray| geometry.closest_hit(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
                 Some(hit) if lane.is_multiple_of(3) => LightGeometry::Object(hit.object),
@@ -406,9 +417,9 @@ pub(super) mod tests {
                 _ => LightGeometry::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = LightObjectPacket::of(LightGeometry::Nothing);
-            sources.iter().enumerate().for_each(|(lane, source)| row.set(lane, *source));
-            let occluded = geometry.instructions().run(Occluded { geometry, rays: &rays, sources: &row });
+            let mut row = LightGeometryPacket::splat(LightGeometry::Nothing);
+            sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
+            let occluded = geometry.instruction_set().run(Occluded { geometry, rays: &rays, sources: &row });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {
                 assert_eq!(occluded & 1 << lane != 0, geometry.occluded(ray, *source), "{lane} of {rays:?}");
             }

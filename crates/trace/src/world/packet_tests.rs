@@ -32,7 +32,7 @@ impl HostileRandom {
 
     /// An adversarial coordinate: on a corner or face, zero, or so large or small that products overflow or
     /// underflow.
-    fn hostile(&mut self) -> f32 {
+    fn hostile_coordinate(&mut self) -> f32 {
         const HOSTILE: [f32; 16] = [
             0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -3.0, 1e-45, -1e-40, 1e-20, 1e-7, 1e10, -1e19, 3e38, -3e38,
         ];
@@ -41,7 +41,7 @@ impl HostileRandom {
     }
 
     fn hostile_vector(&mut self) -> Vec3 {
-        Vec3::new(self.hostile(), self.hostile(), self.hostile())
+        Vec3::new(self.hostile_coordinate(), self.hostile_coordinate(), self.hostile_coordinate())
     }
 
     fn ray(&mut self, kind: usize, scale: f32) -> Ray {
@@ -85,14 +85,14 @@ fn shapes(scale: f64) -> Vec<Object> {
 }
 
 /// A packet's closest hits, and its any-hit masks with and without ignored primitives.
-struct PacketHits<'a> {
+struct PacketTestKernel<'a> {
     object: &'a Object,
     rays: &'a [Ray],
     met: u32,
     except: (u32, &'a [u32; PACKET_SIZE]),
 }
 
-impl SimdKernel for PacketHits<'_> {
+impl SimdKernel for PacketTestKernel<'_> {
     type Output = (HitPacket, u32, u32);
 
     #[inline(always)]
@@ -103,32 +103,37 @@ impl SimdKernel for PacketHits<'_> {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitPacket::without_hits();
-        object.closest_rows(&rows, met, &ends, &mut found, simd);
-        let any_part = object.any_rows(&rows, met, &ends, None, simd);
-        (found, any_part, object.any_rows(&rows, met, &ends, Some(except), simd))
+        object.closest_hit_packet(&rows, met, &ends, &mut found, simd);
+        let any_part = object.any_hit_packet(&rows, met, &ends, None, simd);
+        (found, any_part, object.any_hit_packet(&rows, met, &ends, Some(except), simd))
     }
 }
 
 /// Bit patterns of a hit's fields.
-fn bits(hit: ShapeHit) -> [u32; 4] {
+fn hit_bits(hit: ShapeHit) -> [u32; 4] {
     [hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()]
 }
 
 /// Compares a packet with single rays and returns the number of hits.
-fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET_SIZE])) -> usize {
+fn assert_packet_matches_rays(
+    object: &Object,
+    rays: &[Ray],
+    met: u32,
+    except: (u32, &[u32; PACKET_SIZE]),
+) -> usize {
     let met = met & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {
         let is_traced = rays.get(lane).is_some() && met & 1 << lane != 0;
-        is_traced.then(|| object.closest(&rays[lane], &rays[lane].to_f64())).flatten()
+        is_traced.then(|| object.closest_hit(&rays[lane], &rays[lane].to_f64())).flatten()
     };
     let mut hits = 0;
     for instructions in InstructionSet::ALL {
-        let (found, any_part, other_part) = instructions.run(PacketHits { object, rays, met, except });
+        let (found, any_part, other_part) = instructions.run(PacketTestKernel { object, rays, met, except });
         hits = 0;
         for lane in 0..PACKET_SIZE {
             let alone = alone(lane);
             let what = || format!("{instructions:?}: lane {lane} of {rays:?} at {object:?}");
-            assert_eq!(found.get(lane).map(bits), alone.map(bits), "{}", what());
+            assert_eq!(found.get(lane).map(hit_bits), alone.map(hit_bits), "{}", what());
             assert_eq!(any_part & 1 << lane != 0, alone.is_some(), "{}", what());
             let own = if except.0 & 1 << lane == 0 { None } else { Some(except.1[lane]) };
             let other = alone.is_some_and(|hit| Some(hit.primitive) != own);
@@ -152,16 +157,16 @@ fn packet_and_single_hits_are_bit_identical() {
                 let met = [0xffff, random.below(1 << 16) as u32][random.below(2)];
                 let parts = std::array::from_fn(|_| random.below(6) as u32);
                 let except = (random.below(1 << 16) as u32, &parts);
-                hits += assert_packet(&object, &rays, met, except);
+                hits += assert_packet_matches_rays(&object, &rays, met, except);
                 // End rays exactly at the hit, next to it, and well before it.
                 let [before, at] = [f32::next_down as fn(f32) -> f32, |end| end];
                 let nudge = [before, at, f32::next_up, |end| end * 0.999_999, |end| end * 0.5][i % 5];
                 for ray in &mut rays {
-                    if let Some(hit) = object.closest(ray, &ray.to_f64()) {
+                    if let Some(hit) = object.closest_hit(ray, &ray.to_f64()) {
                         ray.t_max = nudge(hit.t);
                     }
                 }
-                assert_packet(&object, &rays, met, except);
+                assert_packet_matches_rays(&object, &rays, met, except);
                 rays_in_all += rays.len();
             }
             assert!(

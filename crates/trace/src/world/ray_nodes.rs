@@ -8,7 +8,11 @@ impl Geometry {
     /// Visits every node, in any tree, whose box the ray intersects. `visit` receives the ray in the
     /// coordinates of the node's tree, with t unchanged, and returns whether to descend. Depth is counted
     /// across both levels: a mesh's root is one below the leaf that contains the mesh.
-    pub fn visit_nodes(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(
+        &self,
+        ray: &Ray,
+        mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool,
+    ) {
         let mut below = Vec::new();
         self.traced_tree().visit_along_ray(
             ray,
@@ -17,12 +21,12 @@ impl Geometry {
         );
         for (id, above) in below {
             let (local, tree) =
-                match (self.merged(id), self.objects().get(id as usize).and_then(Object::mesh)) {
+                match (self.merged_meshes(id), self.objects().get(id as usize).and_then(Object::mesh)) {
                     (Some(merged), _) => (*ray, merged.tree()),
                     (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangles()),
                     (None, None) => continue,
                 };
-            tree.visit_along_ray(&local, |cell, stretch| {
+            tree.visit_nodes_along_ray(&local, |cell, stretch| {
                 visit(&local, &TreeNode { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
@@ -32,7 +36,7 @@ impl Geometry {
     /// leaves, plus the number of infinite objects.
     pub fn traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
-        self.visit_nodes(ray, |_, cell, _| {
+        self.visit_nodes_along_ray(ray, |_, cell, _| {
             count += 1 + cell.shapes;
             true
         });

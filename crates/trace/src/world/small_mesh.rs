@@ -19,7 +19,7 @@ impl MeshInstance {
 
     /// Finds the nearest hits of the rays in `met`. Other lanes have negative `ends`.
     #[inline(always)]
-    pub(super) fn closest_in_small(
+    pub(super) fn closest_hit_without_tree(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -27,17 +27,17 @@ impl MeshInstance {
         found: &mut HitPacket,
         simd: impl Simd,
     ) {
-        let (mesh, local, mut ends) = (&self.tree.loaded().mesh, self.local_rows(rows), *ends);
+        let (mesh, local, mut ends) = (&self.tree.loaded().mesh, self.local_packet(rows), *ends);
         let rays = ShearedPacket::new(&local);
         for number in 0..mesh.triangles.len() as u32 {
-            rays.closest((number, &mesh.corners(number)), (met, &mut ends), found, simd);
+            rays.update_closest_hits((number, &mesh.corners(number)), (met, &mut ends), found, simd);
         }
     }
 
     /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle. Other lanes
     /// have negative `ends`.
     #[inline(always)]
-    pub(super) fn any_in_small(
+    pub(super) fn any_hit_without_tree(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -45,7 +45,7 @@ impl MeshInstance {
         except: Option<(u32, &[u32; PACKET_SIZE])>,
         simd: impl Simd,
     ) -> u32 {
-        let (mesh, local) = (&self.tree.loaded().mesh, self.local_rows(rows));
+        let (mesh, local) = (&self.tree.loaded().mesh, self.local_packet(rows));
         let (rays, mut hit) = (ShearedPacket::new(&local), 0);
         for number in 0..mesh.triangles.len() as u32 {
             let mut asked = met & !hit;
@@ -56,7 +56,7 @@ impl MeshInstance {
                 }
             }
             if asked != 0 {
-                hit |= rays.any((number, &mesh.corners(number)), asked, ends, simd);
+                hit |= rays.hit_mask((number, &mesh.corners(number)), asked, ends, simd);
             }
         }
         hit
@@ -64,7 +64,7 @@ impl MeshInstance {
 
     /// Transforms the rays to mesh coordinates.
     #[inline(always)]
-    fn local_rows(&self, rows: &RayPacket) -> RayPacket {
+    fn local_packet(&self, rows: &RayPacket) -> RayPacket {
         let RayPacket { mut origin, mut direction, mut start } = *rows;
         if self.is_transformed {
             for i in 0..PACKET_SIZE {

@@ -9,7 +9,8 @@ use crate::assets::image::{ColorCurve, ImageEncoding};
 use crate::assets::{FileLine, FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{
-    Channel, Encoding, Material, PixelValue, Scene, TextureFilter, TextureRole, TextureUse,
+    Channel, ChannelSelector, Material, PixelInterpretation, Scene, TextureEncoding, TextureFilter,
+    TextureRole,
 };
 
 /// An image file and its encoding.
@@ -67,9 +68,9 @@ pub struct NeededTexture {
 
 impl NeededTexture {
     /// The image used as the environment map.
-    pub fn of_environment(file: &Path) -> Self {
+    pub fn for_environment(file: &Path) -> Self {
         Self {
-            source: environment_map(file),
+            source: environment_texture_source(file),
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
@@ -116,7 +117,7 @@ impl TextureNeeds {
 
     /// Combined needs of two images.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn union(self, other: Self) -> Self {
         Self {
             diffuse: self.diffuse || other.diffuse,
             specular: self.specular || other.specular,
@@ -128,7 +129,7 @@ impl TextureNeeds {
     }
 
     /// Whether textures with this role are needed. `is_delta` is true for materials with δ lobes.
-    fn has(self, role: TextureRole, is_delta: bool) -> bool {
+    fn includes_role(self, role: TextureRole, is_delta: bool) -> bool {
         match role {
             TextureRole::Diffuse => self.diffuse,
             TextureRole::Specular => self.specular || self.by_delta && is_delta,
@@ -164,10 +165,10 @@ pub fn textures_needed(
     };
     let (used_materials, own_materials) = materials_in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta());
-        for (texture, role) in textures.filter(|(_, role)| lookups.has(*role, is_delta)) {
+        let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
+        for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             add(NeededTexture {
-                source: material_source(scene, material, (texture, role)),
+                source: material_texture_source(scene, material, (texture, role)),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -185,20 +186,20 @@ pub fn textures_needed(
             let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
-                source: file_source(texture, used),
+                source: file_texture_source(texture, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
                 material: Some(own.name.clone()),
                 statement: Some(texture.statement.clone()),
-                normals_of: (used == TextureUse::Normal).then(|| own.name.clone()),
+                normals_of: (used == PixelInterpretation::Normal).then(|| own.name.clone()),
                 is_environment: false,
                 has_mipmaps: false,
             });
         }
     }
     if let Some(file) = environment_file(scene).filter(|_| lookups.lights) {
-        add(NeededTexture::of_environment(file));
+        add(NeededTexture::for_environment(file));
     }
     needed
 }
@@ -213,7 +214,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
 
 /// The environment map's file. `None` if there is no map or if the map's color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
-    environment_file(scene).map(environment_map)
+    environment_file(scene).map(environment_texture_source)
 }
 
 fn environment_file(scene: &Scene) -> Option<&Path> {
@@ -221,7 +222,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_map(file: &Path) -> TextureSource {
+fn environment_texture_source(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
@@ -241,7 +242,7 @@ fn materials_in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
 }
 
 /// Image file and encoding for a scene material's texture in this role.
-pub fn material_source(
+pub fn material_texture_source(
     scene: &Scene,
     material: &Material,
     (texture, role): (usize, TextureRole),
@@ -270,31 +271,38 @@ pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cut
 }
 
 /// How a scene material's texture is used in this role.
-pub fn texture_use(scene: &Scene, material: &Material, (texture, role): (usize, TextureRole)) -> TextureUse {
-    match role.texture_use() {
-        TextureUse::Color | TextureUse::CutOut => {
+pub fn texture_use(
+    scene: &Scene,
+    material: &Material,
+    (texture, role): (usize, TextureRole),
+) -> PixelInterpretation {
+    match role.pixel_interpretation() {
+        PixelInterpretation::Color | PixelInterpretation::CutOut => {
             let is_alpha = |number| match number {
-                PixelValue::Opacity | PixelValue::Channel(Channel::Alpha) => true,
-                PixelValue::Luminance | PixelValue::Channel(_) | PixelValue::Mask { .. } => false,
+                ChannelSelector::Opacity | ChannelSelector::Channel(Channel::Alpha) => true,
+                ChannelSelector::Luminance | ChannelSelector::Channel(_) | ChannelSelector::Mask { .. } => {
+                    false
+                }
             };
             let opacity = material.opacity.texture().filter(|(_, number)| is_alpha(*number));
             let is_cut_out = opacity.is_some_and(|(opacity, _)| is_same_image(scene, opacity, texture));
-            if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
+            if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
         }
-        TextureUse::Number(PixelValue::Opacity) if !is_color(scene, material, texture) => {
-            TextureUse::Number(PixelValue::Mask { of_any_color: false })
+        PixelInterpretation::Number(ChannelSelector::Opacity)
+            if !is_used_as_color(scene, material, texture) =>
+        {
+            PixelInterpretation::Number(ChannelSelector::Mask { of_any_color: false })
         }
-        used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
+        used @ (PixelInterpretation::Number(_) | PixelInterpretation::Normal) => used,
     }
 }
 
 /// Whether the material also uses the texture's image for a color.
-fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
+fn is_used_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
-    material
-        .textures()
-        .into_iter()
-        .any(|(other, role)| role.texture_use() == TextureUse::Color && image(other) == image(texture))
+    material.textures().into_iter().any(|(other, role)| {
+        role.pixel_interpretation() == PixelInterpretation::Color && image(other) == image(texture)
+    })
 }
 
 /// Whether two textures use the same image with the same texture coordinates.
@@ -307,19 +315,22 @@ fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
 }
 
 /// Image file and encoding for a scene texture with this use.
-pub fn scene_texture_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
+pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpretation) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
-        (Encoding::Srgb, TextureUse::Color | TextureUse::Normal) => ImageEncoding::Srgb,
-        (Encoding::Linear, TextureUse::Color | TextureUse::Normal) | (Encoding::Auto, TextureUse::Normal) => {
-            ImageEncoding::Linear
+        (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
+            ImageEncoding::Srgb
         }
-        (Encoding::Auto, TextureUse::Color) => ImageEncoding::Color,
-        (Encoding::Auto, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Auto),
-        (Encoding::Srgb, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Srgb),
-        (Encoding::Linear, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Linear),
-        (Encoding::Srgb, TextureUse::Number(of)) => ImageEncoding::Number { of, is_srgb: true },
-        (Encoding::Auto | Encoding::Linear, TextureUse::Number(of)) => {
+        (TextureEncoding::Linear, PixelInterpretation::Color | PixelInterpretation::Normal)
+        | (TextureEncoding::Auto, PixelInterpretation::Normal) => ImageEncoding::Linear,
+        (TextureEncoding::Auto, PixelInterpretation::Color) => ImageEncoding::Color,
+        (TextureEncoding::Auto, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Auto),
+        (TextureEncoding::Srgb, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Srgb),
+        (TextureEncoding::Linear, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Linear),
+        (TextureEncoding::Srgb, PixelInterpretation::Number(of)) => {
+            ImageEncoding::Number { of, is_srgb: true }
+        }
+        (TextureEncoding::Auto | TextureEncoding::Linear, PixelInterpretation::Number(of)) => {
             ImageEncoding::Number { of, is_srgb: false }
         }
     };
@@ -327,47 +338,52 @@ pub fn scene_texture_source(scene: &Scene, texture: usize, used: TextureUse) -> 
 }
 
 /// Image file and encoding for a mesh file's texture with this use.
-pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
+pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
     let encoding = match used {
-        TextureUse::Color => ImageEncoding::Color,
-        TextureUse::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
-        TextureUse::Normal => ImageEncoding::Linear,
-        TextureUse::Number(of) => ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false },
+        PixelInterpretation::Color => ImageEncoding::Color,
+        PixelInterpretation::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
+        PixelInterpretation::Normal => ImageEncoding::Linear,
+        PixelInterpretation::Number(of) => {
+            ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
+        }
     };
     TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
 /// How textures from mesh files are used as scalar parameters.
-pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelValue::Luminance);
+pub const FILE_NUMBER: PixelInterpretation = PixelInterpretation::Number(ChannelSelector::Luminance);
 
 /// How a mesh file material's color texture is used.
-pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
+pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> PixelInterpretation {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
-        None | Some(PixelValue::Opacity | PixelValue::Channel(Channel::Alpha)) => true,
-        Some(PixelValue::Luminance | PixelValue::Channel(_) | PixelValue::Mask { .. }) => false,
+        None | Some(ChannelSelector::Opacity | ChannelSelector::Channel(Channel::Alpha)) => true,
+        Some(ChannelSelector::Luminance | ChannelSelector::Channel(_) | ChannelSelector::Mask { .. }) => {
+            false
+        }
     };
     let opacity = own.opacity_texture.as_ref().filter(is_alpha);
     let is_cut_out = opacity.is_some_and(|opacity| opacity.is_same_image(texture));
-    if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
+    if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
 }
 
 /// Returns how a material from a mesh file uses its opacity texture.
-pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
+pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> PixelInterpretation {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
-    let number = if is_color { PixelValue::Opacity } else { PixelValue::Mask { of_any_color: true } };
-    TextureUse::Number(number)
+    let number =
+        if is_color { ChannelSelector::Opacity } else { ChannelSelector::Mask { of_any_color: true } };
+    PixelInterpretation::Number(number)
 }
 
 fn file_textures(
     own: &FileMaterial,
     lookups: TextureNeeds,
-) -> impl Iterator<Item = (&FileTexture, TextureUse)> {
+) -> impl Iterator<Item = (&FileTexture, PixelInterpretation)> {
     let shared = [
         (&own.diffuse_texture, TextureRole::Ambient),
         (&own.emission_texture, TextureRole::Emission),
         (&own.normal_texture, TextureRole::NormalMap),
-        (&own.opacity_texture, TextureRole::Opacity(PixelValue::Opacity)),
+        (&own.opacity_texture, TextureRole::Opacity(ChannelSelector::Opacity)),
     ];
     let of_kind = match &own.physical {
         None => vec![
@@ -376,17 +392,18 @@ fn file_textures(
         ],
         Some(physical) => vec![
             (&own.diffuse_texture, TextureRole::Facets),
-            (&physical.roughness_texture, TextureRole::Roughness(PixelValue::Luminance)),
-            (&physical.metallic_texture, TextureRole::Roughness(PixelValue::Luminance)),
+            (&physical.roughness_texture, TextureRole::Roughness(ChannelSelector::Luminance)),
+            (&physical.metallic_texture, TextureRole::Roughness(ChannelSelector::Luminance)),
         ],
     };
-    let looked_up = of_kind.into_iter().chain(shared).filter(move |(_, role)| lookups.has(*role, false));
+    let looked_up =
+        of_kind.into_iter().chain(shared).filter(move |(_, role)| lookups.includes_role(*role, false));
     looked_up.filter_map(|(texture, role)| {
         let texture = texture.as_ref()?;
-        let used = match role.texture_use() {
-            TextureUse::Color | TextureUse::CutOut => file_color_use(own, texture),
-            TextureUse::Number(PixelValue::Opacity) => file_opacity_use(own, texture),
-            used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
+        let used = match role.pixel_interpretation() {
+            PixelInterpretation::Color | PixelInterpretation::CutOut => file_color_use(own, texture),
+            PixelInterpretation::Number(ChannelSelector::Opacity) => file_opacity_use(own, texture),
+            used @ (PixelInterpretation::Number(_) | PixelInterpretation::Normal) => used,
         };
         Some((texture, used))
     })
@@ -400,7 +417,7 @@ mod tests {
     use super::*;
 
     /// How a material uses its textures, in role order.
-    fn uses(material: &str) -> Vec<TextureUse> {
+    fn uses(material: &str) -> Vec<PixelInterpretation> {
         let text = format!(
             "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n\
              [textures.leaf]\nfile = '../../assets/textures/leaf.png'\nencoding = 'srgb'\n\
@@ -418,10 +435,12 @@ mod tests {
 
     #[test]
     fn color_and_alpha_from_one_image_form_a_cut_out() {
-        const MASK: TextureUse = TextureUse::Number(PixelValue::Mask { of_any_color: false });
-        const ALPHA: TextureUse = TextureUse::Number(PixelValue::Channel(Channel::Alpha));
-        const OPACITY: TextureUse = TextureUse::Number(PixelValue::Opacity);
-        let (color, cut_out) = (TextureUse::Color, TextureUse::CutOut);
+        const MASK: PixelInterpretation =
+            PixelInterpretation::Number(ChannelSelector::Mask { of_any_color: false });
+        const ALPHA: PixelInterpretation =
+            PixelInterpretation::Number(ChannelSelector::Channel(Channel::Alpha));
+        const OPACITY: PixelInterpretation = PixelInterpretation::Number(ChannelSelector::Opacity);
+        let (color, cut_out) = (PixelInterpretation::Color, PixelInterpretation::CutOut);
         let both = |diffuse: &str, opacity: &str| {
             let mut uses = uses(&format!("diffuse = {{ texture = '{diffuse}' }}\nopacity = {{ {opacity} }}"));
             uses.dedup();
@@ -436,8 +455,8 @@ mod tests {
         // An image used only for opacity is a mask.
         assert_eq!(both("leaf", "texture = 'other'"), [color, MASK]);
         assert_eq!(uses("diffuse = 0.5\nopacity = { texture = 'leaf' }"), [MASK]);
-        let red = TextureUse::Number(PixelValue::Channel(Channel::Red));
+        let red = PixelInterpretation::Number(ChannelSelector::Channel(Channel::Red));
         assert_eq!(both("leaf", "texture = 'leaf', channel = 'r'"), [color, red]);
-        assert_eq!(uses("normal_map = 'other'"), [TextureUse::Normal]);
+        assert_eq!(uses("normal_map = 'other'"), [PixelInterpretation::Normal]);
     }
 }

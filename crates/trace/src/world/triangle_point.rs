@@ -22,14 +22,14 @@ pub(super) struct TrianglePoint {
     /// Whether the point is so close to an edge that a ray from the point could start beyond a neighboring
     /// surface; see [`PlacedMesh::pulled_inside`].
     pub(super) is_near_edge: bool,
-    /// Whether the barycentric coordinates may be too imprecise; see [`PlacedMesh::on_ray`].
+    /// Whether the barycentric coordinates may be too imprecise; see [`PlacedMesh::point_from_ray`].
     is_coarse: bool,
 }
 
 impl TrianglePoint {
     /// Whether [`PlacedMesh::corrected`] may change the point.
     #[inline(always)]
-    pub(super) fn is_doubtful(&self) -> bool {
+    pub(super) fn may_need_correction(&self) -> bool {
         self.is_near_edge | self.is_coarse
     }
 }
@@ -45,7 +45,7 @@ pub(super) const EDGE_MARGIN: f64 = 4.0;
 /// Whether a point with barycentric coordinate `weight` is near the opposite edge. `bound` is the squared
 /// minimum distance divided by the squared length of the cross product of two edges.
 #[inline(always)]
-fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
+fn is_within_edge_margin(weight: f64, edge: DVec3, bound: f64) -> bool {
     (weight < 0.0) | (weight * weight < bound * edge.length_squared())
 }
 
@@ -69,10 +69,10 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// remaining error is the rounding of the `f64` arithmetic that determines the side of the triangle on
     /// which a point lies. In a merged tree, the rounding of the transformed corners is added.
     #[inline(always)]
-    pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
-        let reach = self.placement.abs_bound(local.abs());
+    pub(super) fn point_error_bound(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
+        let reach = self.placement.abs_bound_to_world(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
-        let greatest = self.placement.abs_bound(a.abs().max(b.abs()).max(c.abs()));
+        let greatest = self.placement.abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         let of_double = f64_error_bound(greatest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
@@ -85,26 +85,28 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Computes the point with barycentric coordinates `u` and `v` on the triangle with these corners, in
     /// mesh coordinates.
     #[inline(always)]
-    pub(super) fn facet(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> TrianglePoint {
+    pub(super) fn triangle_point(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> TrianglePoint {
         let corners = corners.map(|corner| corner.as_dvec3());
         let [a, b, c] = corners;
         let (ab, ac) = (b - a, c - a);
         let local = a + ab * f64::from(u) + ac * f64::from(v);
-        let point = self.placement.point(local).as_vec3();
-        let error = self.error(point, local, corners);
+        let point = self.placement.point_to_world(local).as_vec3();
+        let error = self.point_error_bound(point, local, corners);
         let across = ab.cross(ac);
         // Compare squared distances from the edges with the squared minimum.
         let least = self.min_edge_distance(error, corners);
         let bound = least * least / across.length_squared();
         let (u, v) = (f64::from(u), f64::from(v));
         let w = 1.0 - u - v;
-        let is_near_edge = is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound);
+        let is_near_edge = is_within_edge_margin(u, ac, bound)
+            | is_within_edge_margin(v, ab, bound)
+            | is_within_edge_margin(w, ac - ab, bound);
         TrianglePoint {
             corners,
             local,
             point,
             error,
-            normal: self.placement.normal(across).normalize().as_vec3(),
+            normal: self.placement.normal_to_world(across).normalize().as_vec3(),
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_near_edge,
             is_coarse: f64::from(point.abs().max_element()) * COARSE < self.max_coordinate(corners),
@@ -114,7 +116,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
     fn max_coordinate(&self, [a, b, c]: [DVec3; 3]) -> f64 {
-        let greatest = self.placement.abs_bound(a.abs().max(b.abs()).max(c.abs()));
+        let greatest = self.placement.abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         (greatest + self.placement.mesh_origin().abs()).max_element()
     }
 
@@ -123,7 +125,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     #[cold]
     #[inline(never)]
     pub(super) fn corrected(&self, facet: &TrianglePoint, ray: &RayF64, weights: [f32; 2]) -> [Vec3; 2] {
-        match self.on_ray(facet, ray) {
+        match self.point_from_ray(facet, ray) {
             Some(corrected) => corrected,
             None if facet.is_near_edge => self.pulled_inside(facet, weights),
             None => [facet.point, facet.error],
@@ -132,26 +134,26 @@ impl<P: MeshPlacement> PlacedMesh<P> {
 
     /// Whether [`PlacedMesh::corrected`] computes the point from the ray.
     #[inline(always)]
-    pub(super) fn is_on_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> bool {
-        facet.is_coarse && self.on_ray(facet, ray).is_some()
+    pub(super) fn uses_point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> bool {
+        facet.is_coarse && self.point_from_ray(facet, ray).is_some()
     }
 
     /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle is much
     /// larger than the distances from the scene's origin to the point and the ray origin.
-    fn on_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
+    fn point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
         if !facet.is_coarse {
             return None;
         }
         let [a, b, c] = facet.corners;
         let greatest = self.max_coordinate(facet.corners);
-        let normal = self.placement.normal((b - a).cross(c - a));
-        let t = (self.placement.point(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
+        let normal = self.placement.normal_to_world((b - a).cross(c - a));
+        let t = (self.placement.point_to_world(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
         let point = ray.at(t);
         let reach = ray.origin.abs().max(point.abs()).max_element();
         let apart = (point - facet.point.as_dvec3()).abs().max_element();
         let is_better = reach * COARSE < greatest && apart <= greatest * f64::from(32.0 * f32::EPSILON);
         let rounded = point.as_vec3();
-        is_better.then(|| [rounded, self.error(rounded, facet.local, facet.corners)])
+        is_better.then(|| [rounded, self.point_error_bound(rounded, facet.local, facet.corners)])
     }
 
     /// Minimum distance from a point to its triangle's edges, in mesh coordinates: the point's error plus the
@@ -175,11 +177,11 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         // Reduce the coordinate with more slack.
         let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
         let local = a + ab * u + ac * v;
-        let point = self.placement.point(local).as_vec3();
+        let point = self.placement.point_to_world(local).as_vec3();
         if !point.is_finite() {
             return [facet.point, facet.error];
         }
-        [point, self.error(point, local, facet.corners)]
+        [point, self.point_error_bound(point, local, facet.corners)]
     }
 
     /// Interpolated shading normal of a smooth mesh, flipped to the side of the geometric normal.
@@ -187,7 +189,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     pub(super) fn shading_normal(&self, facet: &TrianglePoint, [a, b, c]: &[Vec3; 3]) -> Vec3 {
         let TrianglePoint { normal, barycentric, .. } = *facet;
         let interpolated = *a * barycentric.x + *b * barycentric.y + *c * barycentric.z;
-        let bent = self.placement.normal(interpolated.as_dvec3()).as_vec3();
+        let bent = self.placement.normal_to_world(interpolated.as_dvec3()).as_vec3();
         let reciprocal = bent.length_recip();
         let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
         let bent = bent * reciprocal;
@@ -200,19 +202,24 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// planes above it. This prevents facets from shadowing points that are lit according to the shading
     /// normals (Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II, chapter 4).
     #[inline(always)]
-    pub(super) fn shadow_point(&self, facet: &TrianglePoint, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
-        let point = self.placement.point(facet.local);
+    pub(super) fn lifted_shadow_origin(
+        &self,
+        facet: &TrianglePoint,
+        normals: &[Vec3; 3],
+        direction: DVec3,
+    ) -> Vec3 {
+        let point = self.placement.point_to_world(facet.local);
         let normal = facet.normal.as_dvec3();
         let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
         let weights = facet.barycentric.to_array();
         let mut lifted = DVec3::ZERO;
         for i in 0..3 {
-            let own = self.placement.normal(normals[i].as_dvec3());
+            let own = self.placement.normal_to_world(normals[i].as_dvec3());
             let reciprocal = own.length_recip();
             let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
             let own = own * if is_told { reciprocal } else { 0.0 };
             let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-            let height = (self.placement.point(facet.corners[i]) - point).dot(own);
+            let height = (self.placement.point_to_world(facet.corners[i]) - point).dot(own);
             lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
         }
         (point + lifted).as_vec3()
@@ -222,7 +229,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
     use crate::math::transform::Transform;
     use crate::world::placement::IdentityPlacement;
 
@@ -238,9 +245,9 @@ mod tests {
             let at = DVec3::new(number(), number(), number());
             let (map, here) = (&Transform::IDENTITY, IdentityPlacement);
             let bits = |numbers: DVec3| numbers.to_array().map(f64::to_bits);
-            assert_eq!(bits(MeshPlacement::point(map, at)), bits(here.point(at)));
-            assert_eq!(MeshPlacement::abs_bound(map, at.abs()), here.abs_bound(at.abs()));
-            assert_eq!(bits(MeshPlacement::normal(map, at)), bits(here.normal(at)));
+            assert_eq!(bits(MeshPlacement::point_to_world(map, at)), bits(here.point_to_world(at)));
+            assert_eq!(MeshPlacement::abs_bound_to_world(map, at.abs()), here.abs_bound_to_world(at.abs()));
+            assert_eq!(bits(MeshPlacement::normal_to_world(map, at)), bits(here.normal_to_world(at)));
             assert_eq!(map.mesh_origin(), here.mesh_origin());
         }
     }

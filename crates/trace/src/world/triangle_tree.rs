@@ -26,7 +26,7 @@ impl TriangleTree {
     ) -> Result<Self, Cancelled> {
         Ok(match accel {
             Accel::Bvh => Self::Boxes(WideBvh::build(count, corners, token)?),
-            Accel::BvhHigh => Self::Boxes(WideBvh::build_with(Quality::High, count, corners, token)?),
+            Accel::BvhHigh => Self::Boxes(WideBvh::build_with_quality(Quality::High, count, corners, token)?),
             Accel::KdTree => Self::Planes(KdTree::build(count, corners, token)?),
         })
     }
@@ -48,23 +48,23 @@ impl TriangleTree {
     }
 
     /// Returns the nearest hit. At equal distances, the lowest triangle number wins.
-    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+    pub fn closest_hit(&self, ray: &Ray) -> Option<ShapeHit> {
         match self {
-            Self::Boxes(tree) => tree.closest(ray),
-            Self::Planes(tree) => tree.closest(ray),
+            Self::Boxes(tree) => tree.closest_hit(ray),
+            Self::Planes(tree) => tree.closest_hit(ray),
         }
     }
 
     /// Whether the ray hits any triangle except `except`.
-    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+    pub fn any_hit(&self, ray: &Ray, except: Option<u32>) -> bool {
         match self {
-            Self::Boxes(tree) => tree.any(ray, except),
-            Self::Planes(tree) => tree.any(ray, except),
+            Self::Boxes(tree) => tree.any_hit(ray, except),
+            Self::Planes(tree) => tree.any_hit(ray, except),
         }
     }
 
     /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
-    pub fn visit_along_ray(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
             Self::Boxes(tree) => tree.visit_along_ray(ray, visit),
             Self::Planes(tree) => tree.visit_along_ray(ray, visit),
@@ -73,16 +73,16 @@ impl TriangleTree {
 
     /// Visits every triangle that intersects a box. Nearby triangles may also be visited, and triangles may
     /// be visited more than once.
-    pub fn visit_overlapping(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
+    pub fn visit_triangles_in_box(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
         match self {
             Self::Boxes(tree) => tree.visit_overlapping(bounds, visit),
             Self::Planes(tree) => tree.visit_overlapping(bounds, visit),
         }
     }
 
-    /// Like [`TriangleTree::visit_overlapping`], until `visit` returns false. Returns whether all triangles
+    /// Like [`TriangleTree::visit_triangles_in_box`], until `visit` returns false. Returns whether all triangles
     /// were visited.
-    pub fn visit_overlapping_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
+    pub fn visit_triangles_in_box_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.visit_overlapping_while(bounds, visit),
             Self::Planes(tree) => tree.visit_overlapping_while(bounds, visit),
@@ -91,13 +91,13 @@ impl TriangleTree {
 
     /// Finds the nearest hits of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays. Each ray ends at
     /// its entry in `ends`.
-    pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
+    pub fn closest_hit_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         match self {
-            Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
+            Self::Boxes(tree) => tree.closest_hit_packet(rays, ends, hits),
             Self::Planes(tree) => {
                 hits.fill(None);
                 for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
-                    *hit = tree.closest(&Ray { t_max: ends[lane], ..rays[lane] });
+                    *hit = tree.closest_hit(&Ray { t_max: ends[lane], ..rays[lane] });
                 }
             }
         }
@@ -105,13 +105,13 @@ impl TriangleTree {
 
     /// Returns the mask of rays, up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE), that hit a triangle before
     /// they end. Each ray ignores its triangle in `except`, which may be empty.
-    pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
+    pub fn any_hit_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         match self {
-            Self::Boxes(tree) => tree.any_packet(rays, ends, except),
+            Self::Boxes(tree) => tree.any_hit_packet(rays, ends, except),
             Self::Planes(tree) => {
                 let hit = |lane: usize| {
                     let ray = Ray { t_max: ends[lane], ..rays[lane] };
-                    u32::from(tree.any(&ray, except.get(lane).copied().flatten())) << lane
+                    u32::from(tree.any_hit(&ray, except.get(lane).copied().flatten())) << lane
                 };
                 (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(hit).sum()
             }

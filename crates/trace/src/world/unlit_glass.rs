@@ -10,7 +10,7 @@ const ROUNDING: f32 = 1e-5;
 
 /// Two bounding boxes for a light. The light is inside both boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightBox {
+pub struct LightBoundingBoxes {
     /// Bounding box of the light's bounding sphere.
     of_ball: Aabb,
     /// Bounding box of the emitting object.
@@ -19,14 +19,14 @@ pub struct LightBox {
     pub object: Option<u32>,
 }
 
-impl LightBox {
+impl LightBoundingBoxes {
     /// Whether the light may intersect a box.
     pub fn meets(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
     /// Center and corners of the smaller box.
-    pub fn points(&self) -> impl Iterator<Item = Vec3> {
+    pub fn center_and_corners(&self) -> impl Iterator<Item = Vec3> {
         let own = self.of_object.unwrap_or(self.of_ball);
         let corner = move |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { own.min[axis] } else { own.max[axis] };
@@ -48,7 +48,7 @@ impl World {
         // Compute the bounding box of each solid.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
-            if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
+            if self.materials_of(id).any(|material| material.bsdf.as_dielectric().is_some()) {
                 let (own, joined) =
                     (object.bounds().unwrap_or(everywhere), &mut boxes[self.solid_id(id) as usize]);
                 *joined = Some(joined.map_or(own, |others| others.union(own)));
@@ -57,14 +57,15 @@ impl World {
         // Keep the closed solids that cannot be touched by a light.
         let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
-            let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
+            let closed =
+                bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open_solid(body));
             closed.is_some_and(|bounds| !holds_lamp(bounds))
         };
         (0..).zip(&boxes).map(is_dark).collect()
     }
 
     /// Bounding boxes of all finite lights, with a margin for rounding.
-    pub fn light_boxes(&self) -> Vec<LightBox> {
+    pub fn light_boxes(&self) -> Vec<LightBoundingBoxes> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
             let bounds = light.bounds().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
@@ -73,7 +74,11 @@ impl World {
             let of_ball = Aabb::from_points([center - around, center + around]);
             let object = light.as_area().map(|area| area.object);
             let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
-            Some(LightBox { of_ball, of_object: bounds.map(|own| own.expanded(Vec3::splat(room))), object })
+            Some(LightBoundingBoxes {
+                of_ball,
+                of_object: bounds.map(|own| own.expanded(Vec3::splat(room))),
+                object,
+            })
         });
         boxes.collect()
     }

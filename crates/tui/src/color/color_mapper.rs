@@ -5,10 +5,10 @@ use std::cell::RefCell;
 use super::bayer::threshold;
 use super::oklab::oklab;
 use super::palette::{self, AnsiColors};
-use super::recipes::{Ink, PatternDither};
+use super::recipes::{DitherColor, PatternDither};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_to_linear;
-use crate::mosaic::{FittedCell, Tile};
+use crate::mosaic::{BlockPattern, FittedCell};
 use ratatui::style::Color;
 
 /// How strongly dithering favors inks close to the target color on 256-color and 16-color terminals.
@@ -25,13 +25,13 @@ const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 /// A tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MappedCell {
-    pub(crate) tile: Tile,
+    pub(crate) tile: BlockPattern,
     pub(crate) pair: [Color; 2],
 }
 
 /// Two of the 16 ANSI colors, mixed in one cell.
 #[derive(Clone, Copy, Debug)]
-struct ColorPair {
+struct AnsiColorMix {
     /// Index of the shade character. `None` if only the first color is used.
     level: Option<usize>,
     colors: [usize; 2],
@@ -44,7 +44,7 @@ pub(crate) struct ColorMapper {
     plain: RefCell<PatternDither>,
     /// Ditherer for cells drawn with shade characters on 16-color terminals.
     mixed: RefCell<PatternDither>,
-    pairs: Vec<ColorPair>,
+    pairs: Vec<AnsiColorMix>,
 }
 
 impl ColorMapper {
@@ -55,15 +55,16 @@ impl ColorMapper {
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
             ColorDepth::Indexed256 => {
-                let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(Ink::solid);
+                let inks =
+                    (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(DitherColor::solid);
                 shades.plain = RefCell::new(PatternDither::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
-                let inks: Vec<Ink> = ansi.iter().copied().map(Ink::solid).collect();
-                shades.pairs = color_pairs(&inks);
+                let inks: Vec<DitherColor> = ansi.iter().copied().map(DitherColor::solid).collect();
+                shades.pairs = ansi_color_mixes(&inks);
                 let mixed = shades.pairs.iter().map(|pair| {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
-                    pair.level.map_or(*front, |level| Ink::shaded(front, back, LEVELS[level]))
+                    pair.level.map_or(*front, |level| DitherColor::from_pattern(front, back, LEVELS[level]))
                 });
                 shades.mixed = RefCell::new(PatternDither::new(mixed.collect(), CALM_16));
                 shades.plain = RefCell::new(PatternDither::new(inks, CALM_EDGES));
@@ -74,7 +75,7 @@ impl ColorMapper {
 
     /// Returns the terminal color to draw for an sRGB color at this pixel position.
     pub(crate) fn map_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
-        let index = || self.plain.borrow_mut().ink_index(rgb, threshold(x, y));
+        let index = || self.plain.borrow_mut().select_color_index(rgb, threshold(x, y));
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
             ColorDepth::Indexed256 => Color::Indexed(palette::FIRST_FIXED.saturating_add(index() as u8)),
@@ -89,7 +90,7 @@ impl ColorMapper {
         if self.depth == ColorDepth::Ansi16 {
             let labs = fitted.pair.map(|rgb| oklab(srgb8_to_linear(rgb)));
             if labs[0].distance_squared(labs[1]) < EDGE {
-                return self.dithered_cell(mixed_color(first, second, fitted.tile), x, y);
+                return self.dithered_cell(mean_cell_color(first, second, fitted.tile), x, y);
             }
         }
         let pair = [self.map_color(first, x, 2 * y), self.map_color(second, x, 2 * y + 1)];
@@ -97,29 +98,29 @@ impl ColorMapper {
     }
 
     fn dithered_cell(&self, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
-        let index = self.mixed.borrow_mut().ink_index(rgb, threshold(x, y));
-        let ColorPair { level, colors } =
-            self.pairs.get(index).copied().unwrap_or(ColorPair { level: None, colors: [0; 2] });
+        let index = self.mixed.borrow_mut().select_color_index(rgb, threshold(x, y));
+        let AnsiColorMix { level, colors } =
+            self.pairs.get(index).copied().unwrap_or(AnsiColorMix { level: None, colors: [0; 2] });
         let [front, back] = colors.map(|color| NAMES[color]);
         match level {
-            None => MappedCell { tile: Tile::HALVES, pair: [front; 2] },
-            Some(0) => MappedCell { tile: Tile::LIGHT, pair: [front, back] },
-            Some(1) => MappedCell { tile: Tile::MEDIUM, pair: [front, back] },
-            Some(_) => MappedCell { tile: Tile::LIGHT, pair: [back, front] },
+            None => MappedCell { tile: BlockPattern::HALVES, pair: [front; 2] },
+            Some(0) => MappedCell { tile: BlockPattern::LIGHT, pair: [front, back] },
+            Some(1) => MappedCell { tile: BlockPattern::MEDIUM, pair: [front, back] },
+            Some(_) => MappedCell { tile: BlockPattern::LIGHT, pair: [back, front] },
         }
     }
 }
 
 /// Returns all single colors, followed by every pair of colors mixed with each shade character.
-fn color_pairs(inks: &[Ink]) -> Vec<ColorPair> {
-    let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
+fn ansi_color_mixes(inks: &[DitherColor]) -> Vec<AnsiColorMix> {
+    let alone = (0..inks.len()).map(|color| AnsiColorMix { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
-    let shaded =
-        both.flat_map(|colors| (0..LEVELS.len()).map(move |level| ColorPair { level: Some(level), colors }));
+    let shaded = both
+        .flat_map(|colors| (0..LEVELS.len()).map(move |level| AnsiColorMix { level: Some(level), colors }));
     alone.chain(shaded).collect()
 }
 
-fn mixed_color(first: [u8; 3], second: [u8; 3], tile: Tile) -> [u8; 3] {
+fn mean_cell_color(first: [u8; 3], second: [u8; 3], tile: BlockPattern) -> [u8; 3] {
     let [a, b] = tile.part_sizes().map(|size| size as f32);
     let mixed = (srgb8_to_linear(first) * a + srgb8_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)
@@ -131,7 +132,7 @@ mod tests {
     use crate::color::XTERM;
 
     fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
-        shades.map_cell(FittedCell { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
+        shades.map_cell(FittedCell { tile: BlockPattern::HALVES, pair: [rgb; 2] }, x, y)
     }
 
     #[test]
@@ -173,10 +174,10 @@ mod tests {
         ansi[1] = [150, 75, 50];
         let shades = ColorMapper::new(ColorDepth::Ansi16, &ansi);
         assert_eq!(cell(&shades, [150, 75, 50], 2, 2).pair, [Color::Red; 2]);
-        let edge = FittedCell { tile: Tile::HALVES, pair: [[255; 3], [0; 3]] };
+        let edge = FittedCell { tile: BlockPattern::HALVES, pair: [[255; 3], [0; 3]] };
         assert_eq!(
             shades.map_cell(edge, 1, 1),
-            MappedCell { tile: Tile::HALVES, pair: [Color::White, Color::Black] }
+            MappedCell { tile: BlockPattern::HALVES, pair: [Color::White, Color::Black] }
         );
     }
 }

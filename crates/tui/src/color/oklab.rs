@@ -43,7 +43,7 @@ impl OklabDerivative {
     }
 
     /// Returns the change in Oklab caused by a small change in linear light.
-    pub(super) fn change(self, linear: Vec3) -> Vec3 {
+    pub(super) fn apply(self, linear: Vec3) -> Vec3 {
         multiply_matrix(LAB, self.0 * multiply_matrix(CONES, linear))
     }
 }
@@ -64,6 +64,6 @@ mod tests {
         let color = Vec3::new(0.4, 0.2, 0.6);
         let step = Vec3::new(1e-3, -2e-3, 1e-3);
         let change = oklab(color + step) - oklab(color);
-        assert!(OklabDerivative::at(color).change(step).distance(change) < 0.1 * change.length());
+        assert!(OklabDerivative::at(color).apply(step).distance(change) < 0.1 * change.length());
     }
 }

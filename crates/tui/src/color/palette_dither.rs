@@ -1,7 +1,7 @@
 //! Dithering with an arbitrary palette.
 
 use super::bayer::threshold;
-use super::recipes::{Ink, PatternDither};
+use super::recipes::{DitherColor, PatternDither};
 
 /// How strongly dithering favors palette colors close to the target color. Applies to palettes computed from
 /// an image.
@@ -14,11 +14,11 @@ pub(crate) struct PaletteDither(PatternDither);
 impl PaletteDither {
     /// Creates a ditherer for these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
-        Self(PatternDither::new(colors.iter().copied().map(Ink::solid).collect(), CALM))
+        Self(PatternDither::new(colors.iter().copied().map(DitherColor::solid).collect(), CALM))
     }
 
     /// Returns the index of the palette color to use for `rgb` at this pixel.
     pub(crate) fn index_at(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
-        self.0.ink_index(rgb, threshold(x, y))
+        self.0.select_color_index(rgb, threshold(x, y))
     }
 }

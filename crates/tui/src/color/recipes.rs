@@ -20,14 +20,14 @@ const MAX_RECIPES: usize = 1 << 16;
 
 /// A solid color or a fine pattern of two colors.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ink {
+pub(super) struct DitherColor {
     linear: Vec3,
     lab: Vec3,
     /// Mean squared distance from a pattern's two colors to their mean. Zero for solid colors.
     texture: f32,
 }
 
-impl Ink {
+impl DitherColor {
     /// Creates an ink with a solid color.
     pub(super) fn solid(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
@@ -36,7 +36,7 @@ impl Ink {
 
     /// Creates an ink from a fine pattern of `front` over `back`. `share` is the fraction of the area covered
     /// by `front`.
-    pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
+    pub(super) fn from_pattern(front: &Self, back: &Self, share: f32) -> Self {
         /// Texture weight for patterns inside a cell, which are less visible than patterns made of whole
         /// cells.
         const FINENESS: f32 = 0.25;
@@ -51,7 +51,7 @@ impl Ink {
 /// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
 pub(super) struct PatternDither {
-    inks: Vec<Ink>,
+    inks: Vec<DitherColor>,
     /// Weight given to an ink's distance from the color, relative to the error in the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
@@ -60,30 +60,30 @@ pub(super) struct PatternDither {
 impl PatternDither {
     /// Creates a ditherer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks
     /// near the color.
-    pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
+    pub(super) fn new(inks: Vec<DitherColor>, calm: f32) -> Self {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
     /// Returns the index of the ink that a color and a dither threshold in (0, 1) select.
-    pub(super) fn ink_index(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
+    pub(super) fn select_color_index(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {
             Some(recipe) => *recipe,
-            None => self.cached_recipe(rgb),
+            None => self.compute_and_cache_pattern(rgb),
         };
         usize::from(recipe[part])
     }
 
-    fn cached_recipe(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
+    fn compute_and_cache_pattern(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
         if self.recipes.len() >= MAX_RECIPES {
             self.recipes.clear();
         }
-        let recipe = self.recipe(rgb);
+        let recipe = self.compute_pattern(rgb);
         self.recipes.insert(rgb, recipe);
         recipe
     }
 
-    fn recipe(&self, rgb: [u8; 3]) -> [u16; PARTS] {
+    fn compute_pattern(&self, rgb: [u8; 3]) -> [u16; PARTS] {
         let linear = srgb8_to_linear(rgb);
         let lab = oklab(linear);
         let slope = OklabDerivative::at(linear);
@@ -101,7 +101,7 @@ impl PatternDither {
         // Break ties by index.
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let off: Vec<Vec3> =
-            near.iter().map(|(_, index)| slope.change(self.inks[*index].linear - linear)).collect();
+            near.iter().map(|(_, index)| slope.apply(self.inks[*index].linear - linear)).collect();
         let mut parts = [0_u16; PARTS];
         let mut rest = Vec3::ZERO;
         for part in &mut parts {
@@ -122,7 +122,7 @@ mod tests {
     use crate::color::palette;
 
     fn cube() -> PatternDither {
-        PatternDither::new((16..=255).filter_map(palette::fixed_color).map(Ink::solid).collect(), 0.1)
+        PatternDither::new((16..=255).filter_map(palette::fixed_color).map(DitherColor::solid).collect(), 0.1)
     }
 
     #[test]
@@ -131,7 +131,7 @@ mod tests {
         for index in [0, 5, 100, 215, 230] {
             let rgb = palette::fixed_color(16 + index).expect("a fixed color");
             for part in 0..PARTS {
-                let ink = mixer.ink_index(rgb, (part as f32 + 0.5) / PARTS as f32);
+                let ink = mixer.select_color_index(rgb, (part as f32 + 0.5) / PARTS as f32);
                 assert_eq!(palette::fixed_color(16 + ink as u8), Some(rgb));
             }
         }
@@ -141,8 +141,9 @@ mod tests {
     fn recipe_mean_matches_the_color() {
         let mut mixer = cube();
         for rgb in [[150, 75, 50], [101, 67, 33], [30, 60, 90], [200, 190, 180], [115, 115, 110]] {
-            let parts: Vec<usize> =
-                (0..PARTS).map(|part| mixer.ink_index(rgb, (part as f32 + 0.5) / PARTS as f32)).collect();
+            let parts: Vec<usize> = (0..PARTS)
+                .map(|part| mixer.select_color_index(rgb, (part as f32 + 0.5) / PARTS as f32))
+                .collect();
             let mean = parts.iter().map(|ink| mixer.inks[*ink].linear).sum::<Vec3>() / PARTS as f32;
             let off = oklab(mean).distance(oklab(srgb8_to_linear(rgb)));
             assert!(off < 0.02, "{rgb:?}: {off}");
@@ -154,7 +155,7 @@ mod tests {
         let mut mixer = cube();
         let lab = oklab(srgb8_to_linear([150, 75, 50]));
         for part in 0..PARTS {
-            let ink = mixer.ink_index([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
+            let ink = mixer.select_color_index([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
             assert!(mixer.inks[ink].lab.distance(lab) < 0.15);
         }
     }

@@ -78,7 +78,7 @@ enum ReplyState {
 
 /// The connection to the terminal.
 #[derive(Debug)]
-pub(super) struct Connection {
+pub(super) struct TerminalConnection {
     replies: ReplyState,
     is_multiplexed: bool,
     flight: VecDeque<SentSlice>,
@@ -98,7 +98,7 @@ pub(super) struct Connection {
     unwritten: usize,
 }
 
-impl Connection {
+impl TerminalConnection {
     /// Creates a connection whose speed is unknown. `is_multiplexed` means that a multiplexer replies instead
     /// of the terminal.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
@@ -118,7 +118,7 @@ impl Connection {
     }
 
     /// Returns the maximum size of the next slice, excluding its query, or 0 if sending has to wait.
-    pub(super) fn max_slice(&mut self, now: Instant) -> usize {
+    pub(super) fn max_sendable_bytes(&mut self, now: Instant) -> usize {
         self.check_timeouts(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
         let tokens = self.bucket.tokens(now);
@@ -141,7 +141,7 @@ impl Connection {
     }
 
     /// Records a sent slice. `bytes` includes its query.
-    pub(super) fn send(&mut self, bytes: usize, question: Option<QueryKind>, now: Instant) {
+    pub(super) fn record_sent(&mut self, bytes: usize, question: Option<QueryKind>, now: Instant) {
         self.unwritten += bytes;
         self.bucket.take(bytes, now);
         let Some(question) = question else { return };
@@ -155,7 +155,7 @@ impl Connection {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn written(&mut self, bytes: usize) {
+    pub(super) fn record_written(&mut self, bytes: usize) {
         self.unwritten = self.unwritten.saturating_sub(bytes);
     }
 
@@ -173,14 +173,14 @@ impl Connection {
             if slice.question == question && slice.bytes <= MAX_WINDOW {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
-                self.note_recent(round_trip);
+                self.record_round_trip(round_trip);
                 self.adjust_window(&slice, round_trip, now);
             }
         }
     }
 
     /// Returns the earliest time at which more may be sent if no reply arrives.
-    pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
+    pub(super) fn next_send_time(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplyState::Answering => {
@@ -227,7 +227,7 @@ impl Connection {
         self.replies == ReplyState::Answering && !self.is_multiplexed && 2 * quick > self.recent.len()
     }
 
-    fn note_recent(&mut self, round_trip: Duration) {
+    fn record_round_trip(&mut self, round_trip: Duration) {
         if self.recent.len() == RECENT_SLICES {
             self.recent.pop_front();
         }

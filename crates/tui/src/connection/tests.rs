@@ -2,7 +2,7 @@ use super::*;
 
 /// A terminal behind a simulated connection. Sends as much as flow control allows.
 struct SimulatedTerminal {
-    connection: Connection,
+    connection: TerminalConnection,
     start: Instant,
     now: Instant,
     bytes_a_second: f64,
@@ -23,7 +23,7 @@ impl SimulatedTerminal {
     fn new(bytes_a_second: f64, milliseconds: u64, answers: bool, is_multiplexed: bool) -> Self {
         let now = Instant::now();
         let mut terminal = Self {
-            connection: Connection::new(is_multiplexed, now),
+            connection: TerminalConnection::new(is_multiplexed, now),
             start: now,
             now,
             bytes_a_second,
@@ -40,8 +40,8 @@ impl SimulatedTerminal {
     }
 
     fn send(&mut self, bytes: usize, question: Option<QueryKind>) {
-        self.connection.send(bytes, question, self.now);
-        self.connection.written(bytes);
+        self.connection.record_sent(bytes, question, self.now);
+        self.connection.record_written(bytes);
         self.busy = self.busy.max(self.now) + Duration::from_secs_f64(bytes as f64 / self.bytes_a_second);
         self.carried += bytes;
         self.longest = self.longest.max(self.busy - self.now);
@@ -64,14 +64,14 @@ impl SimulatedTerminal {
                 self.connection.handle_reply(question, self.now);
             }
             loop {
-                let room = self.connection.max_slice(self.now);
+                let room = self.connection.max_sendable_bytes(self.now);
                 if room == 0 {
                     break;
                 }
                 let question = self.connection.next_query();
                 self.send(room + question.map_or(0, |_| QUERY_BYTES), question);
             }
-            let next = [self.due.front().map(|(when, _)| *when), self.connection.wake(self.now)];
+            let next = [self.due.front().map(|(when, _)| *when), self.connection.next_send_time(self.now)];
             self.now =
                 next.into_iter().flatten().filter(|next| *next > self.now).min().unwrap_or(end).min(end);
         }
@@ -155,22 +155,22 @@ fn stalled_connection_recovers() {
 
 #[test]
 fn lost_reply_delays_output_by_a_second() {
-    let mut connection = Connection::new(false, Instant::now());
+    let mut connection = TerminalConnection::new(false, Instant::now());
     let now = Instant::now();
-    connection.send(100, Some(QueryKind::Attributes), now);
+    connection.record_sent(100, Some(QueryKind::Attributes), now);
     connection.handle_reply(QueryKind::Attributes, now + Duration::from_millis(5));
     let sent = now + Duration::from_millis(100);
-    connection.send(connection.window_bytes(), Some(QueryKind::Status), sent);
-    assert_eq!(connection.max_slice(sent + Duration::from_millis(900)), 0);
-    assert_eq!(connection.wake(sent), Some(sent + SILENCE));
-    assert!(connection.max_slice(sent + SILENCE) > 0);
+    connection.record_sent(connection.window_bytes(), Some(QueryKind::Status), sent);
+    assert_eq!(connection.max_sendable_bytes(sent + Duration::from_millis(900)), 0);
+    assert_eq!(connection.next_send_time(sent), Some(sent + SILENCE));
+    assert!(connection.max_sendable_bytes(sent + SILENCE) > 0);
     // The timeout grows with the round-trip time.
-    let mut slow = Connection::new(false, now);
-    slow.send(100, Some(QueryKind::Attributes), now);
+    let mut slow = TerminalConnection::new(false, now);
+    slow.record_sent(100, Some(QueryKind::Attributes), now);
     slow.handle_reply(QueryKind::Attributes, now + Duration::from_millis(800));
-    slow.send(slow.window_bytes(), Some(QueryKind::Status), sent);
-    assert_eq!(slow.max_slice(sent + Duration::from_secs(3)), 0);
-    assert!(slow.max_slice(sent + Duration::from_millis(3200)) > 0);
+    slow.record_sent(slow.window_bytes(), Some(QueryKind::Status), sent);
+    assert_eq!(slow.max_sendable_bytes(sent + Duration::from_secs(3)), 0);
+    assert!(slow.max_sendable_bytes(sent + Duration::from_millis(3200)) > 0);
 }
 
 #[test]
@@ -182,16 +182,16 @@ fn idle_connection_needs_no_wakeups() {
         terminal.connection.handle_reply(question, terminal.now);
     }
     assert!(!terminal.connection.awaits_reply());
-    assert_eq!(terminal.connection.wake(terminal.now), None);
+    assert_eq!(terminal.connection.next_send_time(terminal.now), None);
     assert!(terminal.now > terminal.start);
 }
 
 #[test]
 fn unsolicited_replies_are_ignored() {
-    let mut connection = Connection::new(false, Instant::now());
+    let mut connection = TerminalConnection::new(false, Instant::now());
     let now = Instant::now();
     connection.handle_reply(QueryKind::Status, now);
-    connection.send(100, Some(QueryKind::Attributes), now);
+    connection.record_sent(100, Some(QueryKind::Attributes), now);
     connection.handle_reply(QueryKind::Status, now);
     assert!(connection.awaits_reply());
     connection.handle_reply(QueryKind::Attributes, now);
@@ -200,10 +200,10 @@ fn unsolicited_replies_are_ignored() {
 
 #[test]
 fn replies_to_small_slices_reveal_a_fast_terminal() {
-    let mut connection = Connection::new(false, Instant::now());
+    let mut connection = TerminalConnection::new(false, Instant::now());
     let mut now = Instant::now();
-    let mut answer = |connection: &mut Connection, bytes: usize, milliseconds: u64| {
-        connection.send(bytes, Some(QueryKind::Status), now);
+    let mut answer = |connection: &mut TerminalConnection, bytes: usize, milliseconds: u64| {
+        connection.record_sent(bytes, Some(QueryKind::Status), now);
         now += Duration::from_millis(milliseconds);
         connection.handle_reply(QueryKind::Status, now);
     };
@@ -218,8 +218,8 @@ fn replies_to_small_slices_reveal_a_fast_terminal() {
         answer(&mut connection, 60, 20);
     }
     assert!(connection.is_fast());
-    let mut behind = Connection::new(true, now);
-    behind.send(12, Some(QueryKind::Attributes), now);
+    let mut behind = TerminalConnection::new(true, now);
+    behind.record_sent(12, Some(QueryKind::Attributes), now);
     behind.handle_reply(QueryKind::Attributes, now + Duration::from_millis(1));
     assert!(!behind.is_fast(), "the multiplexer replies");
 }

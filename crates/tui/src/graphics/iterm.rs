@@ -4,10 +4,10 @@ use ratatui::layout::Rect;
 
 use super::base64::encoded;
 use super::png::encode_png;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// The command that draws an image at the cursor, scaled to cover these cells.
-pub(super) fn encode(picture: &Picture, cells: Rect) -> Vec<u8> {
+pub(super) fn encode(picture: &Srgb8Image, cells: Rect) -> Vec<u8> {
     let png = encode_png(picture);
     let keys = format!(
         "\x1b]1337;File=inline=1;size={};width={};height={};preserveAspectRatio=0;doNotMoveCursor=1:",

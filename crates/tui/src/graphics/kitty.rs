@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 
 use super::base64::encoded;
 use super::png::encode_png;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// IDs of the two alternating images, chosen to be unlikely to clash with other programs.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
@@ -13,7 +13,7 @@ const CHUNK: usize = 4096;
 
 /// Returns the commands that draw an image at the cursor, scaled to cover these cells, and then delete the
 /// previous image.
-pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
+pub(super) fn encode(picture: &Srgb8Image, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
     let data = encoded(&encode_png(picture));
     let count = data.len().div_ceil(CHUNK);

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use ratatui::layout::Rect;
 
 use self::palette::Palette;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 pub(super) use self::kitty::delete_all;
 pub use self::pixel_screen::TestImageTerminal;
@@ -29,20 +29,20 @@ pub(super) enum ImageProtocol {
     Kitty,
     /// DEC's Sixel format, supported by foot, xterm with `-ti vt340`, mlterm and tmux.
     Sixel,
-    /// iTerm2's protocol. See [`TerminalBrand`](super::terminals::Brand) for terminals that support it.
+    /// iTerm2's protocol. See [`TerminalBrand`](super::terminals::TerminalBrand) for terminals that support it.
     Iterm,
 }
 
 /// An image and the cells it covers.
 #[derive(Clone, Debug)]
-pub(super) struct PixelPlacement {
-    pub(super) picture: Arc<Picture>,
+pub(super) struct ImagePlacement {
+    pub(super) picture: Arc<Srgb8Image>,
     pub(super) cells: Rect,
     /// Width and height of a cell in pixels.
     pub(super) cell: (u16, u16),
 }
 
-impl PartialEq for PixelPlacement {
+impl PartialEq for ImagePlacement {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.picture, &other.picture) && (self.cells, self.cell) == (other.cells, other.cell)
     }
@@ -58,13 +58,13 @@ const STILL_SECONDS: f64 = 1.5;
 
 /// The images on the screen and in flight.
 #[derive(Debug)]
-pub(super) struct Images {
+pub(super) struct TerminalImages {
     protocol: ImageProtocol,
     /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
-    wanted: Option<PixelPlacement>,
+    wanted: Option<ImagePlacement>,
     /// The image that is shown once all pieces have arrived.
-    shown: Option<PixelPlacement>,
+    shown: Option<ImagePlacement>,
     is_still: bool,
     /// Whether the displayed image was downscaled to save bytes.
     is_coarse: bool,
@@ -76,7 +76,7 @@ pub(super) struct Images {
     palette: Option<Palette>,
 }
 
-impl Images {
+impl TerminalImages {
     /// Creates an empty state. `is_wrapped` must be true inside tmux.
     pub(super) fn new(protocol: ImageProtocol, is_wrapped: bool) -> Self {
         // tmux draws Sixel images itself.
@@ -96,7 +96,7 @@ impl Images {
 
     /// Sets the image to show. `is_still` marks a final image. Returns cells that no image covers any more,
     /// which must be redrawn.
-    pub(super) fn set_target(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
+    pub(super) fn set_target(&mut self, wanted: Option<ImagePlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
         if self.wanted.as_ref().is_some_and(|wanted| wanted.cells == shown) {

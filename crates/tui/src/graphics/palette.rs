@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use crate::color::{PaletteDither, dithered_to_6_bits};
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
 const MAX: usize = 240;
@@ -28,7 +28,7 @@ pub(super) struct Palette {
 
 impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
-    pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
+    pub(super) fn for_picture(picture: &Srgb8Image, before: Option<Self>) -> Self {
         let mut bins = histogram(picture);
         let colors = split_into_boxes(&mut bins);
         let fits = |palette: &Self| {
@@ -42,7 +42,7 @@ impl Palette {
     }
 
     /// Returns each pixel's palette index.
-    pub(super) fn indices(&mut self, picture: &Picture) -> Vec<u8> {
+    pub(super) fn indices(&mut self, picture: &Srgb8Image) -> Vec<u8> {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
@@ -54,20 +54,20 @@ impl Palette {
 
 /// A histogram bin.
 #[derive(Clone, Copy, Debug, Default)]
-struct Bin {
+struct HistogramBin {
     sum: [f32; 3],
     count: f32,
 }
 
-impl Bin {
+impl HistogramBin {
     fn mean(&self) -> [f64; 3] {
         self.sum.map(|sum| f64::from(sum / self.count.max(1.0)))
     }
 }
 
 /// Histogram of an image's colors, without empty bins.
-fn histogram(picture: &Picture) -> Vec<Bin> {
-    let mut bins = vec![Bin::default(); 1 << (3 * BITS)];
+fn histogram(picture: &Srgb8Image) -> Vec<HistogramBin> {
+    let mut bins = vec![HistogramBin::default(); 1 << (3 * BITS)];
     for rgb in &picture.pixels {
         let place = rgb.iter().fold(0, |place, channel| place << BITS | usize::from(channel >> (8 - BITS)));
         let bin = &mut bins[place];
@@ -90,7 +90,7 @@ struct ColorBox {
 }
 
 impl ColorBox {
-    fn for_bins(all: &[Bin], bins: Range<usize>) -> Self {
+    fn for_bins(all: &[HistogramBin], bins: Range<usize>) -> Self {
         let own = &all[bins.clone()];
         let count: f64 = own.iter().map(|bin| f64::from(bin.count)).sum();
         let sum = |i: usize| own.iter().map(|bin| f64::from(bin.sum[i])).sum::<f64>();
@@ -108,7 +108,7 @@ impl ColorBox {
 
 /// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
 /// mean color of each box.
-fn split_into_boxes(bins: &mut [Bin]) -> Vec<[u8; 3]> {
+fn split_into_boxes(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
     while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
@@ -126,7 +126,7 @@ fn split_into_boxes(bins: &mut [Bin]) -> Vec<[u8; 3]> {
 }
 
 /// RMS distance between an image's colors and the nearest palette colors, in code values.
-fn palette_error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
+fn palette_error(bins: &[HistogramBin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
             mean.iter().zip(color).map(|(a, b)| (a - f64::from(*b)).powi(2)).sum()
@@ -142,15 +142,15 @@ mod tests {
     use super::*;
 
     /// A dark-to-light ramp with a spot of another color.
-    fn ramp(most: f64) -> Picture {
+    fn ramp(most: f64) -> Srgb8Image {
         let pixel = |i: u32| {
             let light = f64::from(i % 128) / 127.0 * most;
             if i < 40 { [200, 10, 10] } else { [light * 0.6, light * 0.9, light].map(|it| it as u8) }
         };
-        Picture { width: 128, height: 64, pixels: (0..128 * 64).map(pixel).collect() }
+        Srgb8Image { width: 128, height: 64, pixels: (0..128 * 64).map(pixel).collect() }
     }
 
-    fn mean_error(picture: &Picture, palette: &mut Palette) -> f64 {
+    fn mean_error(picture: &Srgb8Image, palette: &mut Palette) -> f64 {
         let indices = palette.indices(picture);
         let pairs = indices.iter().zip(&picture.pixels);
         let off = pairs.map(|(index, rgb)| {
@@ -164,7 +164,7 @@ mod tests {
     fn few_colors_are_exact_even_if_rare() {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
-        let picture = Picture { width: 64, height: 64, pixels };
+        let picture = Srgb8Image { width: 64, height: 64, pixels };
         let mut palette = Palette::for_picture(&picture, None);
         assert_eq!(palette.colors().len(), 2);
         assert_eq!(mean_error(&picture, &mut palette), 0.0);

@@ -1,7 +1,7 @@
 //! A minimal terminal that displays images, for tests and benchmarks.
 
 use super::base64::decoded;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// A terminal that understands only kitty graphics and Sixel, and shows the last complete image.
 #[derive(Debug, Default)]
@@ -11,13 +11,13 @@ pub struct TestImageTerminal {
     is_escaped: bool,
     /// Base64 data from the kitty chunks received so far.
     chunks: Vec<u8>,
-    shown: Option<Picture>,
+    shown: Option<Srgb8Image>,
     count: usize,
 }
 
 impl TestImageTerminal {
     /// Processes terminal output, which may be split at any byte.
-    pub fn take(&mut self, bytes: &[u8]) {
+    pub fn process_output(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let is_escaped = std::mem::replace(&mut self.is_escaped, *byte == 0x1b);
             match (is_escaped, byte, &mut self.string) {
@@ -35,12 +35,12 @@ impl TestImageTerminal {
     }
 
     /// The image on the screen.
-    pub fn shown(&self) -> Option<&Picture> {
+    pub fn displayed_image(&self) -> Option<&Srgb8Image> {
         self.shown.as_ref()
     }
 
     /// Number of images shown so far.
-    pub fn count(&self) -> usize {
+    pub fn displayed_image_count(&self) -> usize {
         self.count
     }
 
@@ -58,7 +58,7 @@ impl TestImageTerminal {
 
     /// Handles a kitty command, which contains a chunk of an image. Returns the image if the chunk completes
     /// it.
-    fn handle_kitty_chunk(&mut self, command: &[u8]) -> Option<Picture> {
+    fn handle_kitty_chunk(&mut self, command: &[u8]) -> Option<Srgb8Image> {
         let split = command.iter().position(|byte| *byte == b';')?;
         let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);
         self.chunks.extend_from_slice(data);
@@ -70,12 +70,12 @@ impl TestImageTerminal {
 }
 
 /// Decodes an RGB image from PNG.
-fn decode_png(bytes: &[u8]) -> Option<Picture> {
+fn decode_png(bytes: &[u8]) -> Option<Srgb8Image> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
     let mut data = vec![0; reader.output_buffer_size()?];
     let info = reader.next_frame(&mut data).ok()?;
     let pixels = data[..info.buffer_size()].as_chunks().0.to_vec();
-    (info.color_type == png::ColorType::Rgb).then_some(Picture {
+    (info.color_type == png::ColorType::Rgb).then_some(Srgb8Image {
         width: info.width,
         height: info.height,
         pixels,
@@ -83,7 +83,7 @@ fn decode_png(bytes: &[u8]) -> Option<Picture> {
 }
 
 /// Decodes a Sixel string that includes its size and palette.
-fn decode_sixel(string: &[u8]) -> Option<Picture> {
+fn decode_sixel(string: &[u8]) -> Option<Srgb8Image> {
     let start = string.iter().position(|byte| *byte == b'q')? + 1;
     let mut rest = &string[start..];
     let (mut width, mut height, mut pixels) = (0, 0, Vec::new());
@@ -118,7 +118,7 @@ fn decode_sixel(string: &[u8]) -> Option<Picture> {
             _ => {}
         }
     }
-    Some(Picture { width: width as u32, height: height as u32, pixels })
+    Some(Srgb8Image { width: width as u32, height: height as u32, pixels })
 }
 
 /// Removes and parses leading semicolon-separated numbers.

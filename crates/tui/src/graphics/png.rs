@@ -1,9 +1,9 @@
 //! PNG encoding for the kitty and iTerm2 protocols.
 
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Encodes an image as PNG with fast compression. Returns an empty vector on failure.
-pub(super) fn encode_png(picture: &Picture) -> Vec<u8> {
+pub(super) fn encode_png(picture: &Srgb8Image) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, picture.width, picture.height);
     encoder.set_color(::png::ColorType::Rgb);

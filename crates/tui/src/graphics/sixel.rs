@@ -4,7 +4,7 @@
 use ratatui::layout::Rect;
 
 use super::palette::Palette;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::rescale::resized;
 
 /// Register of the first palette color. Lower registers are reserved for the terminal.
@@ -16,7 +16,7 @@ const REGISTERS: usize = 256;
 /// pixels. The palette is reused if it still fits the image and recomputed otherwise. Small images are
 /// enlarged only after quantization, which saves time and memory.
 pub(super) fn encode(
-    picture: &Picture,
+    picture: &Srgb8Image,
     cells: Rect,
     cell: (u16, u16),
     palette: &mut Option<Palette>,

@@ -5,20 +5,20 @@ fn noise(level: u8, i: u32) -> [u8; 3] {
     [level, (hash >> 13) as u8, (hash >> 22) as u8]
 }
 
-fn placement(level: u8, x: u16) -> PixelPlacement {
+fn placement(level: u8, x: u16) -> ImagePlacement {
     let pixels = (0..64 * 48).map(|i| noise(level, i)).collect();
-    let picture = Arc::new(Picture { width: 64, height: 48, pixels });
-    PixelPlacement { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
+    let picture = Arc::new(Srgb8Image { width: 64, height: 48, pixels });
+    ImagePlacement { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
 }
 
-fn all(images: &mut Images) -> String {
+fn all(images: &mut TerminalImages) -> String {
     let slices = std::iter::from_fn(|| images.next_slice(5000, None)).flatten().collect();
     String::from_utf8(slices).expect("ASCII")
 }
 
 #[test]
 fn newest_image_replaces_pending_ones() {
-    let mut images = Images::new(ImageProtocol::Kitty, false);
+    let mut images = TerminalImages::new(ImageProtocol::Kitty, false);
     assert!(images.is_complete() && images.next_slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
     images.set_target(Some(first), false);
@@ -37,7 +37,7 @@ fn newest_image_replaces_pending_ones() {
 
 #[test]
 fn kitty_chunks_are_short_and_images_alternate() {
-    let mut images = Images::new(ImageProtocol::Kitty, false);
+    let mut images = TerminalImages::new(ImageProtocol::Kitty, false);
     images.set_target(Some(placement(1, 2)), true);
     let first = all(&mut images);
     for command in first.split("\x1b\\").filter(|command| command.contains(';') && command.contains("_G")) {
@@ -53,7 +53,7 @@ fn kitty_chunks_are_short_and_images_alternate() {
 #[test]
 fn moving_an_image_uncovers_its_old_cells() {
     for protocol in [ImageProtocol::Kitty, ImageProtocol::Sixel, ImageProtocol::Iterm] {
-        let mut images = Images::new(protocol, false);
+        let mut images = TerminalImages::new(protocol, false);
         assert_eq!(images.set_target(Some(placement(1, 2)), true), None);
         all(&mut images);
         assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "no cells should be uncovered");
@@ -68,7 +68,7 @@ fn moving_an_image_uncovers_its_old_cells() {
 
 #[test]
 fn slow_connections_get_coarser_images() {
-    let mut images = Images::new(ImageProtocol::Iterm, false);
+    let mut images = TerminalImages::new(ImageProtocol::Iterm, false);
     let picture = placement(1, 2);
     images.set_target(Some(picture.clone()), false);
     let coarse = images.next_slice(5000, Some(1000.0)).expect("a picture").len();
@@ -83,7 +83,7 @@ fn slow_connections_get_coarser_images() {
 #[test]
 fn sequences_are_wrapped_inside_tmux() {
     assert_eq!(tmux_passthrough(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
-    let mut images = Images::new(ImageProtocol::Iterm, true);
+    let mut images = TerminalImages::new(ImageProtocol::Iterm, true);
     images.set_target(Some(placement(1, 2)), true);
     let bytes = all(&mut images);
     assert!(
@@ -97,8 +97,8 @@ fn sequences_are_wrapped_inside_tmux() {
 fn sixel_size_and_colors_match_the_image() {
     let mut placed = placement(0, 0);
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
-    placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
-    let mut images = Images::new(ImageProtocol::Sixel, true);
+    placed.picture = Arc::new(Srgb8Image { width: 64, height: 48, pixels });
+    let mut images = TerminalImages::new(ImageProtocol::Sixel, true);
     images.set_target(Some(placed), true);
     let bytes = all(&mut images);
     assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
@@ -115,12 +115,12 @@ fn sixel_images_are_resized_to_their_cells() {
     for (width, height) in [(4, 3), (640, 480)] {
         let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
         let mut placed = placement(0, 0);
-        placed.picture = Arc::new(Picture { width, height, pixels: pixels.collect() });
-        let mut images = Images::new(ImageProtocol::Sixel, false);
+        placed.picture = Arc::new(Srgb8Image { width, height, pixels: pixels.collect() });
+        let mut images = TerminalImages::new(ImageProtocol::Sixel, false);
         images.set_target(Some(placed), true);
         let mut screen = TestImageTerminal::default();
-        screen.take(all(&mut images).as_bytes());
-        let shown = screen.shown().expect("a picture");
+        screen.process_output(all(&mut images).as_bytes());
+        let shown = screen.displayed_image().expect("a picture");
         assert_eq!((shown.width, shown.height), (64, 48));
         for (i, pixel) in (0..).zip(&shown.pixels) {
             let expected = color(i % 64 / 16, i / 64 / 16);

@@ -42,7 +42,7 @@ impl ControlString {
         }
     }
 
-    pub(super) fn reply(&self) -> TerminalReply {
+    pub(super) fn parse_reply(&self) -> TerminalReply {
         match self.kind {
             ControlStringKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
                 .map_or(TerminalReply::Other, TerminalReply::Name),
@@ -123,6 +123,6 @@ mod tests {
         assert!(has_true_color(b"524742=38"));
         assert!(has_true_color(b"5463"));
         assert!(!has_true_color(b"544e=787465726d"));
-        assert_eq!(ControlString::begin(b"+", 0, 'r').reply(), TerminalReply::Other);
+        assert_eq!(ControlString::begin(b"+", 0, 'r').parse_reply(), TerminalReply::Other);
     }
 }

@@ -1,13 +1,13 @@
 //! Decoded terminal input.
 
-use crate::event::{Event, KeyPress, Mouse};
+use crate::event::{Event, KeyPress, MouseEvent};
 use crate::terminal_replies::TerminalReply;
 
 /// Input from the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DecodedInput {
     Key(KeyPress),
-    Mouse(Mouse),
+    Mouse(MouseEvent),
     /// Pasted text. Its content is discarded.
     Paste,
     TerminalReply(TerminalReply),

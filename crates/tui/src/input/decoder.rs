@@ -77,7 +77,7 @@ impl Decoder {
         }
         self.last = Some(now);
         for &byte in bytes {
-            self.take_byte(byte, now);
+            self.process_byte(byte, now);
         }
         std::mem::take(&mut self.meaning.found)
     }
@@ -120,13 +120,13 @@ impl Decoder {
         }
     }
 
-    fn take_byte(&mut self, byte: u8, now: Instant) {
+    fn process_byte(&mut self, byte: u8, now: Instant) {
         match std::mem::take(&mut self.held) {
             PendingSequence::Nothing => self.begin_sequence(byte, now),
             PendingSequence::Escape | PendingSequence::StringEnd => self.continue_after_escape(byte, now),
             PendingSequence::Sequence { introducer, .. } if byte == ESCAPE => {
                 if introducer == b'_' {
-                    self.meaning.end_apc(&std::mem::take(&mut self.command));
+                    self.meaning.handle_apc(&std::mem::take(&mut self.command));
                 }
                 self.begin_sequence(byte, now);
                 if b"]P_X^".contains(&introducer) {
@@ -147,7 +147,7 @@ impl Decoder {
                 }
                 self.continue_sequence(byte, (begin, bytes + 1, introducer), now);
             }
-            PendingSequence::Doubtful(bytes) => self.continue_doubtful(bytes, byte, now),
+            PendingSequence::Doubtful(bytes) => self.continue_ambiguous(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
                 if paste.push(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
@@ -208,7 +208,7 @@ impl Decoder {
         }
     }
 
-    fn continue_doubtful(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
+    fn continue_ambiguous(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
             self.continue_sequence(byte, (now, bytes.len(), b'['), now);

@@ -5,7 +5,7 @@ use vte::{Params, Perform};
 
 use super::control_strings::{self, ControlString};
 use super::decoded::DecodedInput;
-use crate::event::{KeyPress, Mouse, MouseEventKind};
+use crate::event::{KeyPress, MouseEvent, MouseEventKind};
 use crate::graphics::ImageProtocol;
 use crate::terminal_replies::TerminalReply;
 
@@ -18,13 +18,13 @@ pub(super) struct InputPerformer {
     pub has_ended: bool,
     /// Whether a paste has started.
     pub is_paste: bool,
-    next: NextCharacter,
+    next: NextCharacterMode,
     report: ControlString,
 }
 
 /// How to interpret the next input character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum NextCharacter {
+enum NextCharacterMode {
     #[default]
     Character,
     /// Last byte of an SS3 key (`ESC O`): F1 to F4, and arrows on some terminals.
@@ -38,7 +38,7 @@ enum NextCharacter {
 impl InputPerformer {
     /// Drops the current sequence.
     pub(super) fn reset(&mut self) {
-        self.next = NextCharacter::Character;
+        self.next = NextCharacterMode::Character;
         self.is_paste = false;
     }
 
@@ -47,7 +47,7 @@ impl InputPerformer {
     }
 
     /// Handles a complete application program command.
-    pub(super) fn end_apc(&mut self, text: &[u8]) {
+    pub(super) fn handle_apc(&mut self, text: &[u8]) {
         self.push_reply(control_strings::parse_apc(text));
     }
 
@@ -65,7 +65,7 @@ impl InputPerformer {
             _ => return self.push_reply(TerminalReply::Other),
         };
         let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
-        self.found.push(DecodedInput::Mouse(Mouse { kind, column, row }));
+        self.found.push(DecodedInput::Mouse(MouseEvent { kind, column, row }));
     }
 
     fn push_reply(&mut self, answer: TerminalReply) {
@@ -77,27 +77,27 @@ impl Perform for InputPerformer {
     fn print(&mut self, character: char) {
         self.has_ended = true;
         match std::mem::take(&mut self.next) {
-            NextCharacter::Character => {
+            NextCharacterMode::Character => {
                 let key = match character {
                     '\x7f' => KeyCode::Backspace,
                     character => KeyCode::Char(character),
                 };
                 self.push_key(key, KeyModifiers::NONE);
             }
-            NextCharacter::SingleShift => {
+            NextCharacterMode::SingleShift => {
                 if let Some(code) = letter_key(character) {
                     self.push_key(code, KeyModifiers::NONE);
                 }
             }
-            NextCharacter::Console => {
+            NextCharacterMode::Console => {
                 if let Some(number @ 1..=5) = u8::try_from(character).ok().and_then(|it| it.checked_sub(b'@'))
                 {
                     self.push_key(KeyCode::F(number), KeyModifiers::NONE);
                 }
             }
-            NextCharacter::Mouse(left) => {
+            NextCharacterMode::Mouse(left) => {
                 if left > 1 {
-                    self.next = NextCharacter::Mouse(left - 1);
+                    self.next = NextCharacterMode::Mouse(left - 1);
                     self.has_ended = false;
                 }
             }
@@ -105,7 +105,7 @@ impl Perform for InputPerformer {
     }
 
     fn execute(&mut self, byte: u8) {
-        self.next = NextCharacter::Character;
+        self.next = NextCharacterMode::Character;
         match byte {
             b'\r' => self.push_key(KeyCode::Enter, KeyModifiers::NONE),
             b'\t' => self.push_key(KeyCode::Tab, KeyModifiers::NONE),
@@ -121,7 +121,7 @@ impl Perform for InputPerformer {
     fn esc_dispatch(&mut self, intermediates: &[u8], _ignore: bool, byte: u8) {
         match byte {
             b'O' if intermediates.is_empty() => {
-                self.next = NextCharacter::SingleShift;
+                self.next = NextCharacterMode::SingleShift;
                 return;
             }
             // A string terminator or an unknown sequence.
@@ -157,11 +157,11 @@ impl Perform for InputPerformer {
             }
             ([], 'Z') => self.push_key(KeyCode::BackTab, KeyModifiers::SHIFT),
             ([], '[') => {
-                self.next = NextCharacter::Console;
+                self.next = NextCharacterMode::Console;
                 self.has_ended = false;
             }
             ([], 'M') if params.len() <= 1 && first == 0 => {
-                self.next = NextCharacter::Mouse(3);
+                self.next = NextCharacterMode::Mouse(3);
                 self.has_ended = false;
             }
             // With two parameters, this is a cursor position report rather than F3.
@@ -194,7 +194,7 @@ impl Perform for InputPerformer {
 
     fn unhook(&mut self) {
         self.has_ended = true;
-        let answer = std::mem::take(&mut self.report).reply();
+        let answer = std::mem::take(&mut self.report).parse_reply();
         self.push_reply(answer);
     }
 }

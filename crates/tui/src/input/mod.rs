@@ -33,7 +33,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let read = move || {
         let mut decoder = Decoder::default();
-        while let Some(inputs) = next(&mut decoder) {
+        while let Some(inputs) = read_input(&mut decoder) {
             for input in inputs {
                 if events.send(input.into()).is_err() {
                     return;
@@ -56,7 +56,7 @@ pub(super) fn set_input_paused(is_held: bool) {
 }
 
 /// Waits while another program is reading the input. Returns true if it had to wait.
-fn wait_while_held() -> bool {
+fn wait_while_paused() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;
     drop(HELD.1.wait_while(held, |held| *held));
@@ -64,10 +64,10 @@ fn wait_while_held() -> bool {
 }
 
 /// Reads and decodes input. Returns an empty list after a timeout, or `None` if the terminal was closed.
-fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
+fn read_input(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait_for_input(decoder.deadline());
-    if wait_while_held() {
+    if wait_while_paused() {
         return Some(Vec::new());
     }
     match waited.and_then(|is_readable| if is_readable { read_stdin(&mut bytes) } else { Ok(None) }) {

@@ -23,12 +23,12 @@ pub(super) struct Paste {
     bytes: usize,
     /// Number of end marker bytes matched so far.
     matched: usize,
-    sequence: ControlSequence,
+    sequence: ControlSequenceState,
 }
 
 /// Parser state of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ControlSequence {
+enum ControlSequenceState {
     /// Outside a control sequence.
     Outside,
     /// After the escape character.
@@ -37,9 +37,9 @@ enum ControlSequence {
     Parameters,
 }
 
-impl ControlSequence {
+impl ControlSequenceState {
     /// The state after another byte. `None` if the byte is text.
-    fn after(self, byte: u8) -> Option<Self> {
+    fn next_state(self, byte: u8) -> Option<Self> {
         match (self, byte) {
             (Self::Outside | Self::Escape | Self::Parameters, 0x1b) => Some(Self::Escape),
             (Self::Escape, b'[') => Some(Self::Parameters),
@@ -52,7 +52,7 @@ impl ControlSequence {
 
 impl Paste {
     pub(super) fn new(now: Instant) -> Self {
-        Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequence::Outside }
+        Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequenceState::Outside }
     }
 
     /// Time when the paste expires if nothing more arrives.
@@ -63,11 +63,11 @@ impl Paste {
 
     /// Processes one byte. Returns true if it completes the end marker.
     pub(super) fn push(&mut self, byte: u8, now: Instant) -> bool {
-        let sequence = self.sequence.after(byte);
+        let sequence = self.sequence.next_state(byte);
         if sequence.is_none() {
             self.last = now;
         }
-        self.sequence = sequence.unwrap_or(ControlSequence::Outside);
+        self.sequence = sequence.unwrap_or(ControlSequenceState::Outside);
         self.bytes = self.bytes.saturating_add(1);
         // Only ESC itself is both a suffix of a partial marker and a prefix of the marker.
         self.matched = match byte {

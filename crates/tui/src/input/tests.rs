@@ -4,7 +4,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use proptest::prelude::*;
 
 use super::*;
-use crate::event::{Mouse, MouseEventKind};
+use crate::event::{MouseEvent, MouseEventKind};
 use crate::graphics::ImageProtocol;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::{TerminalBrand, TerminalId};
@@ -144,7 +144,7 @@ fn left_button_and_wheel_are_decoded() {
         (b"\x1b[<64;10;20M", WheelUp),
         (b"\x1b[<65;10;20M", WheelDown),
     ] {
-        let expected = DecodedInput::Mouse(Mouse { kind, column: 9, row: 19 });
+        let expected = DecodedInput::Mouse(MouseEvent { kind, column: 9, row: 19 });
         assert_eq!(read(bytes), [expected], "{bytes:?}");
         let mut bench = DecoderBench::new();
         let inputs: Vec<DecodedInput> = bytes.iter().flat_map(|byte| bench.read(&[*byte])).collect();

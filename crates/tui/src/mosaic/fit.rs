@@ -1,6 +1,6 @@
 //! Approximates a cell's pixels with two colors and a block character.
 
-use super::tile::{CellDivision, Grid, Tile};
+use super::tile::{BlockPattern, CellDivision, CellGrid};
 use crate::color::oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
@@ -8,7 +8,7 @@ use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 /// A cell's tile and its two sRGB colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
-    pub(crate) tile: Tile,
+    pub(crate) tile: BlockPattern,
     /// Colors of the first and second parts.
     pub(crate) pair: [[u8; 3]; 2],
 }
@@ -19,9 +19,9 @@ const WORTH: f32 = 1e-4;
 
 /// Fits a cell to its pixels, minimizing the squared Oklab distance. `pixels` are sRGB colors in row order.
 /// The chosen division minimizes the variance within the two parts.
-pub(crate) fn fit_cell(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
-    if let ([first, second], Grid::Halves) = (pixels, grid) {
-        return FittedCell { tile: Tile::HALVES, pair: [*first, *second] };
+pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
+    if let ([first, second], CellGrid::Halves) = (pixels, grid) {
+        return FittedCell { tile: BlockPattern::HALVES, pair: [*first, *second] };
     }
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
     let CellDivision { first, tile } = best_division(grid, &pixels);
@@ -34,11 +34,11 @@ pub(crate) fn fit_cell(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
 }
 
 /// The division of a cell that minimizes the variance within its two parts.
-fn best_division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
+fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
-    let (mut best, mut most) = (CellDivision { first: 1, tile: Tile::HALVES }, f32::NEG_INFINITY);
+    let (mut best, mut most) = (CellDivision { first: 1, tile: BlockPattern::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);
     for division in grid.divisions() {
         let mut changed = mask ^ division.first;
@@ -52,7 +52,7 @@ fn best_division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
         mask = division.first;
         // Reduction in variance, up to a constant.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
-        let worth = if division.tile == Tile::HALVES { WORTH * count } else { 0.0 };
+        let worth = if division.tile == BlockPattern::HALVES { WORTH * count } else { 0.0 };
         if gain + worth > most {
             (best, most) = (*division, gain + worth);
         }
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn two_color_patterns_are_reproduced() {
         let colors = [[200, 20, 20], [20, 40, 180]];
-        for grid in [Grid::Quadrants, Grid::Sextants, Grid::Octants] {
+        for grid in [CellGrid::Quadrants, CellGrid::Sextants, CellGrid::Octants] {
             for CellDivision { first, tile } in grid.divisions() {
                 let pixels: Vec<[u8; 3]> =
                     (0..2 * grid.rows()).map(|i| colors[usize::from(first >> i & 1 == 0)]).collect();
@@ -83,6 +83,6 @@ mod tests {
     #[test]
     fn nearly_uniform_cells_use_halves() {
         let pixels: Vec<[u8; 3]> = (0..4).map(|i| [150 + i % 3; 3]).collect();
-        assert_eq!(fit_cell(Grid::Quadrants, &pixels).tile, Tile::HALVES);
+        assert_eq!(fit_cell(CellGrid::Quadrants, &pixels).tile, BlockPattern::HALVES);
     }
 }

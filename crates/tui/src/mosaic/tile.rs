@@ -14,21 +14,21 @@ const ALL: u32 = (1 << PLACES) - 1;
 /// A division of a cell into two parts, and the characters that draw it. The first part contains the top left
 /// corner.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tile {
+pub(crate) struct BlockPattern {
     /// Mask of the grid squares in the first part, in row order.
     first: u32,
     symbols: [char; 2],
 }
 
-impl PartialEq for Tile {
+impl PartialEq for BlockPattern {
     fn eq(&self, other: &Self) -> bool {
         self.first == other.first
     }
 }
 
-impl Eq for Tile {}
+impl Eq for BlockPattern {}
 
-impl Tile {
+impl BlockPattern {
     /// Upper and lower halves.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
     /// A pattern that fills a quarter of the cell with the foreground color. The pattern varies between
@@ -51,7 +51,7 @@ impl Tile {
     }
 
     /// Counts the grid squares in which each part of this tile overlaps each part of `other`.
-    pub(crate) fn shared_squares(self, other: Self) -> [[u32; 2]; 2] {
+    pub(crate) fn overlap_counts(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
@@ -59,7 +59,7 @@ impl Tile {
 
 /// Returns the tile that a character draws, and true if the foreground is its second part. `None` if it is
 /// not a block character.
-pub(crate) fn from_symbol(symbol: char) -> Option<(Tile, bool)> {
+pub(crate) fn from_symbol(symbol: char) -> Option<(BlockPattern, bool)> {
     // Letters, digits and punctuation have smaller code points than block characters.
     if symbol < '▀' {
         return None;
@@ -81,11 +81,11 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
 
 /// Returns the tile with this mask as its first part, or as its second part if the mask excludes the top left
 /// corner.
-fn from_mask(mask: u32) -> Option<(Tile, bool)> {
+fn from_mask(mask: u32) -> Option<(BlockPattern, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
     let symbol = |mask| TABLE.symbols.get(&mask).copied();
-    let tile = Tile { first, symbols: [symbol(first)?, symbol(ALL & !first)?] };
+    let tile = BlockPattern { first, symbols: [symbol(first)?, symbol(ALL & !first)?] };
     Some((tile, is_second))
 }
 
@@ -106,7 +106,7 @@ static TABLE: LazyLock<BlockPatternTable> = LazyLock::new(|| {
             add(symbol, expand_mask(mask, 2));
         }
     }
-    let light = Tile::LIGHT.first;
+    let light = BlockPattern::LIGHT.first;
     add('░', light);
     add('▓', ALL & !light);
     // The inverted checkerboard has a different mask but looks the same.
@@ -179,7 +179,7 @@ fn octants_as_quadrants(mask: u32) -> Option<u32> {
 
 /// Grids that divide a cell into parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Grid {
+pub(crate) enum CellGrid {
     Halves,
     Quadrants,
     /// Sextants and quadrants.
@@ -192,10 +192,10 @@ pub(crate) enum Grid {
 pub(super) struct CellDivision {
     /// Mask of the pixels in the first part, in row order.
     pub(super) first: u32,
-    pub(super) tile: Tile,
+    pub(super) tile: BlockPattern,
 }
 
-impl Grid {
+impl CellGrid {
     /// Pixels per cell, horizontally.
     pub(crate) fn columns(self) -> u32 {
         if self == Self::Halves { 1 } else { 2 }
@@ -228,13 +228,14 @@ impl Grid {
 /// Lists all divisions along two-column grids for a cell with `pixel_rows` rows of pixels. `part_rows` lists
 /// the number of rows in each grid.
 fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
-    let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
+    let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: BlockPattern::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
         // Iterate in Gray code order. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
             let of_tile = from_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
-            let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
+            let is_new =
+                |tile: &BlockPattern| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
                 divisions.push(CellDivision { first: expand_rows(mask, *rows, pixel_rows), tile });
             }
@@ -249,7 +250,9 @@ mod tests {
 
     #[test]
     fn all_divisions_have_characters() {
-        for (grid, count) in [(Grid::Quadrants, 7), (Grid::Sextants, 31 + 6), (Grid::Octants, 127)] {
+        for (grid, count) in
+            [(CellGrid::Quadrants, 7), (CellGrid::Sextants, 31 + 6), (CellGrid::Octants, 127)]
+        {
             let divisions = grid.divisions();
             let mut seen = std::collections::HashSet::new();
             for CellDivision { first, tile } in divisions {
@@ -260,7 +263,7 @@ mod tests {
                 assert!(seen.insert(front) && seen.insert(back));
             }
             assert_eq!(divisions.len(), count, "{grid:?}");
-            assert_eq!(divisions[0].tile, Tile::HALVES);
+            assert_eq!(divisions[0].tile, BlockPattern::HALVES);
         }
     }
 

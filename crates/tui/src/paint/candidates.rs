@@ -1,6 +1,6 @@
 //! Candidate colors for a cell.
 
-use super::cell::Mosaic;
+use super::cell::TwoColorCell;
 use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digits};
 use crate::color::nearest_256;
@@ -24,7 +24,10 @@ pub(super) struct CandidateColors {
 
 /// Returns candidates for the first of `cells`, each of which also fits as many of the following cells as
 /// possible.
-pub(super) fn candidates(cells: &[Option<Mosaic>], model: RateDistortion) -> CandidateColors {
+pub(super) fn cell_color_candidates(
+    cells: &[Option<TwoColorCell>],
+    model: RateDistortion,
+) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     CandidateColors {
@@ -50,8 +53,8 @@ fn candidate_colors(
         return shades;
     };
     for span in model.spans {
-        let box_ = common_colors(wanted.clone(), *span);
-        add(TerminalColor::Rgb(box_.shortest()));
+        let box_ = shared_color_range(wanted.clone(), *span);
+        add(TerminalColor::Rgb(box_.shortest_encoding()));
         let index = nearest_256(box_.mean());
         let fixed = TerminalColor::Palette(index);
         if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.contains(rgb)) {
@@ -62,7 +65,7 @@ fn candidate_colors(
 }
 
 /// The range of colors that fit every cell in a run.
-struct CommonColors {
+struct SharedColorRange {
     low: [u8; 3],
     high: [u8; 3],
     sum: [u32; 3],
@@ -71,8 +74,8 @@ struct CommonColors {
 
 /// Intersects the ranges of colors within `span` of each wanted color, stopping before the intersection
 /// becomes empty.
-fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
-    let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
+fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> SharedColorRange {
+    let mut common = SharedColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
         let TerminalColor::Rgb(rgb) = shade else { break };
         let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
@@ -87,7 +90,7 @@ fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> Commo
     common
 }
 
-impl CommonColors {
+impl SharedColorRange {
     fn mean(&self) -> [u8; 3] {
         let count = self.count.max(1);
         let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
@@ -95,7 +98,7 @@ impl CommonColors {
     }
 
     /// Returns the color with the fewest decimal digits, preferring the one closest to the mean.
-    fn shortest(&self) -> [u8; 3] {
+    fn shortest_encoding(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
             let fewest = decimal_digits(self.low[i]);
@@ -113,9 +116,9 @@ impl CommonColors {
 mod tests {
     use super::*;
 
-    fn row(values: &[u8]) -> Vec<Option<Mosaic>> {
+    fn row(values: &[u8]) -> Vec<Option<TwoColorCell>> {
         let halves = |value: &u8| {
-            Mosaic::halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
+            TwoColorCell::halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
         };
         values.iter().map(|value| Some(halves(value))).collect()
     }
@@ -123,13 +126,13 @@ mod tests {
     #[test]
     fn candidates_cover_many_following_cells() {
         // 21 is within the tolerance of 20, 21 and 22, but not of 24.
-        let found = candidates(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
+        let found = cell_color_candidates(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
-        let grays = [Some(Mosaic::uniform(TerminalColor::Rgb([8, 8, 8])))];
+        let grays = [Some(TwoColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
-            candidates(&grays, RateDistortion::EXACT).first,
+            cell_color_candidates(&grays, RateDistortion::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
         );
     }
@@ -137,13 +140,13 @@ mod tests {
     #[test]
     fn palette_colors_are_kept_unchanged() {
         let cells =
-            [Some(Mosaic::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
-        let found = candidates(&cells, RateDistortion::MOVING);
+            [Some(TwoColorCell::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
+        let found = cell_color_candidates(&cells, RateDistortion::MOVING);
         assert_eq!(
             (found.first, found.second),
             (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
-        let found = candidates(&[None], RateDistortion::MOVING);
+        let found = cell_color_candidates(&[None], RateDistortion::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -7,7 +7,7 @@ use unicode_width::UnicodeWidthStr;
 use super::pen::{Pen, PenRequirements};
 use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
-use crate::mosaic::{PLACES, Tile, from_symbol};
+use crate::mosaic::{BlockPattern, PLACES, from_symbol};
 
 /// Content of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) enum CellContent {
     /// The content of the cell is unknown.
     Unknown,
     /// A tile with two colors. A blank consists of two halves in the same color.
-    Mosaic(Mosaic),
+    Mosaic(TwoColorCell),
     /// A character.
     Text(TextCell),
     /// The right half of a wide character.
@@ -24,20 +24,20 @@ pub(super) enum CellContent {
 
 /// A cell with two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Mosaic {
-    pub(super) tile: Tile,
+pub(super) struct TwoColorCell {
+    pub(super) tile: BlockPattern,
     /// Colors of the first and second parts.
     pub(super) pair: [TerminalColor; 2],
 }
 
-impl Mosaic {
+impl TwoColorCell {
     /// Normalizes the tile so that cells with the same appearance are equal.
-    pub(super) fn new(tile: Tile, pair: [TerminalColor; 2]) -> Self {
-        Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
+    pub(super) fn new(tile: BlockPattern, pair: [TerminalColor; 2]) -> Self {
+        Self { tile: if pair[0] == pair[1] { BlockPattern::HALVES } else { tile }, pair }
     }
 
     pub(super) fn halves(pair: [TerminalColor; 2]) -> Self {
-        Self { tile: Tile::HALVES, pair }
+        Self { tile: BlockPattern::HALVES, pair }
     }
 
     /// A cell with a single color.
@@ -62,7 +62,7 @@ impl Mosaic {
         self,
         other: Self,
     ) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
-        let shared = self.tile.shared_squares(other.tile);
+        let shared = self.tile.overlap_counts(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
         pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
             let part = 2.0 * shared[own][its] as f32 / PLACES as f32;
@@ -107,7 +107,7 @@ impl CellFill {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
     /// The character that draws this tile.
-    pub(super) fn symbol(self, tile: Tile) -> char {
+    pub(super) fn symbol(self, tile: BlockPattern) -> char {
         match self {
             Self::Blank => ' ',
             Self::First => tile.symbols()[0],
@@ -127,7 +127,7 @@ impl CellFill {
     }
 
     /// Returns the glyph's pen requirements. Colors that it does not show are unconstrained.
-    pub(super) fn requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
+    pub(super) fn pen_requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
         let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
@@ -141,16 +141,20 @@ impl CellFill {
     }
 
     /// Whether this glyph can show these colors.
-    pub(super) fn shows(self, pair: [TerminalColor; 2]) -> bool {
+    pub(super) fn can_show(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.layers();
-        pair[0].fits(first) && pair[1].fits(second) && (first != second || pair[0] == pair[1])
+        pair[0].is_allowed_in(first)
+            && pair[1].is_allowed_in(second)
+            && (first != second || pair[0] == pair[1])
     }
 }
 
 impl CellContent {
     /// A blank with the terminal's default background.
-    pub(super) const BLANK: Self =
-        Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::DefaultBackground; 2] });
+    pub(super) const BLANK: Self = Self::Mosaic(TwoColorCell {
+        tile: BlockPattern::HALVES,
+        pair: [TerminalColor::DefaultBackground; 2],
+    });
 
     /// Converts a ratatui cell for a terminal with this color depth.
     pub(super) fn from_cell(cell: &Cell, depth: ColorDepth) -> Self {
@@ -161,7 +165,8 @@ impl CellContent {
         let (fg, bg) = (shade(cell.fg, ColorLayer::Foreground), shade(cell.bg, ColorLayer::Background));
         let (symbol, columns) = printable_symbol(cell.symbol());
         let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
-        let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::from_symbol(symbol, fg, bg)).flatten();
+        let mosaic =
+            harmless.contains(cell.modifier).then(|| TwoColorCell::from_symbol(symbol, fg, bg)).flatten();
         mosaic.map_or_else(
             || {
                 Self::Text(TextCell {

@@ -34,10 +34,10 @@ pub(super) fn push_shortest_move(from: Option<CellPosition>, to: CellPosition, o
             consider(move_with_return(&vec![b'\n'; down], to.x));
         }
         if from.x == to.x {
-            consider(counted_sequence(to.y - from.y, b'B'));
+            consider(csi_with_count(to.y - from.y, b'B'));
         }
     } else if from.x == to.x {
-        consider(counted_sequence(from.y - to.y, b'A'));
+        consider(csi_with_count(from.y - to.y, b'A'));
     }
     out.extend_from_slice(&best);
 }
@@ -57,7 +57,7 @@ fn push_absolute_move(to: CellPosition, out: &mut Vec<u8>) {
 
 /// Movement within a row (CUF or CUB). CHA is not used because CUP, CUF or CUB is always at least as short.
 fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
-    if to >= from { counted_sequence(to - from, b'C') } else { counted_sequence(from - to, b'D') }
+    if to >= from { csi_with_count(to - from, b'C') } else { csi_with_count(from - to, b'D') }
 }
 
 /// Carriage return, line feeds, then movement to the right.
@@ -65,13 +65,13 @@ fn move_with_return(down: &[u8], column: u16) -> Vec<u8> {
     let mut bytes = vec![b'\r'];
     bytes.extend_from_slice(down);
     if column > 0 {
-        bytes.extend(counted_sequence(column, b'C'));
+        bytes.extend(csi_with_count(column, b'C'));
     }
     bytes
 }
 
 /// A control sequence with a count. The count is omitted if it is 1.
-pub(super) fn counted_sequence(count: u16, end: u8) -> Vec<u8> {
+pub(super) fn csi_with_count(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {
         push_number(count, &mut bytes);

@@ -40,7 +40,7 @@ impl Hyperlinks {
     }
 
     /// Appends the bytes that open a hyperlink, closing the previous one.
-    pub(super) fn open(&self, number: u16, out: &mut Vec<u8>) {
+    pub(super) fn push_link_start(&self, number: u16, out: &mut Vec<u8>) {
         let address = usize::from(number).checked_sub(1).and_then(|index| self.addresses.get(index));
         match address {
             Some(address) => out.extend_from_slice(format!("\x1b]8;;{address}\x1b\\").as_bytes()),
@@ -67,8 +67,8 @@ mod tests {
         );
         assert_eq!([links.url_number("a b"), links.url_number("\x1b]"), links.url_number("ä")], [0; 3]);
         let mut out = Vec::new();
-        links.open(2, &mut out);
-        links.open(0, &mut out);
+        links.push_link_start(2, &mut out);
+        links.push_link_start(0, &mut out);
         assert_eq!(out, b"\x1b]8;;file:///b\x1b\\\x1b]8;;\x1b\\");
     }
 }

@@ -82,7 +82,7 @@ enum DrawStep {
 
 /// Hyperlinks and drawing hints for a frame.
 #[derive(Clone, Debug, Default)]
-pub struct FrameExtras {
+pub struct LinksAndDelayedText {
     /// Cells whose text is drawn after the preview.
     pub later: Rect,
     /// Hyperlinks in the text.
@@ -118,7 +118,7 @@ impl Painter {
     }
 
     /// Sets whether the terminal supports REP. See [`can_repeat`].
-    pub fn repeating(self, can_repeat: bool) -> Self {
+    pub fn with_repeat_support(self, can_repeat: bool) -> Self {
         Self { can_repeat, ..self }
     }
 
@@ -129,7 +129,7 @@ impl Painter {
     /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
     /// targets change faster than they can be drawn.
     pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        self.set_target_with(wanted, picture, fidelity, &FrameExtras::default());
+        self.set_target_with(wanted, picture, fidelity, &LinksAndDelayedText::default());
     }
 
     /// Like [`Painter::set_target`], but with hyperlinks and with text to be drawn after the preview.
@@ -138,12 +138,12 @@ impl Painter {
         wanted: &Buffer,
         picture: Rect,
         fidelity: Fidelity,
-        extras: &FrameExtras,
+        extras: &LinksAndDelayedText,
     ) {
         let mut wanted =
             TargetScreen::new(wanted, picture, fidelity, self.depth).with_delayed_text(extras.later);
         for Hyperlink { cells, address } in &extras.links {
-            wanted.link(*cells, self.links.url_number(address));
+            wanted.link_cells(*cells, self.links.url_number(address));
         }
         let size = (wanted.columns, wanted.rows);
         if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
@@ -180,20 +180,20 @@ impl Painter {
     /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the
     /// screen matches the target. The caller must write the bytes because later slices build on them. No
     /// other output may move the cursor or change colors between slices.
-    pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
-        self.slice_until(most_bytes, || false)
+    pub fn next_slice(&mut self, most_bytes: usize) -> Vec<u8> {
+        self.next_slice_until(most_bytes, || false)
     }
 
-    /// Like [`Painter::slice`], but stops early once `is_late` returns true. `is_late` is called before each
+    /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before each
     /// row because planning a whole preview would delay the response to a key press too much.
-    pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
+    pub fn next_slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = OutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
         }
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
         let screen = self.screen.get_or_insert_with(|| {
-            ScreenModel::clear(&self.links, &mut slice);
+            ScreenModel::push_clear(&self.links, &mut slice);
             ScreenModel::cleared(columns, rows)
         });
         loop {
@@ -222,10 +222,12 @@ impl Painter {
                 Some(DrawStep::Later(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
                 }
-                Some(DrawStep::Picture(y)) if self.rows[usize::from(y)].is_done && !screen.is_damaged(y) => {
+                Some(DrawStep::Picture(y))
+                    if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
+                {
                     Vec::new()
                 }
-                Some(DrawStep::Picture(y)) if self.wanted.is_ramp() => {
+                Some(DrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
                 }
                 Some(DrawStep::Picture(y)) => picture::plan_preview_row(

@@ -104,7 +104,7 @@ impl Pen {
         ] {
             if let Some(shade) = wished.filter(|shade| shade != own) {
                 push_separator(list);
-                shade.push(layer, list);
+                shade.push_sgr(layer, list);
                 *own = shade;
             }
         }

@@ -96,6 +96,6 @@ fn target_cell(
         CellContent::Mosaic(mosaic) => Some(*mosaic),
         CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };
-    let wanted = wanted.mosaic(at.x, at.y).map(|wanted| memory.stabilized_mosaic(at, wanted, shown));
+    let wanted = wanted.preview_cell(at.x, at.y).map(|wanted| memory.stabilized_cell(at, wanted, shown));
     TargetCell { wanted, shown }
 }

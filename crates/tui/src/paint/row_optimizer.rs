@@ -4,11 +4,11 @@
 //! colors. The cost depends on the pen and the cursor position, so the search keeps the best path for each of
 //! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
-use super::candidates::{CandidateColors, candidates};
-use super::cell::{CellFill, Mosaic};
+use super::candidates::{CandidateColors, cell_color_candidates};
+use super::cell::{CellFill, TwoColorCell};
 use super::cost_model::RateDistortion;
 use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
-use crate::mosaic::{PLACES, Tile};
+use crate::mosaic::{BlockPattern, PLACES};
 
 /// Number of paths kept per cell.
 const BEAM: usize = 5;
@@ -20,9 +20,9 @@ const MAX_BYTES: f32 = 46.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
     /// Target content. `None` if the cell is not part of the preview.
-    pub(super) wanted: Option<Mosaic>,
+    pub(super) wanted: Option<TwoColorCell>,
     /// Content on the screen. `None` if unknown, in which case the cell must be drawn.
-    pub(super) shown: Option<Mosaic>,
+    pub(super) shown: Option<TwoColorCell>,
 }
 
 /// State of the pen and cursor at the start of a row.
@@ -40,12 +40,12 @@ pub(super) struct DrawOp {
     /// Column relative to the first target cell.
     pub(super) column: usize,
     pub(super) glyph: CellFill,
-    pub(super) mosaic: Mosaic,
+    pub(super) mosaic: TwoColorCell,
 }
 
 /// A path through the row up to some cell.
 #[derive(Clone, Copy, Debug)]
-struct DrawPath {
+struct PartialRowPlan {
     fg: TerminalColor,
     bg: TerminalColor,
     /// Both colors of the pen, packed into one key.
@@ -74,7 +74,7 @@ enum CursorGap {
 }
 
 impl CursorGap {
-    fn bytes(self) -> u32 {
+    fn move_bytes(self) -> u32 {
         match self {
             Self::Far => 8,
             Self::Cells(0) => 0,
@@ -102,24 +102,25 @@ pub(super) struct PlannedRow {
 pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDistortion) -> PlannedRow {
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
-    let first = DrawPath { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+    let first =
+        PartialRowPlan { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut paths = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
         let last = &paths[column];
-        paths.push(extend_paths(last, *target, &wanted[column..], model));
+        paths.push(extend_plans(last, *target, &wanted[column..], model));
     }
     trace_back(&paths, &wanted)
 }
 
 /// Extends the paths by one cell.
-fn extend_paths(
-    last: &[DrawPath],
+fn extend_plans(
+    last: &[PartialRowPlan],
     target: TargetCell,
-    wanted: &[Option<Mosaic>],
+    wanted: &[Option<TwoColorCell>],
     model: RateDistortion,
-) -> Vec<DrawPath> {
-    let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
+) -> Vec<PartialRowPlan> {
+    let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
@@ -130,7 +131,7 @@ fn extend_paths(
     };
     if leave.is_finite() {
         for (parent, path) in last.iter().enumerate() {
-            beam.add(DrawPath {
+            beam.add(PartialRowPlan {
                 gap: path.gap.plus_one_cell(),
                 cost: path.cost + leave,
                 parent,
@@ -142,30 +143,31 @@ fn extend_paths(
     let Some(mosaic) = target.wanted else { return beam.paths };
     // A cell that is close enough to its target is not worth a color change, but redrawing it may be cheaper
     // than skipping it.
-    let changes = if leave <= model.byte { CandidateColors::default() } else { candidates(wanted, model) };
+    let changes =
+        if leave <= model.byte { CandidateColors::default() } else { cell_color_candidates(wanted, model) };
     let changes = ColorChanges::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
-        changes.change_one(parent, path, &mut beam);
+        changes.try_single_changes(parent, path, &mut beam);
     }
     // If both colors are set, the previous pen does not matter, so extend only the cheapest path.
-    let base = |path: &DrawPath| path.cost + path.gap.bytes() as f32 * model.byte;
+    let base = |path: &PartialRowPlan| path.cost + path.gap.move_bytes() as f32 * model.byte;
     if let Some((parent, path)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
-        changes.change_both(parent, path, &mut beam);
+        changes.try_paired_changes(parent, path, &mut beam);
     }
     beam.paths
 }
 
 /// The best paths found so far for a cell.
-struct Beam {
-    paths: Vec<DrawPath>,
+struct SearchBeam {
+    paths: Vec<PartialRowPlan>,
     /// Paths whose cost exceeds the best one by more than this are dropped.
     limit: f32,
 }
 
-impl Beam {
-    fn add(&mut self, path: DrawPath) {
-        let is_same = |other: &DrawPath| other.pen == path.pen && other.gap == path.gap;
+impl SearchBeam {
+    fn add(&mut self, path: PartialRowPlan) {
+        let is_same = |other: &PartialRowPlan| other.pen == path.pen && other.gap == path.gap;
         if let Some(other) = self.paths.iter_mut().find(|other| is_same(other)) {
             if path.cost < other.cost {
                 *other = path;
@@ -201,7 +203,7 @@ struct ColorChange {
 
 /// Color changes to try for a cell.
 struct ColorChanges {
-    mosaic: Mosaic,
+    mosaic: TwoColorCell,
     model: RateDistortion,
     all: Vec<ColorChange>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
@@ -210,7 +212,7 @@ struct ColorChanges {
 }
 
 impl ColorChanges {
-    fn new(candidates: &CandidateColors, mosaic: Mosaic, model: RateDistortion) -> Self {
+    fn new(candidates: &CandidateColors, mosaic: TwoColorCell, model: RateDistortion) -> Self {
         let CandidateColors { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
@@ -234,15 +236,15 @@ impl ColorChanges {
 
     /// Extends a path by drawing with the current pen or after changing one of its colors. A color chosen for
     /// one part is used only there.
-    fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathExtension::new(self, parent, path, beam);
-        if !ends.is_near() {
+    fn try_single_changes(&self, parent: usize, path: &PartialRowPlan, beam: &mut SearchBeam) {
+        let mut ends = PlanExtension::new(self, parent, path, beam);
+        if !ends.can_enter_beam() {
             return;
         }
         let (fg_errors, bg_errors) = (self.errors(path.fg), self.errors(path.bg));
         let pen = PenErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
         for glyph in CellFill::ALL {
-            ends.add(pen, 0, glyph);
+            ends.try_glyph(pen, 0, glyph);
         }
         for (index, change) in self.all.iter().enumerate() {
             let bytes = change.bytes + 3;
@@ -251,24 +253,26 @@ impl ColorChanges {
                 _ if index < self.second => (CellFill::Second, CellFill::First),
                 _ => (CellFill::Full, CellFill::Blank),
             };
-            if change.shade.fits(ColorLayer::Foreground) {
-                ends.add(pen.with_fg(change), bytes, as_fg);
+            if change.shade.is_allowed_in(ColorLayer::Foreground) {
+                ends.try_glyph(pen.with_fg(change), bytes, as_fg);
             }
-            if change.shade.fits(ColorLayer::Background) {
-                ends.add(pen.with_bg(change), bytes, as_bg);
+            if change.shade.is_allowed_in(ColorLayer::Background) {
+                ends.try_glyph(pen.with_bg(change), bytes, as_bg);
             }
         }
     }
 
     /// Extends a path by changing both colors of the pen.
-    fn change_both(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathExtension::new(self, parent, path, beam);
+    fn try_paired_changes(&self, parent: usize, path: &PartialRowPlan, beam: &mut SearchBeam) {
+        let mut ends = PlanExtension::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
                 for (fg, bg, glyph) in [(first, second, CellFill::First), (second, first, CellFill::Second)] {
-                    if fg.shade.fits(ColorLayer::Foreground) && bg.shade.fits(ColorLayer::Background) {
-                        ends.add(PenErrors::from_changes(fg, bg), bytes, glyph);
+                    if fg.shade.is_allowed_in(ColorLayer::Foreground)
+                        && bg.shade.is_allowed_in(ColorLayer::Background)
+                    {
+                        ends.try_glyph(PenErrors::from_changes(fg, bg), bytes, glyph);
                     }
                 }
             }
@@ -277,7 +281,7 @@ impl ColorChanges {
 }
 
 /// Extends one path by drawing the next cell.
-struct PathExtension<'a> {
+struct PlanExtension<'a> {
     parent: usize,
     /// Number of bytes so far, including those that move the cursor to the cell.
     bytes: u32,
@@ -285,29 +289,29 @@ struct PathExtension<'a> {
     error: f32,
     /// Cost per byte of output.
     byte: f32,
-    tile: Tile,
-    beam: &'a mut Beam,
+    tile: BlockPattern,
+    beam: &'a mut SearchBeam,
     /// Current cost bound of the beam.
     bound: f32,
 }
 
-impl<'a> PathExtension<'a> {
-    fn new(changes: &ColorChanges, parent: usize, path: &DrawPath, beam: &'a mut Beam) -> Self {
+impl<'a> PlanExtension<'a> {
+    fn new(changes: &ColorChanges, parent: usize, path: &PartialRowPlan, beam: &'a mut SearchBeam) -> Self {
         let byte = changes.model.byte;
         let error = path.cost - path.bytes as f32 * byte;
         let bound = beam.cost_bound();
         let tile = changes.mosaic.tile;
-        Self { parent, bytes: path.bytes + path.gap.bytes(), error, byte, tile, beam, bound }
+        Self { parent, bytes: path.bytes + path.gap.move_bytes(), error, byte, tile, beam, bound }
     }
 
     /// Whether any glyph drawn here could be cheap enough to enter the beam.
-    fn is_near(&self) -> bool {
+    fn can_enter_beam(&self) -> bool {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
-    fn add(&mut self, ends: PenErrors, sgr: u32, glyph: CellFill) {
+    fn try_glyph(&mut self, ends: PenErrors, sgr: u32, glyph: CellFill) {
         // Inverting the medium shade yields a different pattern but the same character.
-        if glyph == CellFill::Second && self.tile == Tile::MEDIUM {
+        if glyph == CellFill::Second && self.tile == BlockPattern::MEDIUM {
             return;
         }
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
@@ -316,7 +320,7 @@ impl<'a> PathExtension<'a> {
             let PenErrors { fg, bg, .. } = ends;
             let parent = self.parent;
             let (pen, gap, glyph) = (pen_key(fg, bg), CursorGap::Cells(0), Some(glyph));
-            self.beam.add(DrawPath { fg, bg, pen, gap, bytes, cost, parent, glyph });
+            self.beam.add(PartialRowPlan { fg, bg, pen, gap, bytes, cost, parent, glyph });
             self.bound = self.beam.cost_bound();
         }
     }
@@ -354,7 +358,7 @@ impl PenErrors {
 }
 
 /// Traces the cheapest path back from the last cell.
-fn trace_back(paths: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
+fn trace_back(paths: &[Vec<PartialRowPlan>], wanted: &[Option<TwoColorCell>]) -> PlannedRow {
     let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));
@@ -366,7 +370,7 @@ fn trace_back(paths: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow 
                 ColorLayer::Foreground => path.fg,
                 ColorLayer::Background => path.bg,
             });
-            ops.push(DrawOp { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
+            ops.push(DrawOp { column: column - 1, glyph, mosaic: TwoColorCell::new(mosaic.tile, pair) });
         }
         index = path.parent;
     }
@@ -388,8 +392,8 @@ mod tests {
         halves
             .iter()
             .map(|halves| TargetCell {
-                wanted: Some(Mosaic::halves(*halves)),
-                shown: Some(Mosaic::uniform(TerminalColor::DefaultBackground)),
+                wanted: Some(TwoColorCell::halves(*halves)),
+                shown: Some(TwoColorCell::uniform(TerminalColor::DefaultBackground)),
             })
             .collect()
     }
@@ -415,7 +419,7 @@ mod tests {
     fn unchanged_cells_are_skipped() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
-            target.shown = Some(Mosaic::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
+            target.shown = Some(TwoColorCell::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
         let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
@@ -434,7 +438,7 @@ mod tests {
             [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultForeground; 2],
         ] {
-            let targets = [TargetCell { wanted: Some(Mosaic::halves(halves)), shown: None }];
+            let targets = [TargetCell { wanted: Some(TwoColorCell::halves(halves)), shown: None }];
             let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
@@ -449,16 +453,16 @@ mod tests {
         ]
     }
 
-    fn mosaic() -> impl Strategy<Value = Mosaic> {
+    fn mosaic() -> impl Strategy<Value = TwoColorCell> {
         let tile = prop_oneof![
-            3 => Just(Tile::HALVES),
+            3 => Just(BlockPattern::HALVES),
             1 => proptest::sample::select(vec!['▌', '▚', '░', '▒', '🬟', '\u{1CD10}'])
                 .prop_map(|symbol| from_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
             // Normalize like a tile read from a character: the first part is the foreground.
-            let is_cell = tile != Tile::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
-            Mosaic::new(if is_cell { tile } else { Tile::HALVES }, pair)
+            let is_cell = tile != BlockPattern::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
+            TwoColorCell::new(if is_cell { tile } else { BlockPattern::HALVES }, pair)
         })
     }
 
@@ -474,10 +478,10 @@ mod tests {
             let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
             let model = if is_exact { RateDistortion::EXACT } else { RateDistortion::MOVING };
             let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
-            let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
+            let mut screen: Vec<Option<TwoColorCell>> = targets.iter().map(|target| target.shown).collect();
             for op in &found.ops {
                 prop_assert!(targets[op.column].wanted.is_some(), "not part of the preview");
-                prop_assert!(op.glyph.shows(op.mosaic.pair));
+                prop_assert!(op.glyph.can_show(op.mosaic.pair));
                 screen[op.column] = Some(op.mosaic);
             }
             for (shown, target) in screen.iter().zip(&targets) {

@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, CellFill, Mosaic, TextCell};
+use super::cell::{CellContent, CellFill, TextCell, TwoColorCell};
 use super::cursor_moves::{self, CellPosition};
 use super::hyperlinks::{Hyperlinks, LINK_OFF};
 use super::pen::Pen;
@@ -22,7 +22,7 @@ pub(super) enum Stroke {
     /// A character.
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
-    Mosaic { at: CellPosition, glyph: CellFill, mosaic: Mosaic, count: u16 },
+    Mosaic { at: CellPosition, glyph: CellFill, mosaic: TwoColorCell, count: u16 },
     /// `count` blanks with the terminal's default background, or a sequence that erases to the end of the row
     /// if `count` is `None`.
     Erase { at: CellPosition, count: Option<u16> },
@@ -30,7 +30,7 @@ pub(super) enum Stroke {
 
 impl Stroke {
     /// Position of the stroke's first cell.
-    pub(super) fn at(&self) -> CellPosition {
+    pub(super) fn position(&self) -> CellPosition {
         match self {
             Self::Text { at, .. } | Self::Mosaic { at, .. } | Self::Erase { at, .. } => *at,
         }
@@ -43,7 +43,7 @@ impl Stroke {
         for run in strokes.chunk_by(Self::is_repeated_by) {
             let count = run.len() as u16;
             if let [Self::Mosaic { at, glyph: CellFill::Blank, mosaic, .. }, _, ..] = run
-                && run.len() > 1 + cursor_moves::counted_sequence(count - 1, b'b').len()
+                && run.len() > 1 + cursor_moves::csi_with_count(count - 1, b'b').len()
             {
                 shorter.push(Self::Mosaic { at: *at, glyph: CellFill::Blank, mosaic: *mosaic, count });
             } else {
@@ -79,7 +79,7 @@ pub(super) struct ScreenModel {
 }
 
 impl ScreenModel {
-    /// The state of the screen after [`ScreenModel::clear`].
+    /// The state of the screen after [`ScreenModel::push_clear`].
     pub(super) fn cleared(columns: u16, rows: u16) -> Self {
         Self {
             columns,
@@ -91,7 +91,7 @@ impl ScreenModel {
     }
 
     /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
-    pub(super) fn clear(links: &Hyperlinks, slice: &mut OutputSlice) {
+    pub(super) fn push_clear(links: &Hyperlinks, slice: &mut OutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
         }
@@ -103,7 +103,7 @@ impl ScreenModel {
     }
 
     /// Whether a row has cells with unknown content.
-    pub(super) fn is_damaged(&self, y: u16) -> bool {
+    pub(super) fn is_row_damaged(&self, y: u16) -> bool {
         let start = self.index(CellPosition { x: 0, y });
         self.contents[start..start + usize::from(self.columns)].contains(&CellContent::Unknown)
     }
@@ -139,14 +139,14 @@ impl ScreenModel {
     fn push_stroke(&mut self, stroke: &Stroke, links: &Hyperlinks, bytes: &mut Vec<u8>) {
         let (at, requirements) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
-            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.requirements(mosaic.pair)),
+            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.pen_requirements(mosaic.pair)),
             Stroke::Erase { at, .. } => {
-                (at, CellFill::Blank.requirements([TerminalColor::DefaultBackground; 2]))
+                (at, CellFill::Blank.pen_requirements([TerminalColor::DefaultBackground; 2]))
             }
         };
         cursor_moves::push_shortest_move(self.cursor, *at, bytes);
         if self.pen.link != requirements.link {
-            links.open(requirements.link, bytes);
+            links.push_link_start(requirements.link, bytes);
             self.pen.link = requirements.link;
         }
         self.pen.switch_to(&requirements, bytes);
@@ -156,11 +156,11 @@ impl ScreenModel {
                 let symbol = glyph.symbol(mosaic.tile);
                 bytes.extend_from_slice(symbol.encode_utf8(&mut [0; 4]).as_bytes());
                 if *count > 1 {
-                    bytes.extend(cursor_moves::counted_sequence(*count - 1, b'b'));
+                    bytes.extend(cursor_moves::csi_with_count(*count - 1, b'b'));
                 }
             }
             Stroke::Erase { count: Some(count), .. } => {
-                bytes.extend(cursor_moves::counted_sequence(*count, b'X'));
+                bytes.extend(cursor_moves::csi_with_count(*count, b'X'));
             }
             Stroke::Erase { count: None, .. } => bytes.extend_from_slice(b"\x1b[K"),
         }

@@ -6,7 +6,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, Mosaic};
+use super::cell::{CellContent, TwoColorCell};
 use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
 use super::screen::ScreenModel;
@@ -24,9 +24,9 @@ pub(super) struct StableCells {
     columns: usize,
     picture: Rect,
     /// For each cell, its content in the first preview of the request on the screen. `None` if unknown.
-    firsts: Vec<Option<Mosaic>>,
+    firsts: Vec<Option<TwoColorCell>>,
     /// The first preview of the current request. Empty if there was none.
-    newest: Vec<Option<Mosaic>>,
+    newest: Vec<Option<TwoColorCell>>,
     /// For each cell, whether it looks the same in the first previews of the current request and of the
     /// request on the screen.
     steady: Vec<bool>,
@@ -67,7 +67,7 @@ impl StableCells {
     /// Compares a new request's first preview with the previous request's.
     fn begin_request(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
-        self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
+        self.newest = places.map(|(x, y)| wanted.preview_cell(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
             *steady = first.zip(*newest).is_some_and(|(a, b)| color_difference(a, b) <= ALIKE);
@@ -83,7 +83,7 @@ impl StableCells {
                 if let (true, CellContent::Mosaic(shown), Some(wanted)) = (
                     self.is_steady(CellPosition { x, y }),
                     screen.content(CellPosition { x, y }),
-                    wanted.mosaic(x, y),
+                    wanted.preview_cell(x, y),
                 ) {
                     counts[usize::from(color_difference(*shown, wanted))] += 1;
                 }
@@ -99,12 +99,12 @@ impl StableCells {
     }
 
     /// The mosaic to draw. Returns the displayed one if it differs from the target only by noise.
-    pub(super) fn stabilized_mosaic(
+    pub(super) fn stabilized_cell(
         &self,
         at: CellPosition,
-        wanted: Mosaic,
-        shown: Option<Mosaic>,
-    ) -> Mosaic {
+        wanted: TwoColorCell,
+        shown: Option<TwoColorCell>,
+    ) -> TwoColorCell {
         shown
             .filter(|shown| {
                 self.is_steady(at)
@@ -156,7 +156,7 @@ fn noise_threshold(median: usize) -> u8 {
 }
 
 /// The largest channel difference between two mosaics. 255 if their colors cannot be compared.
-fn color_difference(a: Mosaic, b: Mosaic) -> u8 {
+fn color_difference(a: TwoColorCell, b: TwoColorCell) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),

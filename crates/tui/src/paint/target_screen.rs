@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, Mosaic};
+use super::cell::{CellContent, TwoColorCell};
 use super::fidelity::Fidelity;
 use crate::color::ColorDepth;
 
@@ -70,7 +70,7 @@ impl TargetScreen {
     }
 
     /// The mosaic of a preview cell. `None` for text cells, which may cover the preview.
-    pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
+    pub(super) fn preview_cell(&self, x: u16, y: u16) -> Option<TwoColorCell> {
         match self.row(y)[usize::from(x)] {
             CellContent::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
             CellContent::Mosaic(_) | CellContent::Text(_) | CellContent::Covered | CellContent::Unknown => {
@@ -85,7 +85,7 @@ impl TargetScreen {
     }
 
     /// Makes the text in these cells a hyperlink.
-    pub(super) fn link(&mut self, cells: Rect, number: u16) {
+    pub(super) fn link_cells(&mut self, cells: Rect, number: u16) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for place in cells.positions() {
             let index = usize::from(place.y) * usize::from(self.columns) + usize::from(place.x);
@@ -117,7 +117,7 @@ impl TargetScreen {
     }
 
     /// Whether the preview is drawn using characters.
-    pub(super) fn is_ramp(&self) -> bool {
+    pub(super) fn uses_ascii_ramp(&self) -> bool {
         self.depth == ColorDepth::None
     }
 

@@ -54,7 +54,7 @@ impl TerminalColor {
     }
 
     /// Whether the color can be used in this layer.
-    pub(super) fn fits(self, layer: ColorLayer) -> bool {
+    pub(super) fn is_allowed_in(self, layer: ColorLayer) -> bool {
         match self {
             Self::DefaultBackground => layer == ColorLayer::Background,
             Self::DefaultForeground => layer == ColorLayer::Foreground,
@@ -82,7 +82,7 @@ impl TerminalColor {
     }
 
     /// Appends the SGR parameters that set the color, which must be allowed in the layer.
-    pub(super) fn push(self, layer: ColorLayer, out: &mut Vec<u8>) {
+    pub(super) fn push_sgr(self, layer: ColorLayer, out: &mut Vec<u8>) {
         let base = match layer {
             ColorLayer::Foreground => 30,
             ColorLayer::Background => 40,
@@ -91,14 +91,14 @@ impl TerminalColor {
             Self::DefaultBackground | Self::DefaultForeground => push_number(base + 9, out),
             Self::Palette(index @ 0..8) => push_number(base + u16::from(index), out),
             Self::Palette(index @ 8..16) => push_number(base + 52 + u16::from(index), out),
-            Self::Palette(index) => push_list(&[base + 8, 5, u16::from(index)], out),
+            Self::Palette(index) => push_semicolon_list(&[base + 8, 5, u16::from(index)], out),
             Self::Rgb([r, g, b]) => {
-                push_list(&[base + 8, 2, u16::from(r), u16::from(g), u16::from(b)], out);
+                push_semicolon_list(&[base + 8, 2, u16::from(r), u16::from(g), u16::from(b)], out);
             }
         }
     }
 
-    /// Number of bytes that [`TerminalColor::push`] appends.
+    /// Number of bytes that [`TerminalColor::push_sgr`] appends.
     pub(super) fn sgr_length(self) -> u32 {
         match self {
             Self::DefaultBackground | Self::DefaultForeground | Self::Palette(0..8) => 2,
@@ -124,7 +124,7 @@ pub(super) fn push_number(number: u16, out: &mut Vec<u8>) {
 }
 
 /// Appends numbers separated by semicolons.
-fn push_list(numbers: &[u16], out: &mut Vec<u8>) {
+fn push_semicolon_list(numbers: &[u16], out: &mut Vec<u8>) {
     for (i, number) in numbers.iter().enumerate() {
         if i > 0 {
             out.push(b';');
@@ -139,7 +139,7 @@ mod tests {
 
     fn text(shade: TerminalColor, layer: ColorLayer) -> String {
         let mut out = Vec::new();
-        shade.push(layer, &mut out);
+        shade.push_sgr(layer, &mut out);
         String::from_utf8(out).expect("ASCII")
     }
 

@@ -27,12 +27,12 @@ impl TestTerminal {
     fn repeating(columns: u16, rows: u16, depth: ColorDepth, can_repeat: bool) -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let terminal = vt100::Parser::new(side(rows), side(columns), 0);
-        Self { painter: Painter::new(depth).repeating(can_repeat), terminal, sent: 0 }
+        Self { painter: Painter::new(depth).with_repeat_support(can_repeat), terminal, sent: 0 }
     }
 
     /// Sends one slice. Returns false if there was nothing to send.
     fn slice(&mut self, most_bytes: usize) -> bool {
-        let bytes = self.painter.slice(most_bytes);
+        let bytes = self.painter.next_slice(most_bytes);
         // A single cell may need a cursor move, a pen with all modifiers, and a symbol.
         assert!(bytes.len() <= most_bytes.max(96), "{} bytes sent, limit {most_bytes}", bytes.len());
         self.terminal.process(&bytes);
@@ -287,9 +287,9 @@ fn text_is_drawn_first_then_middle_rows() {
 #[test]
 fn painter_without_target_sends_nothing() {
     let mut painter = Painter::new(ColorDepth::TrueColor);
-    assert_eq!(painter.slice(1000), b"");
+    assert_eq!(painter.next_slice(1000), b"");
     painter.invalidate();
-    assert_eq!(painter.slice(1000), b"");
+    assert_eq!(painter.next_slice(1000), b"");
 }
 
 #[test]
@@ -348,7 +348,9 @@ fn with_words() -> Buffer {
 fn delayed_text_is_drawn_after_the_preview() {
     let buffer = with_words();
     let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
-    for extras in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
+    for extras in
+        [LinksAndDelayedText { later, ..LinksAndDelayedText::default() }, LinksAndDelayedText::default()]
+    {
         let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
         test.painter.set_target_with(&buffer, PICTURE, Fidelity::Still, &extras);
         let mut cells_before = None;
@@ -371,19 +373,19 @@ fn delayed_text_is_drawn_after_the_preview() {
 #[test]
 fn hyperlink_covers_only_its_cells() {
     let buffer = with_words();
-    let link = |address: &str| FrameExtras {
+    let link = |address: &str| LinksAndDelayedText {
         links: vec![Hyperlink {
             cells: Rect { x: 4, y: 0, width: 5, height: 1 },
             address: address.to_owned(),
         }],
-        ..FrameExtras::default()
+        ..LinksAndDelayedText::default()
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
-    let mut sent = |extras: &FrameExtras| {
+    let mut sent = |extras: &LinksAndDelayedText| {
         painter.set_target_with(&buffer, PICTURE, Fidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
-            let slice = painter.slice(100);
+            let slice = painter.next_slice(100);
             if slice.is_empty() {
                 return String::from_utf8(bytes).expect("UTF-8");
             }
@@ -404,6 +406,6 @@ fn hyperlink_covers_only_its_cells() {
         other.contains("file:///b\u{1b}\\") && other.contains("there") && !other.contains("now"),
         "{other:?}"
     );
-    let none = sent(&FrameExtras::default());
+    let none = sent(&LinksAndDelayedText::default());
     assert!(none.contains("there") && !none.contains("file:"), "{none:?}");
 }

@@ -37,7 +37,7 @@ fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     match look {
         CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
-            let glyph = CellFill::ALL.into_iter().find(|glyph| glyph.shows(mosaic.pair))?;
+            let glyph = CellFill::ALL.into_iter().find(|glyph| glyph.can_show(mosaic.pair))?;
             Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         CellContent::Unknown | CellContent::Covered => None,
@@ -48,7 +48,7 @@ fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
 fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;
-    let jump = cursor_moves::counted_sequence(to.x - first, b'C').len();
+    let jump = cursor_moves::csi_with_count(to.x - first, b'C').len();
     let (mut between, mut bytes) = (Vec::new(), 0);
     for x in first..to.x {
         let at = CellPosition { x, ..to };
@@ -77,8 +77,8 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
 /// Replaces long runs of blanks with erase sequences.
 fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
     let mut shorter = Vec::with_capacity(strokes.len());
-    for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.at().x + 1 == b.at().x) {
-        let at = run[0].at();
+    for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.position().x + 1 == b.position().x) {
+        let at = run[0].position();
         let end = usize::from(at.x) + run.len();
         let rest = end as u16..wanted.columns;
         let is_last = rest.clone().all(|x| !wanted.is_preview(x, y))

@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use super::InitialState;
 use crate::color::{AnsiColors, ColorDepth, ColorMapper};
-use crate::event::{FrameReport, Window};
+use crate::event::{PreviewSendReport, WindowSize};
 use crate::graphics::ImageProtocol;
-use crate::mosaic::Grid;
+use crate::mosaic::CellGrid;
 use crate::pixel_request::ImageProtocolRequest;
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
@@ -14,7 +14,7 @@ use crate::terminals::Capabilities;
 
 /// Window size, terminal capabilities and preview settings.
 pub(crate) struct DisplayState {
-    pub window: Window,
+    pub window: WindowSize,
     pub kind: PreviewKind,
     pub depth: ColorDepth,
     pub shades: ColorMapper,
@@ -35,7 +35,7 @@ pub(crate) struct DisplayState {
     /// Time at which a missing confirmation is reported.
     pub pixels_until: Option<Instant>,
     /// Bytes and round-trip time for sending the last preview.
-    pub frame: Option<FrameReport>,
+    pub frame: Option<PreviewSendReport>,
 }
 
 impl DisplayState {
@@ -59,7 +59,7 @@ impl DisplayState {
     }
 
     /// Preview pixels per cell, horizontally.
-    pub(crate) fn pixels_across(&self) -> u32 {
+    pub(crate) fn horizontal_pixels_per_cell(&self) -> u32 {
         /// Maximum horizontal preview pixels per cell. A higher resolution is not worth the bytes.
         const MAX: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
@@ -78,12 +78,12 @@ impl DisplayState {
                 let affordable = (most / squares.max(1.0)).sqrt() as u32;
                 u32::from(window.cell_pixels.0).min(affordable).clamp(1, MAX)
             }
-            kind => kind.grid().map_or(1, Grid::columns),
+            kind => kind.grid().map_or(1, CellGrid::columns),
         }
     }
 
     /// Whether the preview's colors are dithered.
-    pub(crate) fn mixes_colors(&self) -> bool {
+    pub(crate) fn dithers_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
             || self.kind == PreviewKind::Pixels(ImageProtocol::Sixel)
     }

@@ -14,12 +14,12 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, Pane, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, ImageOrigin, KeyOverrides, RequestState, format_stops};
-pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
+pub(super) use self::request::{CameraStep, ImageProvenance, KeyOverrides, RequestState, format_stops};
+pub(super) use self::saving::{PendingChange, SavingState, SceneImageProgress, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
-pub(super) use self::work::{AssetBar, RenderState, WorkState, WorkerActivity};
+pub(super) use self::work::{AssetProgressBar, RenderState, WorkState, WorkerActivity};
 use super::color::{AnsiColors, ColorDepth};
-use super::event::Window;
+use super::event::WindowSize;
 use super::options::ExternalChange;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
@@ -31,7 +31,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 pub(super) struct InitialState {
     pub scene: PathBuf,
     pub overrides: Overrides,
-    pub window: Window,
+    pub window: WindowSize,
     pub preview: PreviewKind,
     pub depth: ColorDepth,
     /// Whether the environment indicates a light background.
@@ -82,7 +82,7 @@ impl State {
     }
 
     /// Whether the last camera step has no preview yet.
-    pub(super) fn is_step_without_preview(&self) -> bool {
+    pub(super) fn awaits_camera_step_preview(&self) -> bool {
         let Self { request, work, picture, .. } = self;
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
         // While the scene is broken, the last valid one is being rendered.
@@ -98,7 +98,7 @@ impl State {
     }
 
     /// Whether nothing is known that would keep `w` from replacing the output files.
-    pub(super) fn can_write(&self) -> bool {
+    pub(super) fn can_write_image(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
         let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
         !self.overlays.warnings.iter().any(is_conflict) && !self.saving.written.iter().any(is_kept)
@@ -125,8 +125,8 @@ impl State {
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
-    pub(super) fn list_views(&mut self) {
-        self.overlays.list_views(self.now);
+    pub(super) fn open_view_list(&mut self) {
+        self.overlays.open_view_list(self.now);
         self.dirty = true;
     }
 
@@ -140,7 +140,7 @@ impl State {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);
         let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
-        let bars = self.work.assets.iter().filter_map(AssetBar::disappears_at).min();
+        let bars = self.work.assets.iter().filter_map(AssetProgressBar::disappears_at).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // The displayed age of an older render changes.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::is_absence;
+use crate::scene::is_file_not_found;
 
 /// Errors that prevent the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,11 +60,11 @@ pub(crate) struct OverlayState {
 impl OverlayState {
     /// Whether the scene file does not exist.
     pub(crate) fn is_scene_missing(&self) -> bool {
-        self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
+        self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_file_not_found))
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
-    pub(crate) fn list_views(&mut self, now: Instant) {
+    pub(crate) fn open_view_list(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);
         self.views = Some(ViewList { until: now + MOMENT, name });

@@ -1,13 +1,13 @@
 //! The displayed image and the history.
 
-use crate::history::{History, ShownImage};
+use crate::history::{RenderHistory, ShownImage};
 use crate::pipeline::protocol::ImagePosition;
 
 /// The displayed image, and how it is shown.
 #[derive(Default)]
 pub(crate) struct PictureState {
     pub shown: Option<ShownImage>,
-    pub history: History,
+    pub history: RenderHistory,
     /// Center of the section shown at 1:1 scale. `None` if the whole image is shown.
     pub close_up: Option<ImagePosition>,
     /// Whether everything but the image is hidden.

@@ -7,20 +7,20 @@ use std::time::Instant;
 use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FileRead;
-use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
-use crate::pipeline::settings::{AdjustableSettings, CameraChange, EffectiveSettings, Overrides, View};
-use crate::scene::description::{Integrator, Pose, Shadows};
-use crate::scene::sanitize::visible;
+use crate::pipeline::protocol::{NormalizedRect, PreviewSize, Viewpoint};
+use crate::pipeline::settings::{AdjustableSettings, CameraChange, EffectiveSettings, Overrides, ViewMode};
+use crate::scene::description::{Integrator, Pose, ShadowMode};
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{is_mesh, list_changes};
 
 /// Settings changed with keys. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct KeyOverrides {
-    pub shadows: Option<Shadows>,
+    pub shadows: Option<ShadowMode>,
     pub integrator: Option<Integrator>,
     pub dof: Option<bool>,
     pub photons: Option<bool>,
-    pub view: Option<View>,
+    pub view: Option<ViewMode>,
     pub camera: CameraChange,
     pub exposure: Option<f32>,
 }
@@ -28,7 +28,7 @@ pub(crate) struct KeyOverrides {
 impl KeyOverrides {
     /// Formats the settings as command-line options. A camera position replaces the scene's orbiter camera,
     /// so the options then also include the field of view and focus of `orbiter`.
-    pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
+    pub(crate) fn as_command_line_options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
         let CameraChange { pose, fov, focus } = self.camera;
@@ -59,7 +59,7 @@ impl KeyOverrides {
 
     /// Describes settings that differ from `before`. If `is_camera_written`, a camera reset is omitted
     /// because it only reflects the camera's move into the scene.
-    pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
+    pub(crate) fn describe_differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.has_changes().then(|| "moved".to_owned());
         let name = |name: &str| name.to_owned();
@@ -91,7 +91,7 @@ fn join_names(names: &[&str]) -> String {
 
 /// The scene and settings from which an image was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct ImageOrigin {
+pub(crate) struct ImageProvenance {
     /// Settings changed with keys.
     pub toggles: KeyOverrides,
     /// Text of the scene file. `None` for a model.
@@ -102,7 +102,7 @@ pub(crate) struct ImageOrigin {
     pub is_unfinished: bool,
 }
 
-impl ImageOrigin {
+impl ImageProvenance {
     /// The origin without the exposure, which does not affect rendering.
     pub(crate) fn without_exposure(self) -> Self {
         Self { toggles: KeyOverrides { exposure: None, ..self.toggles }, ..self }
@@ -119,15 +119,18 @@ impl ImageOrigin {
     }
 
     /// Describes changes in files since `before`.
-    pub(crate) fn edits(&self, before: &Self) -> Vec<String> {
+    pub(crate) fn describe_file_changes(&self, before: &Self) -> Vec<String> {
         let texts = before.text.as_deref().zip(self.text.as_deref());
         let of_text = texts.map(|(old, new)| list_changes(old, new)).unwrap_or_default();
         let is_changed = |file: &&FileRead| {
             before.files.iter().any(|old| old.path == file.path && old.content != file.content)
         };
         let name = |file: &FileRead| file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let of_files =
-            self.files.iter().filter(is_changed).map(|file| format!("{} changed", visible(&name(file))));
+        let of_files = self
+            .files
+            .iter()
+            .filter(is_changed)
+            .map(|file| format!("{} changed", escape_invisible_chars(&name(file))));
         of_text.into_iter().chain(of_files).collect()
     }
 }
@@ -169,7 +172,7 @@ pub(crate) struct RequestState {
     /// Time when a new preview size will be requested.
     pub resize_due: Option<Instant>,
     /// Section of the image to render first.
-    pub first_section: Option<Section>,
+    pub first_section: Option<NormalizedRect>,
     pub camera_step: CameraStep,
     /// The first request whose camera was moved with keys.
     pub moved_since: Option<u64>,
@@ -222,8 +225,8 @@ impl RequestState {
     }
 
     /// Returns the origin of the newest request's image.
-    pub(crate) fn origin(&self, is_unfinished: bool) -> ImageOrigin {
-        ImageOrigin {
+    pub(crate) fn image_provenance(&self, is_unfinished: bool) -> ImageProvenance {
+        ImageProvenance {
             toggles: self.sent_toggles,
             text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
             files: self.files.clone(),
@@ -245,8 +248,8 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
-    pub(crate) fn own_image_overrides(&self) -> Option<Box<Overrides>> {
-        (!self.is_own_image()).then(|| Box::new(self.command_line.clone()))
+    pub(crate) fn command_line_overrides(&self) -> Option<Box<Overrides>> {
+        (!self.has_no_key_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 
     /// Drops key changes that have been saved to the scene.
@@ -265,12 +268,12 @@ impl RequestState {
 
     /// The camera, including changes made with keys. `None` until a valid scene has been read.
     pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
-        self.camera.map(|camera| camera.changed(&self.toggles.camera))
+        self.camera.map(|camera| camera.with_change(&self.toggles.camera))
     }
 
     /// Records the original values of camera parts that were moved with keys. Does not overwrite values
     /// recorded earlier.
-    pub(crate) fn record_moved_parts(&mut self) {
+    pub(crate) fn record_original_camera(&mut self) {
         let Some(own) = self.camera else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
         self.moved_from = CameraChange {
@@ -283,7 +286,7 @@ impl RequestState {
     /// Makes the scene's current camera the starting point for camera movement.
     pub(crate) fn rebase_moves_on_scene(&mut self) {
         self.moved_from = CameraChange::default();
-        self.record_moved_parts();
+        self.record_original_camera();
     }
 
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
@@ -313,7 +316,7 @@ impl RequestState {
     }
 
     /// Describes camera, focus and exposure changes made with keys, which may not be obvious from the image.
-    pub(crate) fn key_changes(&self) -> Vec<String> {
+    pub(crate) fn describe_key_changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
@@ -324,27 +327,27 @@ impl RequestState {
 
     /// Whether this is the scene's own image, without changes made with keys. Only this image is written
     /// automatically.
-    pub(crate) fn is_own_image(&self) -> bool {
+    pub(crate) fn has_no_key_overrides(&self) -> bool {
         self.toggles == KeyOverrides::default()
     }
 
     /// The initial view, before any key changes it.
-    pub(crate) fn base_view(&self) -> View {
-        self.command_line.view.unwrap_or(View::Beauty)
+    pub(crate) fn base_view(&self) -> ViewMode {
+        self.command_line.view.unwrap_or(ViewMode::Beauty)
     }
 
-    pub(crate) fn view(&self) -> View {
+    pub(crate) fn view(&self) -> ViewMode {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
     /// Shadows set by the scene or the command line. `None` until a valid scene has been read.
-    pub(crate) fn base_shadows(&self) -> Option<Shadows> {
+    pub(crate) fn base_shadows(&self) -> Option<ShadowMode> {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
 
     /// The current shadow type.
-    pub(crate) fn shadows(&self) -> Shadows {
-        self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
+    pub(crate) fn shadows(&self) -> ShadowMode {
+        self.toggles.shadows.or(self.base_shadows()).unwrap_or(ShadowMode::Soft)
     }
 
     /// Whether photons are enabled by the scene or the command line. `None` until a valid scene has been

@@ -7,8 +7,8 @@ use super::request::KeyOverrides;
 use crate::event::WriteFailure;
 use crate::messages;
 use crate::options::ExternalChange;
-use crate::pipeline::protocol::{CameraEdit, OwnImageState, Viewpoint};
-use crate::scene::sanitize::visible;
+use crate::pipeline::protocol::{SavedSceneImageState, SceneFileEdit, Viewpoint};
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// A saved change that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,8 +19,8 @@ pub(crate) struct PendingChange {
 
 /// The scene's own image, rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct OwnImage {
-    pub state: OwnImageState,
+pub(crate) struct SceneImageProgress {
+    pub state: SavedSceneImageState,
     /// Progress of the render, from 0 to 1.
     pub fraction: f64,
 }
@@ -47,20 +47,20 @@ pub(crate) struct WrittenFile {
 impl WrittenFile {
     /// The file's path, safe to display.
     pub(crate) fn name(&self) -> String {
-        visible(&self.path.to_string_lossy()).into_owned()
+        escape_invisible_chars(&self.path.to_string_lossy()).into_owned()
     }
 
     /// Describes how another program changed the file and how to write the image anyway.
-    pub(crate) fn loss(&self) -> Option<String> {
+    pub(crate) fn describe_external_change(&self) -> Option<String> {
         let describe = |lost: ExternalChange| {
-            if lost.is_kept() { messages::output_kept } else { messages::output_changed }
+            if lost.is_kept() { messages::output_not_overwritten } else { messages::output_changed }
         };
-        self.lost.map(|lost| describe(lost)(&self.name(), lost.words()))
+        self.lost.map(|lost| describe(lost)(&self.name(), lost.describe()))
     }
 
     /// Describes the changes made with keys that the file includes.
-    pub(crate) fn changes(&self) -> Vec<String> {
-        self.shows.unwrap_or_default().differences(&KeyOverrides::default(), false)
+    pub(crate) fn describe_key_changes(&self) -> Vec<String> {
+        self.shows.unwrap_or_default().describe_differences(&KeyOverrides::default(), false)
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct SavingState {
     pub last_edit: Option<u64>,
     /// Generation of the first request that used the last saved files.
     pub saved_at: u64,
-    pub own: OwnImage,
+    pub own: SceneImageProgress,
     /// Whether the scene's files are complete, meaning that no program is writing them.
     pub is_settled: bool,
     /// The last save. `None` once its first changed cell is on the screen.
@@ -86,7 +86,7 @@ pub(crate) struct SavingState {
     /// Whether an older render was displayed when the camera was last saved.
     pub is_camera_of_newest: bool,
     /// Camera edits in the scene file that can be undone, from oldest to newest.
-    pub camera_edits: Vec<CameraEdit>,
+    pub camera_edits: Vec<SceneFileEdit>,
     /// Whether there is a scene file next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
     /// Camera in the scene file that `c` wrote for the model.
@@ -110,7 +110,7 @@ pub(crate) struct SavingState {
 impl SavingState {
     /// The file, if any, to which the user wrote an image that includes changes made with keys. The scene's
     /// own image does not replace it until the scene is saved or the user writes another image.
-    pub(crate) fn image_by_hand(&self) -> Option<&WrittenFile> {
+    pub(crate) fn manually_written_image(&self) -> Option<&WrittenFile> {
         let is_there = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
         let is_newer = |written: &&WrittenFile| written.generation >= self.saved_at;
         self.written.iter().filter(is_there).filter(is_newer).find(|written| written.shows.is_some())
@@ -126,7 +126,7 @@ impl SavingState {
             edits: 0,
             last_edit: None,
             saved_at: 0,
-            own: OwnImage { state: OwnImageState::NotBegun, fraction: 0.0 },
+            own: SceneImageProgress { state: SavedSceneImageState::NotBegun, fraction: 0.0 },
             is_settled: true,
             change: None,
             editor_closed: None,

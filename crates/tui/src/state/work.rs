@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::request::ImageOrigin;
+use super::request::ImageProvenance;
 use crate::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
 
@@ -31,13 +31,13 @@ pub(crate) enum RenderState {
 
 /// Progress bar for an asset that is being loaded.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct AssetBar {
+pub(crate) struct AssetProgressBar {
     pub progress: AssetProgress,
     /// Time when the bar became full. It stays at 100% for a moment.
     pub finished: Option<Instant>,
 }
 
-impl AssetBar {
+impl AssetProgressBar {
     const LINGER: Duration = Duration::from_millis(400);
 
     /// Time when the bar disappears.
@@ -56,7 +56,7 @@ pub(crate) struct WorkState {
     pub stages: [Option<StageReport>; Stage::ALL.len()],
     /// How long each stage's last run before this request took.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
-    pub assets: Vec<AssetBar>,
+    pub assets: Vec<AssetProgressBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
     /// Noise over time for this render.
@@ -65,7 +65,7 @@ pub(crate) struct WorkState {
     pub last_curve: NoiseCurve,
     /// Curves of recent renders, from oldest to newest. They are restored if a later request reproduces an
     /// image.
-    curves: Vec<(ImageOrigin, NoiseCurve)>,
+    curves: Vec<(ImageProvenance, NoiseCurve)>,
     /// Whether the request left the image unchanged.
     pub unchanged: bool,
     /// Number of finished renders, not counting exposure changes.
@@ -96,7 +96,7 @@ impl WorkState {
     }
 
     /// Stores a finished render's curve.
-    pub(crate) fn store_curve(&mut self, origin: ImageOrigin) {
+    pub(crate) fn store_noise_curve(&mut self, origin: ImageProvenance) {
         const MAX: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
         self.curves.push((origin, self.curve.clone()));
@@ -106,13 +106,13 @@ impl WorkState {
     }
 
     /// Restores the curve if an earlier request rendered the same image.
-    pub(crate) fn restore_curve(&mut self, origin: &ImageOrigin) {
+    pub(crate) fn restore_noise_curve(&mut self, origin: &ImageProvenance) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }
 
     /// Whether a render is running. It may be a render of the last valid scene.
-    pub(crate) fn is_under_way(&self) -> bool {
+    pub(crate) fn is_rendering(&self) -> bool {
         self.rendering == RenderState::UnderWay
     }
 

@@ -9,7 +9,7 @@ use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::Pose;
 use crate::scene::diagnostic::Severity;
-use crate::{Changed, ColorDepth};
+use crate::{ColorDepth, ContentChange};
 use crossterm::event::KeyCode;
 
 fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
@@ -28,43 +28,47 @@ fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
 fn moved_camera_is_shown_but_not_written() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    let effects = ui.press('l');
-    let moved = request(&effects).expect("a request");
+    let effects = ui.press_character('l');
+    let moved = find_render_request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (WriteMode::No, false));
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
-    let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
-    let edited = request(&effects).expect("a request");
+    let effects = ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    let edited = find_render_request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving should not reset the camera");
     assert_eq!(edited.write, WriteMode::No);
-    let effects = ui.press('0');
-    let own = request(&effects).expect("a request");
+    let effects = ui.press_character('0');
+    let own = find_render_request(&effects).expect("a request");
     assert_eq!((own.write, own.overrides.camera.has_changes()), (WriteMode::Try, false));
-    assert!(!ui.text().contains(messages::CAMERA_MOVED));
+    assert!(!ui.screen_text().contains(messages::CAMERA_MOVED));
 }
 
 #[test]
 fn newest_camera_step_waits_for_a_preview() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    let effects = ui.press('l');
-    let first = request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
+    let effects = ui.press_character('l');
+    let first =
+        find_render_request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
-        assert!(ui.press(key).is_empty(), "steps should wait for the first step's preview");
+        assert!(ui.press_character(key).is_empty(), "steps should wait for the first step's preview");
     }
     let effects = show(&mut ui);
-    let newest = request(&effects).expect("the newest step should be requested").overrides.camera;
+    let newest = find_render_request(&effects).expect("the newest step should be requested").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
     assert!(show(&mut ui).is_empty(), "no step should be waiting");
-    assert!(request(&ui.press('l')).is_some(), "the next step should be requested immediately");
+    assert!(
+        find_render_request(&ui.press_character('l')).is_some(),
+        "the next step should be requested immediately"
+    );
     // Other keys take effect immediately and include all previous steps.
-    ui.press('l');
-    let effects = ui.press('s');
-    assert!(request(&effects).expect("a request").overrides.camera != newest);
+    ui.press_character('l');
+    let effects = ui.press_character('s');
+    assert!(find_render_request(&effects).expect("a request").overrides.camera != newest);
     assert!(show(&mut ui).is_empty());
 }
 
@@ -72,23 +76,26 @@ fn newest_camera_step_waits_for_a_preview() {
 fn missing_previews_do_not_block_steps() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.press('l');
-    ui.press('l');
+    ui.press_character('l');
+    ui.press_character('l');
     let generation = ui.state.request.generation;
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_none(), "the last valid scene should still be rendering");
-    assert!(request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
-    ui.press('l');
+    assert!(find_render_request(&effects).is_none(), "the last valid scene should still be rendering");
+    assert!(find_render_request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
+    ui.press_character('l');
     let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
     let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_some(), "a failure should trigger the waiting step");
-    let mut ui = TestUi::with(state(80, 1));
+    assert!(find_render_request(&effects).is_some(), "a failure should trigger the waiting step");
+    let mut ui = TestUi::from_state(state(80, 1));
     ui.finish_render(RED);
     for _ in 0..3 {
-        assert!(request(&ui.press('l')).is_some(), "without space for a preview, steps should not wait");
+        assert!(
+            find_render_request(&ui.press_character('l')).is_some(),
+            "without space for a preview, steps should not wait"
+        );
     }
 }
 
@@ -98,17 +105,24 @@ fn arrows_scroll_open_diagnostics() {
     ui.finish_render(RED);
     ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
-    assert!(ui.key(down).is_empty());
+    assert!(ui.press_key(down).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
-    ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(request(&ui.key(down)).is_some(), "arrow keys should move the camera after the pane is closed");
+    ui.press_key(KeyPress::special(KeyCode::Esc));
+    assert!(
+        find_render_request(&ui.press_key(down)).is_some(),
+        "arrow keys should move the camera after the pane is closed"
+    );
 }
 
 #[test]
 fn camera_keys_need_a_scene() {
     let mut ui = TestUi::new();
-    assert!(ui.press('l').is_empty() && ui.press('>').is_empty() && ui.press(']').is_empty());
-    assert!(ui.text().contains(messages::NO_SCENE));
+    assert!(
+        ui.press_character('l').is_empty()
+            && ui.press_character('>').is_empty()
+            && ui.press_character(']').is_empty()
+    );
+    assert!(ui.screen_text().contains(messages::NO_SCENE));
 }
 
 #[test]
@@ -116,11 +130,11 @@ fn exposure_changes_start_from_scene_value() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.state.request.exposure = Some(1.0);
-    ui.press(']');
+    ui.press_character(']');
     show(&mut ui);
-    let effects = ui.press(']');
-    assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
-    assert!(ui.text().contains("0 reset exposure (+1.5)"), "{}", ui.text());
+    let effects = ui.press_character(']');
+    assert_eq!(find_render_request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
+    assert!(ui.screen_text().contains("0 reset exposure (+1.5)"), "{}", ui.screen_text());
 }
 
 #[test]
@@ -128,20 +142,23 @@ fn held_keys_stop_at_their_limits() {
     for (key, words) in [
         ('+', messages::CLOSEST.to_owned()),
         ('-', messages::FARTHEST.to_owned()),
-        ('<', messages::field_limit(1.0)),
-        ('>', messages::field_limit(160.0)),
+        ('<', messages::fov_limit(1.0)),
+        ('>', messages::fov_limit(160.0)),
         ('[', messages::exposure_limit("−20")),
         (']', messages::exposure_limit("+20")),
     ] {
         let mut ui = TestUi::new();
         ui.finish_render(RED);
         for _ in 0..400 {
-            ui.press(key);
+            ui.press_character(key);
             show(&mut ui);
         }
-        assert!(ui.text().contains(&words), "{key}: {}", ui.text());
+        assert!(ui.screen_text().contains(&words), "{key}: {}", ui.screen_text());
         let generation = ui.state.request.generation;
-        assert!(ui.press(key).is_empty() && ui.state.request.generation == generation, "{key}: a request");
+        assert!(
+            ui.press_character(key).is_empty() && ui.state.request.generation == generation,
+            "{key}: a request"
+        );
         let view = ui.state.request.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
@@ -154,8 +171,8 @@ fn reverted_changes_are_not_sent() {
         ui.finish_render(RED);
         let mut last = None;
         for key in keys.chars() {
-            let effects = ui.press(key);
-            last = request(&effects).cloned();
+            let effects = ui.press_character(key);
+            last = find_render_request(&effects).cloned();
             show(&mut ui);
         }
         let last = last.expect("a request");
@@ -165,34 +182,38 @@ fn reverted_changes_are_not_sent() {
             (last.write, last.own.is_none()),
             if is_back { (WriteMode::Try, true) } else { (WriteMode::No, false) }
         );
-        let line = ui.text().lines().last().map(str::to_owned).unwrap_or_default();
+        let line = ui.screen_text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
-        assert!(!ui.text().contains(messages::CAMERA_MOVED), "{keys}: {}", ui.text());
+        assert!(!ui.screen_text().contains(messages::CAMERA_MOVED), "{keys}: {}", ui.screen_text());
     }
 }
 
 #[test]
 fn command_line_exposure_is_not_a_change() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
-    let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
+    let mut ui = TestUi::from_state(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish_render(RED);
-    ui.press('[');
+    ui.press_character('[');
     show(&mut ui);
-    ui.press(']');
+    ui.press_character(']');
     assert_eq!((ui.state.request.toggles.exposure, ui.state.request.overrides().exposure), (None, Some(1.0)));
 }
 
 #[test]
 fn model_scene_is_written_once() {
-    use crate::pipeline::protocol::{Event as WorkerEvent, SavedCamera};
+    use crate::pipeline::protocol::{CameraSaveResult, Event as WorkerEvent};
     let mut ui = TestUi::new();
     ui.state.request.scene = "assets/vase.obj".into();
     ui.finish_render([200, 30, 30]);
-    ui.press('l');
+    ui.press_character('l');
     ui.finish_render([30, 30, 200]);
-    ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(ui.text().contains("c keep") && !ui.text().contains("o edit"), "{}", ui.text());
-    let kept = SavedCamera {
+    ui.press_key(KeyPress::special(KeyCode::Esc));
+    assert!(
+        ui.screen_text().contains("c keep") && !ui.screen_text().contains("o edit"),
+        "{}",
+        ui.screen_text()
+    );
+    let kept = CameraSaveResult {
         path: "assets/vase.toml".into(),
         is_new: true,
         is_own: false,
@@ -201,20 +222,20 @@ fn model_scene_is_written_once() {
     };
     let generation = ui.state.request.generation;
     ui.worker_event(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
-    ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(!ui.text().contains("c keep"), "c should not be offered again: {}", ui.text());
-    assert_eq!(crate::exit_summary::unsaved_as_options(&ui.state), None);
-    ui.press('l');
+    ui.press_key(KeyPress::special(KeyCode::Esc));
+    assert!(!ui.screen_text().contains("c keep"), "c should not be offered again: {}", ui.screen_text());
+    assert_eq!(crate::exit_summary::unsaved_changes_as_options(&ui.state), None);
+    ui.press_character('l');
     ui.finish_render([200, 30, 30]);
     assert!(
-        crate::exit_summary::unsaved_as_options(&ui.state).is_some(),
+        crate::exit_summary::unsaved_changes_as_options(&ui.state).is_some(),
         "the camera has moved since it was saved"
     );
 }
 
 /// Simulates saving a scene with this camera.
 fn save(ui: &mut TestUi, camera: Viewpoint) {
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     ui.worker_event(protocol::Event::Settings {
@@ -222,7 +243,7 @@ fn save(ui: &mut TestUi, camera: Viewpoint) {
         settings: effective_settings().into(),
         camera,
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     show(ui);
 }
@@ -233,7 +254,7 @@ fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
         _ => None,
     };
-    ui.press('c').into_iter().find_map(is_order)
+    ui.press_character('c').into_iter().find_map(is_order)
 }
 
 fn viewpoint_at(position: [f64; 3]) -> Viewpoint {
@@ -253,34 +274,38 @@ fn first_c_lists_conflicting_saves() {
         ("h<", both, "camera.position = [0, 2, 4], camera.fov = 25"),
         ("h<", wide(25.0), "camera.fov = 25"),
     ] {
-        let mut ui = TestUi::with(state(160, 40));
+        let mut ui = TestUi::from_state(state(160, 40));
         ui.finish_render(RED);
         for key in keys.chars() {
-            ui.press(key);
+            ui.press_character(key);
             show(&mut ui);
         }
         let moved = ui.state.request.toggles.camera;
         save(&mut ui, saved);
         assert_eq!(kept(&mut ui), None, "{keys}");
         let said = format!("error: {words} {}", messages::CAMERA_CONFLICT);
-        assert!(ui.text().contains(&said), "{keys}: {}", ui.text());
-        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: pressing c again should confirm");
+        assert!(ui.screen_text().contains(&said), "{keys}: {}", ui.screen_text());
+        assert_eq!(kept(&mut ui), Some(saved.with_change(&moved)), "{keys}: pressing c again should confirm");
     }
 }
 
 #[test]
 fn later_conflicting_saves_are_also_listed() {
-    let mut ui = TestUi::with(state(160, 40));
+    let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
-    ui.press('h');
+    ui.press_character('h');
     show(&mut ui);
     for height in [2.0, 3.0] {
         save(&mut ui, viewpoint_at([0.0, height, 4.0]));
         assert_eq!(kept(&mut ui), None);
-        assert!(ui.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", ui.text());
+        assert!(
+            ui.screen_text().contains(&format!("camera.position = [0, {height}, 4]")),
+            "{}",
+            ui.screen_text()
+        );
     }
     // Moving the camera again requires no confirmation.
-    ui.press('h');
+    ui.press_character('h');
     show(&mut ui);
     assert!(kept(&mut ui).is_some());
 }
@@ -288,40 +313,40 @@ fn later_conflicting_saves_are_also_listed() {
 #[test]
 fn saving_keeps_camera_settings_that_did_not_move() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
-    let mut ui = TestUi::with(state(160, 40));
+    let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
-    ui.press('h');
+    ui.press_character('h');
     show(&mut ui);
     save(&mut ui, saved);
     let moved = ui.state.request.toggles.camera;
-    assert_eq!(kept(&mut ui), Some(saved.changed(&moved)));
+    assert_eq!(kept(&mut ui), Some(saved.with_change(&moved)));
     // The focus follows `look_at`, so saving did not change it.
-    let mut ui = TestUi::with(state(160, 40));
+    let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
     ui.state.request.toggles.camera.focus = Some(2.5);
-    ui.press('r');
+    ui.press_character('r');
     save(&mut ui, viewpoint_at([0.0, 1.0, 6.0]));
     assert_eq!(kept(&mut ui).map(|camera| (camera.focus, camera.pose.position.z)), Some((2.5, 6.0)));
 }
 
 #[test]
 fn reset_camera_can_be_moved_without_conflict() {
-    let mut ui = TestUi::with(state(160, 40));
+    let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
-    ui.press('h');
+    ui.press_character('h');
     show(&mut ui);
     save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));
-    ui.press('0');
-    ui.press('h');
+    ui.press_character('0');
+    ui.press_character('h');
     assert!(kept(&mut ui).is_some());
 }
 
 #[test]
 fn model_cameras_have_no_conflicts() {
-    let mut ui = TestUi::with(state(160, 40));
+    let mut ui = TestUi::from_state(state(160, 40));
     ui.state.request.scene = "assets/vase.obj".into();
     ui.finish_render(RED);
-    ui.press('h');
+    ui.press_character('h');
     show(&mut ui);
     // The model's size has changed, so its default camera has moved.
     save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));

@@ -1,11 +1,13 @@
 //! Tests for edits and typos: history, render numbers and render times.
 
 use super::{BLUE, RED, cells_of};
-use crate::Changed;
-use crate::event::{Event, FrameReport};
+use crate::ContentChange;
+use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, LastValidSceneOutcome, PreviewSource, SavedCamera, Stage, Status};
+use crate::pipeline::protocol::{
+    self, CameraSaveResult, LastValidSceneOutcome, PreviewSource, Stage, Status,
+};
 use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::FingerprintHasher;
@@ -14,7 +16,7 @@ const GREEN: [u8; 3] = [10, 200, 20];
 
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
 }
@@ -42,25 +44,29 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
 
 #[test]
 fn fixing_a_typo_is_not_an_edit() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("shininess = 60");
     ui.finish_render(RED);
     ui.save_scene("shininess = 6");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     // The last valid scene is shown again, possibly with different dithering.
     preview(&mut ui, "dull", GREEN, true);
     ui.save_scene("shininess = 6");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "dull", GREEN, true);
     end(&mut ui, true, 0.0, 1.0);
-    assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
-    assert!(ui.text().contains("▸2 shininess") && !ui.text().contains(messages::AGAIN), "{}", ui.text());
-    ui.press('b');
-    assert!(cells_of(&mut ui, RED) > 500, "{}", ui.text());
-    let text = ui.text();
+    assert!(ui.screen_text().contains("unchanged · render 2"), "{}", ui.screen_text());
+    assert!(
+        ui.screen_text().contains("▸2 shininess") && !ui.screen_text().contains(messages::AGAIN),
+        "{}",
+        ui.screen_text()
+    );
+    ui.press_character('b');
+    assert!(cells_of(&mut ui, RED) > 500, "{}", ui.screen_text());
+    let text = ui.screen_text();
     assert!(text.contains(&format!("{}, 0 s ago", messages::render_position(1, 2))), "{text}");
     assert!(text.contains(&format!("\n{}, shininess 60 → 6  ", messages::BEFORE_EDIT)), "{text}");
     assert!(text.contains("b newest") && !text.contains("b shows"), "{text}");
@@ -68,33 +74,33 @@ fn fixing_a_typo_is_not_an_edit() {
 
 #[test]
 fn editing_a_comment_adds_no_entry() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("a = 1 # one");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.save_scene("a = 1 # two");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
-    ui.press('b');
-    assert!(ui.text().contains(messages::NO_EARLIER_RENDER), "{}", ui.text());
+    ui.press_character('b');
+    assert!(ui.screen_text().contains(messages::NO_EARLIER_RENDER), "{}", ui.screen_text());
 }
 
 #[test]
 fn editing_the_output_path_adds_no_entry() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("camera.fov = 40");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "narrow", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.save_scene("camera.fov = 44");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "wide", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.save_scene("camera.fov = 44\nrender.output = \"other.png\"");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "wide", BLUE, true);
     let generation = ui.state.request.generation;
     let mut event = done_event(generation, Vec::new(), false);
@@ -102,37 +108,45 @@ fn editing_the_output_path_adds_no_entry() {
         report.stages[Stage::Render as usize].status = Status::Reused;
     }
     ui.worker_event(event);
-    let text = ui.text();
+    let text = ui.screen_text();
     // Another render wrote the image, but it results from the same edit.
     assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
     assert!(!text.contains("render.output"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 2);
-    ui.press('b');
-    assert!(ui.text().contains(&format!("{}, camera.fov 40 → 44  ", messages::BEFORE_EDIT)), "{}", ui.text());
+    ui.press_character('b');
+    assert!(
+        ui.screen_text().contains(&format!("{}, camera.fov 40 → 44  ", messages::BEFORE_EDIT)),
+        "{}",
+        ui.screen_text()
+    );
 }
 
 #[test]
 fn resumed_render_time_is_cumulative() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("a = 1");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 5.8, 5.8);
-    ui.press('r');
-    ui.read_scene();
+    ui.press_character('r');
+    ui.report_scene_read();
     preview(&mut ui, "first", BLUE, false);
     save_broken_scene(&mut ui);
     preview(&mut ui, "first", GREEN, false);
     ui.save_scene("a = 1");
-    ui.read_scene();
+    ui.report_scene_read();
     preview(&mut ui, "first", GREEN, false);
     let generation = ui.state.request.generation;
     let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..render_progress(0.5, None) };
     ui.worker_event(protocol::Event::Progress { generation, progress });
-    assert!(ui.text().contains("32/64 samples · 4.5 s"), "time should be cumulative: {}", ui.text());
+    assert!(
+        ui.screen_text().contains("32/64 samples · 4.5 s"),
+        "time should be cumulative: {}",
+        ui.screen_text()
+    );
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, false, 4.23, 8.73);
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(text.contains("render 8.73 s +2.9 s"), "{text}");
     assert!(text.contains("8.73 s · render 2"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 1, "{text}");
@@ -155,11 +169,11 @@ const FINISHED: LastValidSceneOutcome = LastValidSceneOutcome::Finished { unchan
 
 /// Finishes a render, makes an edit, and saves a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("shininess = 60");
     ui.finish_render(RED);
     ui.save_scene("shininess = 6");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, false);
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "dull", GREEN, false);
@@ -170,7 +184,7 @@ fn typo_during_a_render() -> TestUi {
 fn render_of_last_valid_scene_is_counted_once() {
     let mut ui = typo_during_a_render();
     let newest = |ui: &mut TestUi| {
-        let text = ui.text();
+        let text = ui.screen_text();
         assert!(
             text.contains("▸2 shininess") && text.contains(&format!(" 1 {}", messages::OPENED)),
             "{text}"
@@ -184,36 +198,40 @@ fn render_of_last_valid_scene_is_counted_once() {
     show_preview(&mut ui, "dull", BLUE, true);
     newest(&mut ui);
     for key in ['n', 'N'] {
-        ui.press(key);
+        ui.press_character(key);
     }
     newest(&mut ui);
     ui.save_scene("shininess = 6");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     newest(&mut ui);
-    assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
+    assert!(ui.screen_text().contains("unchanged · render 2"), "{}", ui.screen_text());
     ui.save_scene("shininess = 5");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))), "{}", ui.text());
+    ui.press_character('n');
+    assert!(
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))),
+        "{}",
+        ui.screen_text()
+    );
 }
 
 #[test]
 fn stopped_render_of_last_valid_scene_is_marked() {
     let mut ui = typo_during_a_render();
     last_good(&mut ui, LastValidSceneOutcome::Stopped);
-    assert!(ui.text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.text());
+    assert!(ui.screen_text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.screen_text());
     assert_eq!(ui.state.work.renders, 1);
 }
 
 #[test]
 fn render_of_last_valid_scene_is_numbered() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("shininess = 60");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "bright", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
@@ -221,33 +239,37 @@ fn render_of_last_valid_scene_is_numbered() {
     last_good(&mut ui, LastValidSceneOutcome::Finished { unchanged: true });
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
-        ui.press('s');
+        ui.press_character('s');
         ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
         for is_finished in [false, true] {
             show_preview(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
-            assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
-            assert!(ui.text().contains(&format!(" 1 {}", messages::OPENED)), "{}", ui.text());
+            assert!(ui.screen_text().contains(&format!("▸{run} {words}")), "{}", ui.screen_text());
+            assert!(ui.screen_text().contains(&format!(" 1 {}", messages::OPENED)), "{}", ui.screen_text());
         }
         last_good(&mut ui, FINISHED);
         assert_eq!(ui.state.work.renders, u64::from(run));
-        assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
+        assert!(ui.screen_text().contains(&format!("▸{run} {words}")), "{}", ui.screen_text());
     }
-    ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))), "{}", ui.text());
+    ui.press_character('n');
+    assert!(
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))),
+        "{}",
+        ui.screen_text()
+    );
 }
 
 #[test]
 fn complete_image_is_not_listed_as_stopped() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
-    ui.press('s');
-    ui.read_scene();
+    ui.press_character('s');
+    ui.report_scene_read();
     // All samples have been rendered, but a key is pressed before the request is done.
     show_preview(&mut ui, "hard", GREEN, true);
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(BLUE);
-    ui.press('n');
-    let text = ui.text();
+    ui.press_character('n');
+    let text = ui.screen_text();
     assert!(
         text.contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::OLDER)))
             && !text.contains(messages::STOPPED),
@@ -257,45 +279,49 @@ fn complete_image_is_not_listed_as_stopped() {
 
 #[test]
 fn entries_are_numbered_by_render() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
     // Stopped renders are not counted.
-    ui.press('s');
-    ui.read_scene();
+    ui.press_character('s');
+    ui.report_scene_read();
     preview(&mut ui, "hard", GREEN, false);
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(BLUE);
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(text.contains("· render 2") && text.contains("▸2 shadows off"), "{text}");
     assert!(
         text.contains(&format!("– {}:", messages::STOPPED))
             && text.contains(&format!(" 1 {}", messages::OPENED)),
         "{text}"
     );
-    ui.press('n');
+    ui.press_character('n');
     assert!(
-        ui.text().contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::STOPPED))),
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::STOPPED))),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
     assert!(
-        ui.text().contains(&format!(
+        ui.screen_text().contains(&format!(
             "{}: shadows hard · {}",
             messages::STOPPED,
             messages::HISTORY_KEYS.join(" · ")
         )),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
-    ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(1, 2))), "{}", ui.text());
+    ui.press_character('n');
+    assert!(
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_position(1, 2))),
+        "{}",
+        ui.screen_text()
+    );
 }
 
 #[test]
 fn age_counts_from_the_last_improvement() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.save_scene("shininess = 60");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "bright", RED, false);
     ui.advance_clock(8000);
     end(&mut ui, false, 8.0, 8.0);
@@ -303,40 +329,44 @@ fn age_counts_from_the_last_improvement() {
     // Showing an image again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
     ui.save_scene("shininess = 6");
-    ui.read_scene();
+    ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, false);
     ui.advance_clock(2000);
-    ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_position(1, 2))), "{}", ui.text());
+    ui.press_character('n');
+    assert!(
+        ui.screen_text().contains(&format!("{}, 5 s ago", messages::render_position(1, 2))),
+        "{}",
+        ui.screen_text()
+    );
     // The same applies to a stopped render.
-    ui.press('N');
+    ui.press_character('N');
     show_preview(&mut ui, "dull", GREEN, false);
     ui.advance_clock(4000);
-    ui.press('s');
+    ui.press_character('s');
     ui.advance_clock(1000);
     ui.finish_render(RED);
-    ui.press('n');
+    ui.press_character('n');
     assert!(
-        ui.text().contains(&format!("{}, 5 s ago", messages::unnumbered_render(messages::STOPPED))),
+        ui.screen_text().contains(&format!("{}, 5 s ago", messages::unnumbered_render(messages::STOPPED))),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
 }
 
 #[test]
 fn reset_settings_are_listed_together() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
-    ui.press('s');
-    ui.press('p');
+    ui.press_character('s');
+    ui.press_character('p');
     ui.finish_render(BLUE);
-    ui.press('0');
+    ui.press_character('0');
     ui.finish_render(GREEN);
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(RED);
-    ui.press('n');
+    ui.press_character('n');
     let words = format!("shadows and photons reset · {}", messages::HISTORY_KEYS.join(" · "));
-    assert!(ui.text().contains(&words), "{}", ui.text());
+    assert!(ui.screen_text().contains(&words), "{}", ui.screen_text());
 }
 
 #[test]
@@ -344,13 +374,13 @@ fn d_and_f_report_a_pinhole_camera() {
     for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut ui = TestUi::new();
         ui.save_scene(text);
-        ui.read_scene();
+        ui.report_scene_read();
         ui.state.request.effective = Some(EffectiveSettings { dof: false, ..effective_settings() });
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
-        ui.press('d');
-        assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
-        ui.press('f');
-        assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
+        ui.press_character('d');
+        assert!(ui.screen_text().contains(messages::PINHOLE), "{}", ui.screen_text());
+        ui.press_character('f');
+        assert!(ui.screen_text().contains(messages::PINHOLE), "{}", ui.screen_text());
     }
 }
 
@@ -359,11 +389,11 @@ fn creating_a_model_scene_cannot_be_undone() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let (path, edit) = ("assets/knot.toml".into(), None);
-    let kept = SavedCamera { path, is_new: true, is_own: false, of_model: true, edit };
+    let kept = CameraSaveResult { path, is_new: true, is_own: false, of_model: true, edit };
     ui.worker_event(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
-    ui.press('u');
+    ui.press_character('u');
     let words = messages::NEW_SCENE_STAYS;
-    assert!(ui.text().contains(words), "{}", ui.text());
+    assert!(ui.screen_text().contains(words), "{}", ui.screen_text());
 }
 
 #[test]
@@ -371,13 +401,21 @@ fn unreadable_scene_has_no_save_hint() {
     let mut ui = TestUi::new();
     let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "a folder") };
     ui.fail_render(vec![folder]);
-    assert!(!ui.text().contains("save "), "{}", ui.text());
+    assert!(!ui.screen_text().contains("save "), "{}", ui.screen_text());
     ui.handle_event(Event::Settled);
-    assert!(ui.text().contains("a folder") && !ui.text().contains("save "), "{}", ui.text());
+    assert!(
+        ui.screen_text().contains("a folder") && !ui.screen_text().contains("save "),
+        "{}",
+        ui.screen_text()
+    );
     let mut ui = TestUi::new();
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
-    assert!(ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
+    assert!(
+        ui.screen_text().contains(&messages::save_to_render("cornell.toml", false)),
+        "{}",
+        ui.screen_text()
+    );
 }
 
 #[test]
@@ -388,15 +426,15 @@ fn eta_is_never_zero() {
             generation: 1,
             progress: render_progress(0.5, Some(seconds)),
         });
-        assert!(ui.text().contains(words), "{seconds}: {}", ui.text());
+        assert!(ui.screen_text().contains(words), "{seconds}: {}", ui.screen_text());
     }
 }
 
 #[test]
 fn status_line_items_are_separated() {
-    let mut ui = TestUi::with(state(80, 24));
+    let mut ui = TestUi::from_state(state(80, 24));
     ui.finish_render(RED);
-    ui.press('l');
+    ui.press_character('l');
     ui.finish_render(BLUE);
     let settings = ui.state.request.effective.as_mut().expect("settings");
     (settings.width, settings.height) = (320, 180);
@@ -407,12 +445,16 @@ fn status_line_items_are_separated() {
     for name in [Stage::Textures, Stage::Accel, Stage::Photons, Stage::Write] {
         ui.state.work.stages[name as usize] = None;
     }
-    ui.state.display.frame = Some(FrameReport { bytes: 131_000, round_trip: None });
-    ui.press('m');
+    ui.state.display.frame = Some(PreviewSendReport { bytes: 131_000, round_trip: None });
+    ui.press_character('m');
     ui.state.overlays.message = None;
     assert!(
-        ui.text().contains(&format!("{}, {}", messages::cached_stages("3 stages"), messages::NOT_SAVED)),
+        ui.screen_text().contains(&format!(
+            "{}, {}",
+            messages::cached_stages("3 stages"),
+            messages::NOT_SAVED
+        )),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
 }

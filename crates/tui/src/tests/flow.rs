@@ -9,13 +9,13 @@ use crate::messages;
 use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, WriteMode};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::state::WorkerActivity;
-use crate::{Changed, ExitStatus};
+use crate::{ContentChange, ExitStatus};
 
 #[test]
 fn first_request_includes_the_preview_size() {
     let mut state = state(80, 24);
-    let effects = crate::update::start(&mut state);
-    let request = request(&effects).expect("a request");
+    let effects = crate::update::request_first_render(&mut state);
+    let request = find_render_request(&effects).expect("a request");
     assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42, around: None }));
     assert_eq!((request.generation, request.write, request.force), (1, WriteMode::Try, false));
 }
@@ -25,7 +25,7 @@ fn images_of_older_requests_are_dropped() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let old = ui.state.request.generation;
-    ui.press('r');
+    ui.press_character('r');
     ui.draw_screen();
     ui.handle_event(Event::Picture {
         generation: old,
@@ -49,8 +49,8 @@ fn first_change_is_timed_from_the_save() {
     ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_millis(3);
-    let effects = ui.handle_event(Event::Changed(Changed { noticed }));
-    assert_eq!(request(&effects).map(|it| it.generation), Some(2));
+    let effects = ui.handle_event(Event::Changed(ContentChange { noticed }));
+    assert_eq!(find_render_request(&effects).map(|it| it.generation), Some(2));
     ui.handle_event(Event::Shown { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
     ui.handle_event(Event::Picture {
@@ -64,10 +64,13 @@ fn first_change_is_timed_from_the_save() {
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::Shown { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), false));
-    assert!(ui.text().contains(&messages::save_to_screen_time("23 ms")), "{}", ui.text());
+    assert!(ui.screen_text().contains(&messages::save_to_screen_time("23 ms")), "{}", ui.screen_text());
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::Shown { generation: 2 });
-    assert!(!ui.state.dirty && ui.text().contains(&messages::save_to_screen_time("23 ms")), "measured once");
+    assert!(
+        !ui.state.dirty && ui.screen_text().contains(&messages::save_to_screen_time("23 ms")),
+        "measured once"
+    );
 }
 
 #[test]
@@ -87,7 +90,7 @@ fn only_the_first_preview_is_urgent() {
     };
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     assert!(!picture(&mut ui, 1), "an outdated preview is not urgent");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
@@ -98,11 +101,11 @@ fn unchanged_state_is_not_redrawn() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.draw_screen();
-    ui.press('g');
+    ui.press_character('g');
     ui.advance_clock(10_000);
     ui.handle_event(Event::Shown { generation: 1 });
     ui.worker_event(protocol::Event::Preview { generation: 1 });
-    ui.key(KeyPress::special(crossterm::event::KeyCode::PageUp));
+    ui.press_key(KeyPress::special(crossterm::event::KeyCode::PageUp));
     assert!(!ui.state.dirty);
     assert_eq!(ui.state.next_tick(), None);
 }
@@ -114,7 +117,7 @@ fn clock_stops_while_paused() {
     assert!(ui.state.next_tick().is_some());
     ui.advance_clock(250);
     assert!(ui.state.dirty);
-    ui.press(' ');
+    ui.press_character(' ');
     ui.draw_screen();
     assert_eq!(ui.state.next_tick(), None);
 }
@@ -153,7 +156,7 @@ fn resize_does_not_restart_the_render() {
         let mut ui = TestUi::new();
         ui.now += Duration::from_secs(5);
         if is_held {
-            ui.press(' ');
+            ui.press_character(' ');
         }
         ui.handle_event(Event::Resize(window(120, 40)));
         let effects = ui.advance_clock(200);
@@ -167,10 +170,10 @@ fn resize_does_not_restart_the_render() {
 fn editing_a_comment_reports_unchanged() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.worker_event(protocol::Event::Started { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), true));
-    assert!(ui.text().contains("unchanged"));
+    assert!(ui.screen_text().contains("unchanged"));
     assert!(cells_of(&mut ui, RED) > 0);
 }
 
@@ -196,7 +199,7 @@ fn lost_event_sources_are_handled() {
         [Effect::Quit(ExitStatus::HANGUP)]
     ));
     assert!(ui.handle_event(Event::Lost(EventSource::Watcher)).is_empty());
-    assert!(ui.text().contains(messages::NOT_WATCHING));
+    assert!(ui.screen_text().contains(messages::NOT_WATCHING));
 }
 
 #[test]
@@ -204,7 +207,7 @@ fn cancelled_render_is_reported() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Cancelled { generation: 1 });
     assert_eq!(ui.state.work.activity, WorkerActivity::Cancelled);
-    assert!(ui.text().contains("stopped"));
+    assert!(ui.screen_text().contains("stopped"));
 }
 
 #[test]
@@ -218,16 +221,16 @@ fn unanswered_writes_are_still_pending_at_exit() {
     for (outcome, is_open) in [(None, true), (Some(postponed), true)].into_iter().chain(ends) {
         let mut ui = TestUi::new();
         assert!(!ui.state.saving.is_write_requested);
-        ui.press('w');
+        ui.press_character('w');
         if let Some(event) = outcome {
             ui.worker_event(event);
         }
-        assert!(matches!(ui.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
+        assert!(matches!(ui.press_character('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
         assert_eq!(ui.state.saving.is_write_requested, is_open);
     }
     let mut ui = TestUi::new();
-    ui.press('w');
-    ui.press('r');
+    ui.press_character('w');
+    ui.press_character('r');
     assert!(ui.state.saving.is_write_requested, "the next request should still write the image");
     ui.worker_event(written(ui.state.request.generation));
     assert!(!ui.state.saving.is_write_requested);
@@ -241,16 +244,16 @@ fn error_with(message: &str) -> Vec<Diagnostic> {
 fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(error_with("half"));
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(error_with("more"));
-    assert!(!ui.text().contains("more") && !ui.text().contains("broken"));
+    assert!(!ui.screen_text().contains("more") && !ui.screen_text().contains("broken"));
     assert!(ui.handle_event(Event::Settled).is_empty());
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(text.contains("error: more") && text.contains("broken"), "{text}");
     assert!(!text.contains("half"), "outdated error: {text}");
 }
@@ -259,13 +262,13 @@ fn errors_in_incomplete_files_are_deferred() {
 fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(error_with("half"));
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.handle_event(Event::Settled);
     ui.advance_clock(5000);
-    let text = ui.text();
+    let text = ui.screen_text();
     assert!(!text.contains("half") && text.contains("done"), "{text}");
     assert!(cells_of(&mut ui, BLUE) > 0 && cells_of(&mut ui, RED) == 0);
 }
@@ -274,35 +277,35 @@ fn file_saved_in_steps_shows_no_error() {
 fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.fail_render(error_with("first"));
-    assert!(ui.text().contains("error: first"), "without a save, errors should not be deferred");
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    assert!(ui.screen_text().contains("error: first"), "without a save, errors should not be deferred");
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.handle_event(Event::Settled);
     ui.fail_render(error_with("late"));
-    assert!(ui.text().contains("error: late"));
-    ui.press('r');
+    assert!(ui.screen_text().contains("error: late"));
+    ui.press_character('r');
     ui.fail_render(error_with("again"));
-    assert!(ui.text().contains("error: again"));
+    assert!(ui.screen_text().contains("error: again"));
 }
 
 #[test]
 fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(error_with("half"));
     ui.handle_event(Event::Lost(EventSource::Watcher));
-    assert!(ui.text().contains("error: half"), "{}", ui.text());
-    ui.press('r');
+    assert!(ui.screen_text().contains("error: half"), "{}", ui.screen_text());
+    ui.press_character('r');
     ui.fail_render(error_with("again"));
-    assert!(ui.text().contains("error: again"));
+    assert!(ui.screen_text().contains("error: again"));
 }
 
 #[test]
 fn render_failures_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
     ui.worker_event(protocol::Event::Failed { generation: ui.state.request.generation, failure });
-    assert!(ui.text().contains("no memory"), "{}", ui.text());
+    assert!(ui.screen_text().contains("no memory"), "{}", ui.screen_text());
 }
 
 #[test]
@@ -313,12 +316,12 @@ fn time_spent_in_the_editor_is_not_counted() {
     ui.now += Duration::from_secs(9);
     ui.handle_event(Event::Back);
     ui.now += Duration::from_millis(2);
-    ui.handle_event(Event::Changed(Changed { noticed }));
+    ui.handle_event(Event::Changed(ContentChange { noticed }));
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::Shown { generation: 2 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(22)));
     let noticed = ui.now;
-    ui.handle_event(Event::Changed(Changed { noticed }));
+    ui.handle_event(Event::Changed(ContentChange { noticed }));
     ui.now += Duration::from_millis(30);
     ui.handle_event(Event::Shown { generation: 3 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(30)));

@@ -7,12 +7,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::super::display::{Display, TerminalEnvironment};
-use super::super::graphics::{ImageProtocol, Images, TestImageTerminal};
+use super::super::graphics::{ImageProtocol, TerminalImages, TestImageTerminal};
 use super::super::presenter::Presenter;
 use super::super::terminal_replies::TerminalReply;
 use crate::color::{ColorDepth, xterm_rgb};
 use crate::event::Event;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::fixtures::*;
 use crate::mosaic::filled_squares;
 use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
@@ -93,7 +93,7 @@ impl SimulatedTerminal {
     fn deliver(&mut self, now: Instant) {
         while let Some((_, bytes)) = self.arriving.pop_front_if(|(when, _)| *when <= now) {
             self.cells.process(&bytes);
-            self.pixels.take(&bytes);
+            self.pixels.process_output(&bytes);
             self.bytes.extend(bytes);
         }
         while self.unanswered.pop_front_if(|(when, _)| *when <= now).is_some() {}
@@ -106,7 +106,7 @@ impl SimulatedTerminal {
 
     /// Returns the colors of all cell parts, or of all pixels if an image is shown.
     fn visible_colors(&self) -> Vec<[u8; 3]> {
-        if let Some(picture) = self.pixels.shown() {
+        if let Some(picture) = self.pixels.displayed_image() {
             return picture.pixels.clone();
         }
         let mut colors = Vec::new();
@@ -153,7 +153,7 @@ struct WatchedRender {
 
 impl WatchedRender {
     fn new(line: SimulatedConnection, preview: PreviewKind, depth: ColorDepth) -> Self {
-        let mut ui = TestUi::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
+        let mut ui = TestUi::from_state(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
         let begin = ui.now;
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Started { generation });
@@ -163,12 +163,12 @@ impl WatchedRender {
             settings,
             camera: camera(),
             exposure: 0.0,
-            own: own_settings(),
+            own: scene_settings(),
         });
         let size = ui.state.request.preview_size.expect("a preview size");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
-            PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
+            PreviewKind::Pixels(protocol) => Some(TerminalImages::new(protocol, false)),
             _ => None,
         };
         let taken = Rc::clone(&outbox);
@@ -213,7 +213,7 @@ impl WatchedRender {
             }
             if self.ui.now >= key {
                 key += REPEAT;
-                self.ui.press('l');
+                self.ui.press_character('l');
             }
             // A waiting step is requested once the previous one has a preview.
             if self.ui.state.request.generation > last {
@@ -304,7 +304,7 @@ impl WatchedRender {
 }
 
 /// A room in muted colors, as noisy as a render with `samples` samples per pixel.
-fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
+fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Srgb8Image {
     /// Noise of a single sample in code values, similar to a Cornell box.
     const NOISE: f64 = 1.2;
     let pixel = |i: u32| {
@@ -319,7 +319,7 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
         };
         std::array::from_fn(|c| channel(c).round() as u8)
     };
-    Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
+    Srgb8Image { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
 /// Mean difference between two screens, in code values.

@@ -9,12 +9,12 @@ use crate::fixtures::*;
 use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, ImagePosition, WriteMode};
-use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, View};
+use crate::pipeline::protocol::{self, Command, ImagePosition, SceneFileEdit, WriteMode};
+use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, ViewMode};
 use crate::preview_kind::PreviewKind;
-use crate::scene::description::{Integrator, Pose, Shadows};
+use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
-use crate::{Changed, ExitStatus};
+use crate::{ContentChange, ExitStatus};
 
 /// Checks that each key does what its table row says. `check` covers every action.
 #[test]
@@ -30,61 +30,69 @@ fn every_key_has_its_effect() {
 
 /// The camera pose requested by a key.
 fn requested_pose(effects: &[Effect]) -> Pose {
-    request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
+    find_render_request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
 
 fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
-    let overrides = |effects: &[Effect]| request(effects).map(|it| it.overrides.clone());
+    let overrides = |effects: &[Effect]| find_render_request(effects).map(|it| it.overrides.clone());
     match action {
         Action::CycleShadows => {
             // Returning to the scene's own value clears the override.
             for (wanted, by_key) in [
-                (Shadows::Hard, Some(Shadows::Hard)),
-                (Shadows::Off, Some(Shadows::Off)),
-                (Shadows::Soft, None),
+                (ShadowMode::Hard, Some(ShadowMode::Hard)),
+                (ShadowMode::Off, Some(ShadowMode::Off)),
+                (ShadowMode::Soft, None),
             ] {
-                let effects = ui.key(key);
+                let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").shadows, by_key);
                 assert_eq!(ui.state.request.shadows(), wanted);
             }
         }
         Action::ToggleDepthOfField => {
             for by_key in [Some(false), None] {
-                let effects = ui.key(key);
+                let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").dof, by_key);
             }
         }
         Action::TogglePhotons => {
             for (wanted, by_key) in [(true, Some(true)), (false, None)] {
-                let effects = ui.key(key);
+                let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").photons, by_key);
                 assert_eq!(ui.state.request.photons(), wanted);
             }
-            ui.press('i');
-            assert!(ui.key(key).is_empty(), "the path integrator does not use photons");
-            assert!(ui.text().contains(&messages::photons_unsupported("whitted")), "{}", ui.text());
+            ui.press_character('i');
+            assert!(ui.press_key(key).is_empty(), "the path integrator does not use photons");
+            assert!(
+                ui.screen_text().contains(&messages::photons_unsupported("whitted")),
+                "{}",
+                ui.screen_text()
+            );
         }
         Action::CycleIntegrator => {
             for (wanted, by_key) in [(Integrator::Path, Some(Integrator::Path)), (Integrator::Whitted, None)]
             {
-                let effects = ui.key(key);
+                let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").integrator, by_key);
                 assert_eq!(ui.state.request.integrator(), wanted);
             }
-            ui.key(key);
-            assert!(ui.text().contains("path"), "{}", ui.text());
-            assert!(ui.press('s').is_empty(), "the path integrator always has soft shadows");
-            assert!(ui.text().contains(&messages::only_soft_shadows("path", "whitted")), "{}", ui.text());
+            ui.press_key(key);
+            assert!(ui.screen_text().contains("path"), "{}", ui.screen_text());
+            assert!(ui.press_character('s').is_empty(), "the path integrator always has soft shadows");
+            assert!(
+                ui.screen_text().contains(&messages::only_soft_shadows("path", "whitted")),
+                "{}",
+                ui.screen_text()
+            );
         }
         Action::NextView | Action::PreviousView => {
-            let effects = ui.key(key);
-            let wanted = if action == Action::NextView { View::Normal } else { View::Error };
-            let request = request(&effects).expect("a request");
+            let effects = ui.press_key(key);
+            let wanted = if action == Action::NextView { ViewMode::Normal } else { ViewMode::Error };
+            let request = find_render_request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteMode::No));
-            assert!(ui.text().contains(&messages::view_chosen(wanted.name())));
+            assert!(ui.screen_text().contains(&messages::view_chosen(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
-            let moved = requested_pose(&ui.key(key)).position - DVec3::Y;
+            let moved = requested_pose(&ui.press_key(key)).position - DVec3::Y;
             let expected = match action {
                 Action::OrbitLeft => -DVec3::X,
                 Action::OrbitRight => DVec3::X,
@@ -94,143 +102,153 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(moved.dot(expected) > 0.1 && (moved.length() - 4.0).abs() < 1e-3, "{moved}");
         }
         Action::DollyIn | Action::DollyOut => {
-            let distance = requested_pose(&ui.key(key)).distance();
+            let distance = requested_pose(&ui.press_key(key)).distance();
             assert_eq!(distance < 4.0, action == Action::DollyIn);
             assert_ne!(distance, 4.0);
         }
         Action::NarrowField | Action::WidenField => {
-            let overrides = overrides(&ui.key(key)).expect("a request");
+            let overrides = overrides(&ui.press_key(key)).expect("a request");
             assert_eq!(overrides.camera.fov.map(|fov| fov < 40.0), Some(action == Action::NarrowField));
             assert_eq!(overrides.camera.pose, None);
         }
         Action::Darken | Action::Brighten => {
             let stops = if action == Action::Darken { -0.25 } else { 0.25 };
-            let effects = ui.key(key);
+            let effects = ui.press_key(key);
             assert_eq!(
-                request(&effects).map(|it| (it.overrides.exposure, it.write)),
+                find_render_request(&effects).map(|it| (it.overrides.exposure, it.write)),
                 Some((Some(stops), WriteMode::No))
             );
             assert!(
-                ui.text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
+                ui.screen_text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
                 "{}",
-                ui.text()
+                ui.screen_text()
             );
         }
         Action::KeepCamera => {
-            assert!(ui.key(key).is_empty(), "an unchanged camera should not be saved");
-            ui.press('l');
+            assert!(ui.press_key(key).is_empty(), "an unchanged camera should not be saved");
+            ui.press_character('l');
             let wanted = ui.state.request.viewpoint().expect("a camera");
             assert!(
-                matches!(ui.key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
+                matches!(ui.press_key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
             );
         }
         Action::Inspect => {
             assert!(
-                matches!(ui.key(key)[..], [Effect::Send(Command::Pick(spot))] if (spot.x, spot.y) == (0.5, 0.5))
+                matches!(ui.press_key(key)[..], [Effect::Send(Command::Pick(spot))] if (spot.x, spot.y) == (0.5, 0.5))
             );
         }
         Action::UndoCamera => {
-            assert!(ui.key(key).is_empty(), "no camera has been saved");
-            let edit = CameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
+            assert!(ui.press_key(key).is_empty(), "no camera has been saved");
+            let edit = SceneFileEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
             ui.state.saving.camera_edits.push(edit.clone());
-            assert!(matches!(&ui.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit));
+            assert!(
+                matches!(&ui.press_key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit)
+            );
         }
         Action::Copy => {
-            assert!(ui.key(key).is_empty(), "nothing has been clicked");
+            assert!(ui.press_key(key).is_empty(), "nothing has been clicked");
             ui.state.selection.clicked = Some("a ball".to_owned());
-            assert!(ui.key(key).is_empty() && ui.text().contains(messages::SELECT_TO_COPY), "{}", ui.text());
+            assert!(
+                ui.press_key(key).is_empty() && ui.screen_text().contains(messages::SELECT_TO_COPY),
+                "{}",
+                ui.screen_text()
+            );
             ui.state.display.capabilities.clipboard = true;
-            assert!(matches!(ui.key(key)[..], [Effect::Aside(_)]));
+            assert!(matches!(ui.press_key(key)[..], [Effect::Aside(_)]));
         }
         Action::Focus => {
-            assert!(ui.key(key).is_empty(), "expected to wait for a click");
-            assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pick(_))]));
+            assert!(ui.press_key(key).is_empty(), "expected to wait for a click");
+            assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Pick(_))]));
         }
         Action::ActualPixels => {
             let around = |effects: &[Effect]| match effects {
                 [Effect::Send(Command::Preview(Some(size)))] => size.around,
                 other => panic!("{other:?}"),
             };
-            assert_eq!(around(&ui.key(key)), Some(ImagePosition { x: 0.5, y: 0.5 }));
-            assert!(ui.text().contains("x back"), "{}", ui.text());
-            assert_eq!(around(&ui.key(key)), None);
+            assert_eq!(around(&ui.press_key(key)), Some(ImagePosition { x: 0.5, y: 0.5 }));
+            assert!(ui.screen_text().contains("x back"), "{}", ui.screen_text());
+            assert_eq!(around(&ui.press_key(key)), None);
         }
         Action::RenderRegionFirst => {
-            let first = |effects: &[Effect]| request(effects).expect("a request").first;
-            ui.press('r');
-            assert!(ui.key(key).is_empty(), "expected to wait for a drag");
-            let section = first(&ui.key(key)).expect("a region around the crosshair");
+            let first = |effects: &[Effect]| find_render_request(effects).expect("a request").first;
+            ui.press_character('r');
+            assert!(ui.press_key(key).is_empty(), "expected to wait for a drag");
+            let section = first(&ui.press_key(key)).expect("a region around the crosshair");
             assert!((section.left - 1.0 / 3.0).abs() < 1e-9 && (section.height - 1.0 / 3.0).abs() < 1e-9);
-            assert!(ui.text().contains("z region first"), "{}", ui.text());
-            assert_eq!(first(&ui.key(key)), None);
+            assert!(ui.screen_text().contains("z region first"), "{}", ui.screen_text());
+            assert_eq!(first(&ui.press_key(key)), None);
         }
         Action::ToggleMouse => {
-            assert!(matches!(ui.key(key)[..], [Effect::Mouse(false)]));
-            assert!(matches!(ui.key(key)[..], [Effect::Mouse(true)]));
+            assert!(matches!(ui.press_key(key)[..], [Effect::Mouse(false)]));
+            assert!(matches!(ui.press_key(key)[..], [Effect::Mouse(true)]));
         }
-        Action::Edit => assert!(matches!(ui.key(key)[..], [Effect::Edit(_)])),
+        Action::Edit => assert!(matches!(ui.press_key(key)[..], [Effect::Edit(_)])),
         Action::CompareLastEdit => {
-            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
             ui.finish_render(BLUE);
             for (color, other) in [(RED, BLUE), (BLUE, RED)] {
-                ui.key(key);
+                ui.press_key(key);
                 assert!(cells_of(ui, color) > 0 && cells_of(ui, other) == 0);
             }
         }
         Action::OlderRender | Action::NewerRender => {
-            ui.press('s');
+            ui.press_character('s');
             ui.finish_render(BLUE);
             let is_older = action == Action::OlderRender;
             if !is_older {
-                ui.press('n');
+                ui.press_character('n');
             }
-            ui.key(key);
+            ui.press_key(key);
             assert_eq!(cells_of(ui, RED) > 0, is_older);
         }
         Action::TogglePause => {
-            ui.press('r');
-            assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pause(true))]));
-            assert!(ui.text().contains("paused"));
-            assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pause(false))]));
+            ui.press_character('r');
+            assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Pause(true))]));
+            assert!(ui.screen_text().contains("paused"));
+            assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Pause(false))]));
         }
-        Action::RenderAgain => assert!(request(&ui.key(key)).expect("a request").force),
-        Action::WriteImage => assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Write)])),
+        Action::RenderAgain => assert!(find_render_request(&ui.press_key(key)).expect("a request").force),
+        Action::WriteImage => assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Write)])),
         Action::ResetSettings => {
-            ui.press('s');
-            ui.press('v');
-            assert_eq!(overrides(&ui.key(key)), Some(Overrides::default()));
-            assert!(ui.key(key).is_empty(), "nothing left to reset");
+            ui.press_character('s');
+            ui.press_character('v');
+            assert_eq!(overrides(&ui.press_key(key)), Some(Overrides::default()));
+            assert!(ui.press_key(key).is_empty(), "nothing left to reset");
         }
         Action::ToggleDiagnostics => {
             ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
-            assert!(ui.key(key).is_empty());
-            assert!(!ui.text().contains("error: wrong"));
+            assert!(ui.press_key(key).is_empty());
+            assert!(!ui.screen_text().contains("error: wrong"));
         }
         Action::ShowImageOnly => {
             let cells = cells_of(ui, RED);
-            let effects = ui.key(key);
+            let effects = ui.press_key(key);
             assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
-            assert!(cells_of(ui, RED) > cells && ui.text().contains("tab back"), "{}", ui.text());
-            ui.key(key);
+            assert!(
+                cells_of(ui, RED) > cells && ui.screen_text().contains("tab back"),
+                "{}",
+                ui.screen_text()
+            );
+            ui.press_key(key);
             assert_eq!(cells_of(ui, RED), cells);
         }
         Action::ToggleHelp => {
             let help = keymap::binding_for(action).expect("a binding").help;
-            ui.key(key);
-            assert!(ui.text().contains(help));
-            ui.key(key);
-            assert!(!ui.text().contains(help));
+            ui.press_key(key);
+            assert!(ui.screen_text().contains(help));
+            ui.press_key(key);
+            assert!(!ui.screen_text().contains(help));
         }
-        Action::Redraw => assert!(matches!(ui.key(key)[..], [Effect::Redraw])),
-        Action::Suspend => assert!(matches!(ui.key(key)[..], [Effect::StopJob])),
-        Action::Interrupt => assert!(matches!(ui.key(key)[..], [Effect::Quit(ExitStatus(130))])),
-        Action::Quit => assert!(matches!(ui.key(key)[..], [Effect::Quit(ExitStatus(0))])),
+        Action::Redraw => assert!(matches!(ui.press_key(key)[..], [Effect::Redraw])),
+        Action::Suspend => assert!(matches!(ui.press_key(key)[..], [Effect::StopJob])),
+        Action::Interrupt => assert!(matches!(ui.press_key(key)[..], [Effect::Quit(ExitStatus(130))])),
+        Action::Quit => assert!(matches!(ui.press_key(key)[..], [Effect::Quit(ExitStatus(0))])),
     }
 }
 
 /// The text of the key line.
 fn bottom(ui: &mut TestUi) -> String {
-    ui.text().lines().last().map(str::to_owned).unwrap_or_default()
+    ui.screen_text().lines().last().map(str::to_owned).unwrap_or_default()
 }
 
 #[test]
@@ -242,21 +260,21 @@ fn key_line_shows_toggles_and_values() {
     let is_bold =
         |ui: &mut TestUi| ui.draw_screen()[(2, 23)].modifier.contains(ratatui::style::Modifier::BOLD);
     assert!(!is_bold(&mut ui));
-    ui.press('s');
+    ui.press_character('s');
     assert!(bottom(&mut ui).starts_with("s hard"), "{}", bottom(&mut ui));
     assert!(is_bold(&mut ui), "changed settings should be bold");
-    ui.press('i');
+    ui.press_character('i');
     assert!(bottom(&mut ui).starts_with("s –  p off  d on  v beauty  i path"), "{}", bottom(&mut ui));
     ui.handle_event(Event::Resize(window(140, 40)));
-    ui.press('0');
+    ui.press_character('0');
     let long = "s shadows soft  p photons off  d dof on  v view beauty  i whitted  ";
     assert!(bottom(&mut ui).starts_with(long), "{}", bottom(&mut ui));
     ui.handle_event(Event::Resize(window(40, 12)));
-    ui.press('g');
+    ui.press_character('g');
     ui.finish_render(RED);
-    ui.press('0');
-    ui.press('?');
-    ui.press('?');
+    ui.press_character('0');
+    ui.press_character('?');
+    ui.press_character('?');
     assert!(bottom(&mut ui).starts_with("s soft  p off") && bottom(&mut ui).ends_with("? help"));
 }
 
@@ -264,11 +282,11 @@ fn key_line_shows_toggles_and_values() {
 fn key_line_shows_currently_useful_keys() {
     let mut ui = TestUi::new();
     assert!(bottom(&mut ui).contains("space pause"), "{}", bottom(&mut ui));
-    ui.press(' ');
+    ui.press_character(' ');
     assert!(bottom(&mut ui).contains("space resume"), "{}", bottom(&mut ui));
     ui.finish_render(RED);
     assert!(bottom(&mut ui).contains("tab image") && !bottom(&mut ui).contains("space"));
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(RED);
     ui.handle_event(Event::Resize(window(200, 60)));
     for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::TogglePause) {
@@ -280,7 +298,7 @@ fn key_line_shows_currently_useful_keys() {
     assert!(bottom(&mut ui).contains("e 1 warning"));
     ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
     assert!(bottom(&mut ui).contains("esc close"), "{}", bottom(&mut ui));
-    ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    ui.press_key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(bottom(&mut ui).contains("e 1 error"), "{}", bottom(&mut ui));
 }
 
@@ -289,35 +307,36 @@ fn message_is_shown_until_a_key_is_pressed() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let hints = bottom(&mut ui);
-    ui.press('0');
-    let text = ui.text();
+    ui.press_character('0');
+    let text = ui.screen_text();
     assert!(text.lines().nth(22).is_some_and(|line| line.starts_with(messages::NOTHING_TO_RESET)), "{text}");
     assert_eq!(bottom(&mut ui), hints);
-    ui.press('?');
-    ui.press('?');
-    assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
+    ui.press_character('?');
+    ui.press_character('?');
+    assert!(!ui.screen_text().contains(messages::NOTHING_TO_RESET));
     // If there is no separate line for messages, they replace the key line or the scene name in the header.
     for rows in [12, 5] {
         ui.handle_event(Event::Resize(window(60, rows)));
-        ui.press('0');
-        assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
+        ui.press_character('0');
+        assert!(ui.screen_text().contains(messages::NOTHING_TO_RESET), "{}", ui.screen_text());
     }
 }
 
 #[test]
 fn toggles_start_from_the_command_line() {
-    let base = Overrides { shadows: Some(Shadows::Off), view: Some(View::Depth), ..Overrides::default() };
+    let base =
+        Overrides { shadows: Some(ShadowMode::Off), view: Some(ViewMode::Depth), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone());
-    let mut ui = TestUi::with(state);
+    let mut ui = TestUi::from_state(state);
     assert!(bottom(&mut ui).starts_with("s off  p off") && bottom(&mut ui).contains("v depth"));
-    let effects = ui.press('s');
-    let soft = request(&effects).expect("a request");
-    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), WriteMode::No));
+    let effects = ui.press_character('s');
+    let soft = find_render_request(&effects).expect("a request");
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(ShadowMode::Soft), WriteMode::No));
     assert_eq!(soft.own.as_deref(), Some(&base), "the scene's own image should continue");
-    let effects = ui.press('V');
-    assert_eq!(request(&effects).expect("a request").write, WriteMode::No);
-    let effects = ui.press('0');
-    assert_eq!(request(&effects).map(|it| it.overrides.clone()), Some(base));
+    let effects = ui.press_character('V');
+    assert_eq!(find_render_request(&effects).expect("a request").write, WriteMode::No);
+    let effects = ui.press_character('0');
+    assert_eq!(find_render_request(&effects).map(|it| it.overrides.clone()), Some(base));
 }
 
 #[test]
@@ -329,40 +348,40 @@ fn pinhole_has_no_depth_of_field() {
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
-    assert!(ui.press('d').is_empty());
-    assert!(ui.text().contains(messages::PINHOLE));
+    assert!(ui.press_character('d').is_empty());
+    assert!(ui.screen_text().contains(messages::PINHOLE));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
-    let mut ui = TestUi::with(state);
+    let mut ui = TestUi::from_state(state);
     ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
-    assert_eq!(request(&ui.press('d')).expect("a request").overrides.dof, Some(true));
+    assert_eq!(find_render_request(&ui.press_character('d')).expect("a request").overrides.dof, Some(true));
     ui.worker_event(protocol::Event::Settings {
         generation: 2,
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
-    assert!(ui.text().contains(messages::PINHOLE));
+    assert!(ui.screen_text().contains(messages::PINHOLE));
 }
 
 #[test]
 fn new_request_ends_a_pause() {
     let mut ui = TestUi::new();
-    ui.press(' ');
-    let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.press_character(' ');
+    let effects = ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!ui.state.work.paused);
-    assert!(ui.text().contains(messages::RESUMED), "{}", ui.text());
+    assert!(ui.screen_text().contains(messages::RESUMED), "{}", ui.screen_text());
 }
 
 #[test]
@@ -373,18 +392,18 @@ fn resuming_is_reported_with_other_messages() {
         ('v', messages::view_chosen("normal")),
     ] {
         let mut ui = TestUi::new();
-        ui.press(' ');
-        let effects = ui.press(key);
-        assert!(request(&effects).is_some() && !ui.state.work.paused);
-        let text = ui.text();
+        ui.press_character(' ');
+        let effects = ui.press_character(key);
+        assert!(find_render_request(&effects).is_some() && !ui.state.work.paused);
+        let text = ui.screen_text();
         assert!(text.contains(messages::RESUMED) && text.contains(&words[..5]), "{key}: {text}");
-        ui.press(key);
-        assert!(!ui.text().contains(messages::RESUMED), "{key}: should be reported only once");
+        ui.press_character(key);
+        assert!(!ui.screen_text().contains(messages::RESUMED), "{key}: should be reported only once");
     }
     let mut ui = TestUi::new();
-    ui.press(' ');
-    ui.press(' ');
-    assert!(!ui.text().contains(messages::RESUMED), "resuming with space should show no message");
+    ui.press_character(' ');
+    ui.press_character(' ');
+    assert!(!ui.screen_text().contains(messages::RESUMED), "resuming with space should show no message");
 }
 
 #[test]
@@ -392,86 +411,95 @@ fn clock_stops_while_paused() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, None) });
     ui.advance_clock(3000);
-    ui.press(' ');
-    assert!(ui.text().contains("32/64 samples · 3.0 s"), "{}", ui.text());
+    ui.press_character(' ');
+    assert!(ui.screen_text().contains("32/64 samples · 3.0 s"), "{}", ui.screen_text());
     ui.advance_clock(5000);
-    assert!(ui.text().contains("32/64 samples · 3.0 s"), "{}", ui.text());
-    ui.press(' ');
+    assert!(ui.screen_text().contains("32/64 samples · 3.0 s"), "{}", ui.screen_text());
+    ui.press_character(' ');
     ui.advance_clock(1000);
-    assert!(ui.text().contains("32/64 samples · 4.0 s"), "{}", ui.text());
+    assert!(ui.screen_text().contains("32/64 samples · 4.0 s"), "{}", ui.screen_text());
 }
 
 #[test]
 fn pausing_without_a_render_shows_a_message() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    assert!(ui.press(' ').is_empty());
-    assert!(ui.text().contains(messages::NOT_RENDERING));
+    assert!(ui.press_character(' ').is_empty());
+    assert!(ui.screen_text().contains(messages::NOT_RENDERING));
 }
 
 #[test]
 fn postponed_write_is_reported_again_when_done() {
     let mut ui = TestUi::new();
-    ui.press('w');
+    ui.press_character('w');
     ui.worker_event(protocol::Event::WritePostponed { generation: 1 });
-    assert!(ui.text().contains(messages::WRITE_POSTPONED), "{}", ui.text());
+    assert!(ui.screen_text().contains(messages::WRITE_POSTPONED), "{}", ui.screen_text());
     ui.worker_event(protocol::Event::WriteDone { generation: 1, paths: vec!["cornell.png".into()] });
-    assert!(ui.text().contains(&messages::files_written("cornell.png")), "{}", ui.text());
+    assert!(ui.screen_text().contains(&messages::files_written("cornell.png")), "{}", ui.screen_text());
 }
 
 #[test]
 fn cancelled_render_is_not_paused() {
     let mut ui = TestUi::new();
-    ui.press(' ');
+    ui.press_character(' ');
     ui.worker_event(protocol::Event::Cancelled { generation: 1 });
-    assert!(!ui.state.work.paused && !ui.text().contains("paused"), "{}", ui.text());
+    assert!(!ui.state.work.paused && !ui.screen_text().contains("paused"), "{}", ui.screen_text());
 }
 
 #[test]
 fn reverted_toggle_is_not_a_change() {
     for (keys, base) in [
         ("sss", Overrides::default()),
-        ("sss", Overrides { shadows: Some(Shadows::Hard), ..Overrides::default() }),
+        ("sss", Overrides { shadows: Some(ShadowMode::Hard), ..Overrides::default() }),
         ("ii", Overrides::default()),
         ("pp", Overrides::default()),
         ("dd", Overrides::default()),
         ("vV", Overrides::default()),
     ] {
-        let mut ui =
-            TestUi::with(state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone()));
+        let mut ui = TestUi::from_state(state_with(
+            120,
+            40,
+            PreviewKind::HalfBlock,
+            ColorDepth::TrueColor,
+            base.clone(),
+        ));
         ui.finish_render(RED);
         let mut requests = Vec::new();
         for key in keys.chars() {
             assert_eq!(ui.state.request.overrides() == base, requests.is_empty(), "{keys}");
-            requests.extend(request(&ui.press(key)).cloned());
+            requests.extend(find_render_request(&ui.press_character(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
         // Toggling starts again from the scene's value, whether or not the reply has arrived.
-        let first = request(&ui.press(keys.chars().next().expect("a key"))).cloned().expect("a request");
+        let first = find_render_request(&ui.press_character(keys.chars().next().expect("a key")))
+            .cloned()
+            .expect("a request");
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
     }
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
-    "sssii".chars().for_each(|key| drop(ui.press(key)));
-    assert!(ui.press('0').is_empty());
-    assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
+    "sssii".chars().for_each(|key| drop(ui.press_character(key)));
+    assert!(ui.press_character('0').is_empty());
+    assert!(ui.screen_text().contains(messages::NOTHING_TO_RESET), "{}", ui.screen_text());
 }
 
 #[test]
 fn saved_settings_are_the_base_for_toggles() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     let (generation, own) =
-        (ui.state.request.generation, AdjustableSettings { shadows: Shadows::Hard, ..own_settings() });
-    let settings = Box::new(EffectiveSettings { shadows: Shadows::Hard, ..effective_settings() });
+        (ui.state.request.generation, AdjustableSettings { shadows: ShadowMode::Hard, ..scene_settings() });
+    let settings = Box::new(EffectiveSettings { shadows: ShadowMode::Hard, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
-    let shadows: Vec<Option<Shadows>> = "sss"
+    let shadows: Vec<Option<ShadowMode>> = "sss"
         .chars()
-        .map(|key| request(&ui.press(key)).and_then(|request| request.overrides.shadows))
+        .map(|key| {
+            find_render_request(&ui.press_character(key)).and_then(|request| request.overrides.shadows)
+        })
         .collect();
-    assert_eq!(shadows, [Some(Shadows::Off), Some(Shadows::Soft), None]);
+    assert_eq!(shadows, [Some(ShadowMode::Off), Some(ShadowMode::Soft), None]);
 }

@@ -1,7 +1,7 @@
 //! Tests that the image gets enough space and that nothing moves during a render.
 
 use super::{RED, cells_of};
-use crate::Changed;
+use crate::ContentChange;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event};
 use crate::fixtures::*;
@@ -33,7 +33,7 @@ fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
         settings,
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     show(ui, (width, height));
 }
@@ -65,15 +65,15 @@ fn image_gets_most_of_the_space() {
     for window in WINDOWS {
         for size in SIZES {
             let most = max_cells(window, size);
-            let mut ui = TestUi::with(state(window.0, window.1));
+            let mut ui = TestUi::from_state(state(window.0, window.1));
             rendered(&mut ui, size);
             let share = cells_of(&mut ui, RED) as f64 / most;
             println!("{window:?} {size:?}: {share:.3}");
-            assert!(share >= 0.75, "{window:?} {size:?}: {share:.3}\n{}", ui.text());
-            ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Tab));
+            assert!(share >= 0.75, "{window:?} {size:?}: {share:.3}\n{}", ui.screen_text());
+            ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Tab));
             show(&mut ui, size);
             let share = cells_of(&mut ui, RED) as f64 / most;
-            assert!(share >= 0.95, "{window:?} {size:?} alone: {share:.3}\n{}", ui.text());
+            assert!(share >= 0.95, "{window:?} {size:?} alone: {share:.3}\n{}", ui.screen_text());
         }
     }
 }
@@ -81,7 +81,7 @@ fn image_gets_most_of_the_space() {
 #[test]
 fn layout_is_stable_during_a_render() {
     for (columns, rows) in WINDOWS.into_iter().chain([(40, 12), (30, 8), (80, 60)]) {
-        let mut ui = TestUi::with(state(columns, rows));
+        let mut ui = TestUi::from_state(state(columns, rows));
         rendered(&mut ui, (640, 480));
         let place = |ui: &TestUi| {
             let Layout { header, preview, panel, under, keys, pane } = Layout::for_state(&ui.state);
@@ -103,15 +103,15 @@ fn layout_is_stable_during_a_render() {
                     generation,
                     progress: render_progress(0.5, None),
                 }),
-                3 => ui.press(' '),
-                4 => ui.press('0'),
+                3 => ui.press_character(' '),
+                4 => ui.press_character('0'),
                 5 => ui.worker_event(written_event(generation, "cornell.png", true)),
                 6 => ui.worker_event(done_event(
                     generation,
                     vec![diagnostic(Severity::Warning, "unused")],
                     false,
                 )),
-                7 => ui.handle_event(Event::Changed(Changed { noticed: ui.now })),
+                7 => ui.handle_event(Event::Changed(ContentChange { noticed: ui.now })),
                 8 => {
                     ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
@@ -133,7 +133,7 @@ fn new_aspect_ratio_requests_another_preview() {
         settings: settings(640),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     assert!(same.is_empty(), "{same:?}");
     let wide = ui.worker_event(protocol::Event::Settings {
@@ -141,7 +141,7 @@ fn new_aspect_ratio_requests_another_preview() {
         settings: settings(1200),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     assert!(
         matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
@@ -152,24 +152,28 @@ fn new_aspect_ratio_requests_another_preview() {
 #[test]
 fn small_windows_are_usable() {
     for (columns, rows) in [(40, 12), (30, 8)] {
-        let mut ui = TestUi::with(state(columns, rows));
+        let mut ui = TestUi::from_state(state(columns, rows));
         ui.worker_event(protocol::Event::Progress {
             generation: 1,
             progress: render_progress(0.5, Some(9.0)),
         });
-        let text = ui.text();
+        let text = ui.screen_text();
         assert!(text.contains("● rendering") && text.contains("50 %"), "{text}");
         assert!(text.contains("? help") && text.contains("s soft"), "{text}");
         ui.worker_event(protocol::Event::Progress {
             generation: 1,
             progress: render_progress(0.5, Some(4567.0)),
         });
-        assert!(ui.text().contains("50 %"), "progress should take precedence over the ETA: {}", ui.text());
+        assert!(
+            ui.screen_text().contains("50 %"),
+            "progress should take precedence over the ETA: {}",
+            ui.screen_text()
+        );
         rendered(&mut ui, (640, 480));
         let share = cells_of(&mut ui, RED) as f64 / max_cells((columns, rows), (640, 480));
-        assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
+        assert!(share >= 0.7, "{share:.3}\n{}", ui.screen_text());
         ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
-        let text = ui.text();
+        let text = ui.screen_text();
         assert!(text.contains("✗ broken") && text.contains("error: misspelled"), "{text}");
         assert!(text.contains("cornell.toml:3:1"), "{text}");
     }
@@ -177,8 +181,8 @@ fn small_windows_are_usable() {
 
 #[test]
 fn status_line_shows_progress_then_results() {
-    let mut ui = TestUi::with(state(120, 40));
-    let under = |ui: &mut TestUi| ui.text().lines().nth(38).map(str::to_owned).unwrap_or_default();
+    let mut ui = TestUi::from_state(state(120, 40));
+    let under = |ui: &mut TestUi| ui.screen_text().lines().nth(38).map(str::to_owned).unwrap_or_default();
     let of = |name, status, seconds| protocol::Event::Stage {
         generation: 1,
         stage: stage_report(name, status, seconds, ""),
@@ -205,22 +209,26 @@ fn stage_times_are_compared_with_last_render() {
         ui.worker_event(protocol::Event::Stage { generation, stage: report });
     };
     render(&mut ui, 1.42);
-    assert!(!ui.text().contains("1.42 s −") && !ui.text().contains("1.42 s +"));
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    assert!(!ui.screen_text().contains("1.42 s −") && !ui.screen_text().contains("1.42 s +"));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     render(&mut ui, 1.12);
-    assert!(ui.text().contains("render   1.12 s −.3 s"), "{}", ui.text());
-    ui.press('r');
+    assert!(ui.screen_text().contains("render   1.12 s −.3 s"), "{}", ui.screen_text());
+    ui.press_character('r');
     ui.worker_event(protocol::Event::Started { generation: ui.state.request.generation });
-    ui.press('r');
+    ui.press_character('r');
     render(&mut ui, 2.24);
-    assert!(ui.text().contains("render  2.24 s +1.1 s"), "cancelled renders should not count: {}", ui.text());
+    assert!(
+        ui.screen_text().contains("render  2.24 s +1.1 s"),
+        "cancelled renders should not count: {}",
+        ui.screen_text()
+    );
 }
 
 #[test]
 fn save_hint_is_shown_until_the_first_save() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for size in SIZES {
-            let mut ui = TestUi::with(state(columns, rows));
+            let mut ui = TestUi::from_state(state(columns, rows));
             rendered(&mut ui, size);
             ui.worker_event(done_event(1, Vec::new(), false));
             // If all stages are listed, a narrow window has no space for the hint.
@@ -228,14 +236,14 @@ fn save_hint_is_shown_until_the_first_save() {
             assert!(
                 ui.screen_words().contains(&messages::save_to_render("cornell.toml", false)),
                 "{}",
-                ui.text()
+                ui.screen_text()
             );
-            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
             ui.worker_event(done_event(2, Vec::new(), false));
             assert!(
                 !ui.screen_words().contains(&messages::save_to_render("cornell.toml", false)),
                 "{}",
-                ui.text()
+                ui.screen_text()
             );
         }
     }
@@ -262,18 +270,18 @@ fn status_line_lists_only_current_files() {
         unfinished: None,
     });
     assert!(
-        Layout::for_state(&ui.state).panel.is_empty() && ui.text().contains("→ dof.png 63.0 kB"),
+        Layout::for_state(&ui.state).panel.is_empty() && ui.screen_text().contains("→ dof.png 63.0 kB"),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
-    ui.press('l');
+    ui.press_character('l');
     finish(&mut ui);
     // A key press that has no other effect clears the message about the camera.
-    ui.press('?');
-    ui.press('?');
-    let text = ui.text();
+    ui.press_character('?');
+    ui.press_character('?');
+    let text = ui.screen_text();
     assert!(text.contains(messages::NOT_SAVED) && !text.contains("dof.png 63"), "{text}");
-    ui.press('w');
+    ui.press_character('w');
     ui.worker_event(protocol::Event::Written {
         generation: 2,
         path: "dof.png".into(),
@@ -281,16 +289,16 @@ fn status_line_lists_only_current_files() {
         is_own: false,
         unfinished: None,
     });
-    ui.press('?');
-    ui.press('?');
-    let text = ui.text();
+    ui.press_character('?');
+    ui.press_character('?');
+    let text = ui.screen_text();
     assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("not saved"), "{text}");
 }
 
 #[test]
 fn hints_wrap_at_the_panel_width() {
     for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
-        let mut ui = TestUi::with(state(columns, rows));
+        let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         let settings = Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
         ui.worker_event(protocol::Event::Settings {
@@ -298,15 +306,15 @@ fn hints_wrap_at_the_panel_width() {
             settings,
             camera: camera(),
             exposure: 0.0,
-            own: own_settings(),
+            own: scene_settings(),
         });
         let panel = Layout::for_state(&ui.state).panel;
         let hint = messages::save_to_render("cornell.toml", true);
         assert_eq!(
-            ui.text().contains(&hint),
+            ui.screen_text().contains(&hint),
             usize::from(panel.width) >= hint.len(),
             "{panel:?}\n{}",
-            ui.text()
+            ui.screen_text()
         );
     }
 }
@@ -317,7 +325,7 @@ fn pixel_preview_memory_is_bounded() {
         let kind = PreviewKind::Pixels(protocol);
         let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
         state.display.window.cell_pixels = cell_pixels;
-        state.display.pixels_across()
+        state.display.horizontal_pixels_per_cell()
     };
     for (protocol, fine, most) in
         [(ImageProtocol::Kitty, 10, 2_400_000), (ImageProtocol::Sixel, 8, 1_600_000)]

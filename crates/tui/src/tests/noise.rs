@@ -18,13 +18,13 @@ fn noise_is_shown_during_a_render() {
         (36, 20, "32/64 samples"),
     ] {
         ui.handle_event(Event::Resize(window(columns, rows)));
-        assert!(ui.text().contains(words), "{words}: {}", ui.text());
+        assert!(ui.screen_text().contains(words), "{words}: {}", ui.screen_text());
     }
-    assert!(!ui.text().contains("noise"), "{}", ui.text());
+    assert!(!ui.screen_text().contains("noise"), "{}", ui.screen_text());
     // While paused, the remaining time is unknown.
     ui.handle_event(Event::Resize(window(80, 24)));
-    ui.press(' ');
-    assert!(ui.text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.text());
+    ui.press_character(' ');
+    assert!(ui.screen_text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.screen_text());
 }
 
 #[test]
@@ -38,25 +38,25 @@ fn sample_count_is_approximate_with_noise_target() {
         settings,
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     ui.worker_event(protocol::Event::Progress {
         generation: 1,
         progress: RenderProgress { is_total_fixed: false, ..render_progress(0.5, None) },
     });
-    assert!(ui.text().contains("about 32 samples"), "{}", ui.text());
+    assert!(ui.screen_text().contains("about 32 samples"), "{}", ui.screen_text());
 }
 
 /// Returns the screen after a render with a target `error` or a time limit.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
-    let mut ui = TestUi::with(state_with(80, 24, kind, depth, overrides));
+    let mut ui = TestUi::from_state(state_with(80, 24, kind, depth, overrides));
     ui.finish_render(RED);
     let report = ui.state.work.report.as_mut().expect("a report");
     (report.image.complete, report.image.samples.max) = (complete, samples);
     ui.state.request.effective.as_mut().expect("settings").error = error;
-    ui.text()
+    ui.screen_text()
 }
 
 #[test]
@@ -81,11 +81,15 @@ fn limit_that_ended_the_render_is_shown() {
 fn noise_and_target_per_tile_are_shown() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    assert!(ui.text().contains("noise    0.81 %") && !ui.text().contains("per tile"), "{}", ui.text());
+    assert!(
+        ui.screen_text().contains("noise    0.81 %") && !ui.screen_text().contains("per tile"),
+        "{}",
+        ui.screen_text()
+    );
     for (samples, words) in [(64, "target   0.5 % per tile"), (256, "target ✓ 0.5 % per tile")] {
         ui.state.request.effective.as_mut().expect("settings").error = 0.005;
         ui.state.request.effective.as_mut().expect("settings").samples = samples;
-        assert!(ui.text().contains(words), "{words}: {}", ui.text());
+        assert!(ui.screen_text().contains(words), "{words}: {}", ui.screen_text());
     }
 }
 
@@ -94,5 +98,5 @@ fn noise_has_two_digits() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
-    assert!(ui.text().contains("noise    43 %"), "{}", ui.text());
+    assert!(ui.screen_text().contains("noise    43 %"), "{}", ui.screen_text());
 }

@@ -14,9 +14,9 @@ const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.foc
 
 /// A UI showing a notice while a render is half done.
 fn half_done(window: (u16, u16), notice: &str) -> TestUi {
-    let mut ui = TestUi::with(state(window.0, window.1));
+    let mut ui = TestUi::from_state(state(window.0, window.1));
     ui.finish_render(RED);
-    ui.press('r');
+    ui.press_character('r');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.5, Some(2.0)) });
@@ -27,20 +27,20 @@ fn half_done(window: (u16, u16), notice: &str) -> TestUi {
 #[test]
 fn notice_expires_after_four_seconds() {
     for window in WINDOWS {
-        let mut ui = TestUi::with(state(window.0, window.1));
+        let mut ui = TestUi::from_state(state(window.0, window.1));
         ui.finish_render(RED);
-        ui.press(']');
+        ui.press_character(']');
         ui.finish_render(BLUE);
-        assert!(ui.text().contains(SHORT), "{}", ui.text());
+        assert!(ui.screen_text().contains(SHORT), "{}", ui.screen_text());
         ui.advance_clock(3900);
-        assert!(ui.text().contains(SHORT), "{}", ui.text());
+        assert!(ui.screen_text().contains(SHORT), "{}", ui.screen_text());
         // Since there are no other events, the event loop must wake up to clear the notice.
         let wake = ui.state.next_tick().expect("a tick");
         assert!(wake <= ui.now + std::time::Duration::from_millis(100));
         ui.state.dirty = false;
         ui.advance_clock(100);
         assert!(ui.state.dirty);
-        let rows = ui.text();
+        let rows = ui.screen_text();
         // The key line also contains this text, as a setting that `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
@@ -52,12 +52,12 @@ fn notice_expires_after_four_seconds() {
 fn newer_notice_is_shown_for_four_seconds() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.press(']');
+    ui.press_character(']');
     ui.advance_clock(3000);
-    ui.press(']');
+    ui.press_character(']');
     ui.finish_render(BLUE);
     ui.advance_clock(3000);
-    assert!(ui.text().contains(&messages::exposure_changed("+0.5")), "{}", ui.text());
+    assert!(ui.screen_text().contains(&messages::exposure_changed("+0.5")), "{}", ui.screen_text());
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn notice_does_not_hide_progress() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
             let mut ui = half_done(window, notice);
-            let text = ui.text();
+            let text = ui.screen_text();
             let begin: String = notice.chars().take(30).collect();
             assert!(text.contains(&begin), "{window:?} {text}");
             assert!(text.contains("32/64 samples"), "{window:?} {text}");
@@ -78,7 +78,7 @@ fn notice_does_not_hide_progress() {
 fn notice_does_not_hide_the_written_file() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
-            let mut ui = TestUi::with(state(window.0, window.1));
+            let mut ui = TestUi::from_state(state(window.0, window.1));
             ui.worker_event(protocol::Event::Written {
                 generation: 1,
                 path: "cornell.png".into(),
@@ -88,7 +88,7 @@ fn notice_does_not_hide_the_written_file() {
             });
             ui.finish_render(RED);
             crate::update::show_notice(&mut ui.state, notice);
-            assert!(ui.text().contains("→ cornell.png"), "{window:?} {}", ui.text());
+            assert!(ui.screen_text().contains("→ cornell.png"), "{window:?} {}", ui.screen_text());
         }
     }
 }
@@ -96,13 +96,13 @@ fn notice_does_not_hide_the_written_file() {
 /// Without a status line, notices replace the key line.
 #[test]
 fn small_window_shows_keys_after_a_notice() {
-    let mut ui = TestUi::with(state(60, 8));
+    let mut ui = TestUi::from_state(state(60, 8));
     ui.finish_render(RED);
-    ui.press(']');
+    ui.press_character(']');
     ui.finish_render(BLUE);
-    assert!(!ui.text().contains("q quit"), "{}", ui.text());
+    assert!(!ui.screen_text().contains("q quit"), "{}", ui.screen_text());
     ui.advance_clock(4000);
-    assert!(ui.text().contains("q quit"), "{}", ui.text());
+    assert!(ui.screen_text().contains("q quit"), "{}", ui.screen_text());
 }
 
 #[test]
@@ -116,12 +116,12 @@ fn errors_and_prompts_stay_until_a_key_press() {
     ui.finish_render(RED);
     ui.worker_event(failed);
     ui.advance_clock(60_000);
-    assert!(ui.text().contains("disk full"), "{}", ui.text());
-    ui.press('f');
+    assert!(ui.screen_text().contains("disk full"), "{}", ui.screen_text());
+    ui.press_character('f');
     ui.advance_clock(60_000);
-    assert!(ui.text().contains(messages::CLICK_TO_FOCUS), "{}", ui.text());
-    ui.press('f');
+    assert!(ui.screen_text().contains(messages::CLICK_TO_FOCUS), "{}", ui.screen_text());
+    ui.press_character('f');
     ui.handle_event(Event::Lost(crate::event::EventSource::Watcher));
     ui.advance_clock(60_000);
-    assert!(ui.text().contains(messages::NOT_WATCHING), "{}", ui.text());
+    assert!(ui.screen_text().contains(messages::NOT_WATCHING), "{}", ui.screen_text());
 }

@@ -3,9 +3,9 @@
 use ratatui::layout::Rect;
 
 use super::{BLUE, RED, cells_of};
-use crate::Changed;
+use crate::ContentChange;
 use crate::color::ColorDepth;
-use crate::event::{Effect, Event, KeyPress, Mouse, MouseEventKind};
+use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
@@ -27,7 +27,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
         settings: settings.clone(),
         camera: camera(),
         exposure: 0.0,
-        own: own_settings(),
+        own: scene_settings(),
     });
     let picture = uniform_picture(90, 68, RED);
     ui.handle_event(Event::Picture {
@@ -75,17 +75,17 @@ fn panel(ui: &mut TestUi) -> String {
 
 #[test]
 fn finished_render_has_a_noise_curve() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     rendered(&mut ui, 0.01);
     let text = panel(&mut ui);
-    assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.text());
+    assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
     let words = format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target("1 %"));
     assert!(text.contains(&words), "{text}");
     // The target line is a row of identical dots from the axis to the edge.
     let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
-    assert!(ui.text().lines().any(is_line), "{}", ui.text());
+    assert!(ui.screen_text().lines().any(is_line), "{}", ui.screen_text());
     // Changing the exposure reuses the render and its curve, unlike changing the lighting.
-    ui.press(']');
+    ui.press_character(']');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "the curve is hidden during a render");
@@ -94,12 +94,12 @@ fn finished_render_has_a_noise_curve() {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
     ui.worker_event(event);
-    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
-    ui.press('s');
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
+    ui.press_character('s');
     ui.finish_render(BLUE);
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "a single point is not drawn as a curve");
     // The curve is restored for an image that was rendered before.
-    ui.press('0');
+    ui.press_character('0');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), false);
@@ -107,16 +107,16 @@ fn finished_render_has_a_noise_curve() {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
     ui.worker_event(event);
-    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
     // Without a target `error`, there is no target line.
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     rendered(&mut ui, 0.0);
     assert!(panel(&mut ui).contains("1 min 50 s") && !panel(&mut ui).contains("target:"));
 }
 
 #[test]
 fn history_lists_changes_and_opens_on_click() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     assert!(!panel(&mut ui).contains(messages::HISTORY));
     edited(&mut ui, &[("camera.fov = 30", BLUE)]);
@@ -126,9 +126,9 @@ fn history_lists_changes_and_opens_on_click() {
         "{text}"
     );
     assert!(text.contains(&format!("1 {}", messages::OPENED)), "{text}");
-    ui.press('s');
+    ui.press_character('s');
     ui.finish_render(RED);
-    assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.text());
+    assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.screen_text());
     let all = cells_of(&mut ui, BLUE);
     assert!(all > 5 && all < 100, "expected a thumbnail: {all}");
     // Find a cell in the blue thumbnail.
@@ -136,23 +136,23 @@ fn history_lists_changes_and_opens_on_click() {
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
     let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a thumbnail");
-    let mouse = Mouse { kind: MouseEventKind::Press, column: place.x, row: place.y };
+    let mouse = MouseEvent { kind: MouseEventKind::Press, column: place.x, row: place.y };
     ui.handle_event(Event::Mouse(mouse));
-    ui.handle_event(Event::Mouse(Mouse { kind: MouseEventKind::Release, ..mouse }));
-    assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.text());
+    ui.handle_event(Event::Mouse(MouseEvent { kind: MouseEventKind::Release, ..mouse }));
+    assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.screen_text());
     assert!(
-        ui.text().contains(&messages::render_position(2, 3)) && panel(&mut ui).contains("▸2"),
+        ui.screen_text().contains(&messages::render_position(2, 3)) && panel(&mut ui).contains("▸2"),
         "{}",
-        ui.text()
+        ui.screen_text()
     );
-    ui.press('N');
+    ui.press_character('N');
     assert!(panel(&mut ui).contains("▸3") && cells_of(&mut ui, RED) > 500);
 }
 
 /// Saves the scene and starts its render. If `color` is set, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     ui.save_scene(text);
-    ui.read_scene();
+    ui.report_scene_read();
     color.into_iter().for_each(|color| show(ui, color));
 }
 
@@ -165,7 +165,7 @@ fn show(ui: &mut TestUi, color: [u8; 3]) {
 
 #[test]
 fn preview_does_not_wait_for_the_history() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", None);
     let (generation, before) = (ui.state.request.generation, ui.state.picture.history.len());
@@ -186,7 +186,7 @@ fn small_color(ui: &TestUi) -> [u8; 3] {
 
 #[test]
 fn entry_shows_preview_drawn_after_render_ends() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
@@ -196,7 +196,7 @@ fn entry_shows_preview_drawn_after_render_ends() {
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
     assert!(ui.state.dirty, "the history should be redrawn");
-    assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.text());
+    assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.screen_text());
     assert_eq!(ui.state.picture.history.len(), 2);
     // A preview that is already shown is not redrawn.
     ui.handle_event(Event::Shown { generation });
@@ -205,11 +205,11 @@ fn entry_shows_preview_drawn_after_render_ends() {
 
 #[test]
 fn hidden_entry_gets_preview_drawn_after_end() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
-    ui.press('n');
+    ui.press_character('n');
     ui.worker_event(done_event(generation, Vec::new(), false));
     ui.draw_screen();
     show(&mut ui, BLUE);
@@ -219,10 +219,10 @@ fn hidden_entry_gets_preview_drawn_after_end() {
 
 #[test]
 fn actual_pixels_are_not_used_as_a_thumbnail() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED), ("camera.fov = 30", BLUE)]);
     let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, RED));
-    let section = Some(protocol::Section { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
+    let section = Some(protocol::NormalizedRect { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
     let (range, lacks_photons, source) = (None, false, None);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
     ui.handle_event(Event::Shown { generation });
@@ -231,7 +231,7 @@ fn actual_pixels_are_not_used_as_a_thumbnail() {
 
 #[test]
 fn running_render_is_the_newest_entry() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some(BLUE));
     let text = panel(&mut ui);
@@ -247,7 +247,7 @@ fn running_render_is_the_newest_entry() {
     assert!(text.contains(&format!("▸– {}: camera.fov", messages::STOPPED)) && !text.contains('2'), "{text}");
     show(&mut ui, [10, 200, 20]);
     for keys in ["", "nN", "b", "b"] {
-        keys.chars().for_each(|key| drop(ui.press(key)));
+        keys.chars().for_each(|key| drop(ui.press_character(key)));
         let text = panel(&mut ui);
         assert!(
             text.contains("2 camera.fov 30 → 20")
@@ -261,22 +261,22 @@ fn running_render_is_the_newest_entry() {
     edited(&mut ui, &[]);
     let generation = ui.state.request.generation;
     ui.worker_event(done_event(generation, Vec::new(), false));
-    ui.press('n');
+    ui.press_character('n');
     let before = ui.state.picture.history.len();
     start_render(&mut ui, "camera.fov = 10", None);
-    ui.press('n');
-    ui.press('n');
+    ui.press_character('n');
+    ui.press_character('n');
     show(&mut ui, [90, 90, 20]);
     assert_eq!(ui.state.picture.history.len(), before + 1);
-    assert!(panel(&mut ui).contains(" 3 camera.fov 20 → 10"), "{}", ui.text());
+    assert!(panel(&mut ui).contains(" 3 camera.fov 20 → 10"), "{}", ui.screen_text());
 }
 
 #[test]
 fn moving_the_camera_adds_a_single_entry() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     for step in 0..5 {
-        ui.press('l');
+        ui.press_character('l');
         show(&mut ui, [step, 0, 200]);
         let text = panel(&mut ui);
         assert!(
@@ -289,13 +289,13 @@ fn moving_the_camera_adds_a_single_entry() {
 
 #[test]
 fn unchanged_image_keeps_its_curve() {
-    let mut ui = TestUi::with(state(120, 40));
+    let mut ui = TestUi::from_state(state(120, 40));
     rendered(&mut ui, 0.01);
     // Make and fix a typo, which leaves the image unchanged.
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.handle_event(Event::Settled);
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), true);
@@ -303,14 +303,14 @@ fn unchanged_image_keeps_its_curve() {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
     ui.worker_event(event);
-    assert!(ui.text().contains("unchanged"), "{}", ui.text());
-    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
+    assert!(ui.screen_text().contains("unchanged"), "{}", ui.screen_text());
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
 }
 
 #[test]
 fn numbers_are_not_separated_from_their_units() {
     for columns in 120..200 {
-        let mut ui = TestUi::with(state(columns, 40));
+        let mut ui = TestUi::from_state(state(columns, 40));
         rendered(&mut ui, 0.01);
         let panel = Layout::for_state(&ui.state).panel;
         let buffer = ui.draw_screen();
@@ -329,11 +329,11 @@ fn numbers_are_not_separated_from_their_units() {
 fn history_heading_is_not_shown_without_entries() {
     // The panel is too narrow for diagnostics, then not tall enough, then large enough.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
-        let mut ui = TestUi::with(state(200, 60));
+        let mut ui = TestUi::from_state(state(200, 60));
         ui.state.request.effective = Some(EffectiveSettings { width, height, ..effective_settings() });
         ui.handle_event(Event::Resize(window(200, 60)));
         for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
-            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(protocol::Event::Started { generation });
             ui.worker_event(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
@@ -351,14 +351,14 @@ fn history_heading_is_not_shown_without_entries() {
                 .count()
         };
         let has_heading = |text: &str| text.contains(messages::HISTORY);
-        let text = ui.text();
+        let text = ui.screen_text();
         assert!(has_heading(&text) && entries(&text) == 3, "{text}");
         for count in 1..8 {
             let errors = (0..count)
                 .map(|number| diagnostic(crate::scene::diagnostic::Severity::Error, &format!("{number}")));
             ui.fail_render(errors.collect());
             ui.handle_event(Event::Settled);
-            let text = ui.text();
+            let text = ui.screen_text();
             assert!(text.contains("error: 0"), "{text}");
             assert_eq!(has_heading(&text), entries(&text) > 1, "{width}×{height}, {count} errors:\n{text}");
         }
@@ -385,18 +385,18 @@ fn side_panel_fits_every_window_size() {
         "g = 1",
     ];
     for (kind, depth) in kinds {
-        let mut ui = TestUi::with(state_with(120, 40, kind, depth, Overrides::default()));
+        let mut ui = TestUi::from_state(state_with(120, 40, kind, depth, Overrides::default()));
         let all: Vec<_> =
             (1_u8..).zip(edits).map(|(index, what)| (what, [40 * (index % 5), 10 * index, 7])).collect();
         ui.finish_render(RED);
         edited(&mut ui, &all);
-        ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+        ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
         rendered(&mut ui, 0.01);
         for columns in [100, 119, 120, 140, 200] {
             for rows in [1, 5, 12, 24, 40, 60, 90] {
                 ui.handle_event(Event::Resize(window(columns, rows)));
                 for key in ['n', 'N', '?', '?'] {
-                    ui.press(key);
+                    ui.press_character(key);
                     let layout = Layout::for_state(&ui.state);
                     let mut buffer = ratatui::buffer::Buffer::empty(Rect::new(0, 0, columns, rows));
                     let drawn = view::draw(&ui.state, &mut buffer);
@@ -415,13 +415,13 @@ fn side_panel_fits_every_window_size() {
 }
 
 fn fixtures_text(buffer: &ratatui::buffer::Buffer) -> String {
-    text(buffer)
+    buffer_text(buffer)
 }
 
 #[test]
 fn written_files_are_hyperlinks() {
     for (columns, rows) in [(120, 40), (80, 20)] {
-        let mut ui = TestUi::with(state(columns, rows));
+        let mut ui = TestUi::from_state(state(columns, rows));
         ui.worker_event(protocol::Event::Written {
             generation: 1,
             path: "cornell.png".into(),
@@ -432,10 +432,10 @@ fn written_files_are_hyperlinks() {
         ui.finish_render(RED);
         let mut buffer = ui.draw_screen();
         let drawn = view::draw(&ui.state, &mut buffer);
-        let [(cells, path)] = &drawn.files[..] else { panic!("{drawn:?}\n{}", ui.text()) };
+        let [(cells, path)] = &drawn.files[..] else { panic!("{drawn:?}\n{}", ui.screen_text()) };
         let name: String = cells.positions().map(|place| buffer[place].symbol().to_owned()).collect();
         assert_eq!((name.as_str(), path.as_os_str().to_str()), ("cornell.png", Some("cornell.png")));
-        ui.press('?');
+        ui.press_character('?');
         assert!(view::draw(&ui.state, &mut buffer).files.is_empty(), "covered text should not be linked");
     }
 }
@@ -468,9 +468,9 @@ fn long_renders_send_a_notification_at_the_end() {
     // Pauses are not counted.
     let held = |ui: &mut TestUi| {
         focus(false)(ui);
-        ui.key(KeyPress::plain(' '));
+        ui.press_key(KeyPress::plain(' '));
         ui.advance_clock(60_000);
-        ui.key(KeyPress::plain(' '));
+        ui.press_key(KeyPress::plain(' '));
     };
     assert_eq!(notification(5, held), None);
     let never = |ui: &mut TestUi| {

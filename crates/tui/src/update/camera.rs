@@ -3,16 +3,16 @@
 
 use std::path::PathBuf;
 
-use super::notices::{notify, prompt, show_change, show_notice};
+use super::notices::{notify, prompt, show_key_change, show_notice};
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{Command, MovedCamera, SavedCamera};
+use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
 use crate::scene::is_mesh;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{State, format_stops};
 
 /// Orbit step in degrees.
@@ -56,7 +56,7 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return notify(state, &messages::field_limit(fov));
+        return notify(state, &messages::fov_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
     handle_camera_step(state)
@@ -88,9 +88,9 @@ fn report_unknown_camera(state: &mut State) -> Vec<Effect> {
 }
 
 pub(super) fn handle_camera_step(state: &mut State) -> Vec<Effect> {
-    drop_restored_values(state);
+    drop_redundant_camera_changes(state);
     let effects = render_or_delay_step(state);
-    show_change(
+    show_key_change(
         state,
         if state.request.toggles.camera.has_changes() {
             messages::CAMERA_MOVED
@@ -102,13 +102,13 @@ pub(super) fn handle_camera_step(state: &mut State) -> Vec<Effect> {
 }
 
 /// Drops camera changes that are equal to the scene's own values.
-fn drop_restored_values(state: &mut State) {
+fn drop_redundant_camera_changes(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
     camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
     let pose = CameraChange { focus: None, ..*camera };
-    camera.focus = camera.focus.filter(|focus| *focus != own.changed(&pose).focus);
+    camera.focus = camera.focus.filter(|focus| *focus != own.with_change(&pose).focus);
 }
 
 /// Asks the worker to write the current camera into the scene file.
@@ -135,19 +135,22 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
 
 /// Handles the result of writing the camera. If the scene now uses this camera, the camera no longer counts
 /// as moved.
-pub(super) fn handle_saved_camera(state: &mut State, outcome: Result<SavedCamera, String>) -> Vec<Effect> {
-    let SavedCamera { path, is_new, is_own, of_model, edit } = match outcome {
+pub(super) fn handle_saved_camera(
+    state: &mut State,
+    outcome: Result<CameraSaveResult, String>,
+) -> Vec<Effect> {
+    let CameraSaveResult { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= is_mesh(&state.request.scene);
-            return prompt(state, &format!("error: {}", visible(&why)));
+            return prompt(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     if of_model {
         (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
     }
-    let name = visible(&path.to_string_lossy()).into_owned();
+    let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
         _ if of_model => messages::model_scene_written(&name),
         (true, true) => messages::camera_saved(&name),
@@ -184,14 +187,14 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return prompt(state, &format!("error: {}", visible(&why)));
+            return prompt(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     state.saving.camera_edits.pop();
     state.picture.history.record_edit();
     let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
-    let name = visible(&path.to_string_lossy()).into_owned();
+    let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();
     show_notice(state, messages::camera_undone(&name));
     effects
 }
@@ -199,7 +202,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
 /// Renders the newest step immediately if the previous one has a preview. Otherwise the step waits.
 fn render_or_delay_step(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
-    if state.is_step_without_preview() {
+    if state.awaits_camera_step_preview() {
         state.request.camera_step.is_waiting = true;
         return Vec::new();
     }
@@ -219,7 +222,7 @@ pub(super) fn render_waiting_step_now(state: &mut State) -> Vec<Effect> {
 
 /// Renders the waiting step if the previous one has a preview.
 pub(super) fn render_waiting_step(state: &mut State) -> Vec<Effect> {
-    if state.request.camera_step.is_waiting && !state.is_step_without_preview() {
+    if state.request.camera_step.is_waiting && !state.awaits_camera_step_preview() {
         render_or_delay_step(state)
     } else {
         Vec::new()

@@ -11,7 +11,7 @@ use crate::state::{RenderState, State};
 pub(super) fn record_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
-        let origin = state.request.origin(!is_finished);
+        let origin = state.request.image_provenance(!is_finished);
         state.picture.history.record(shown, state.now, origin);
     }
 }
@@ -19,7 +19,7 @@ pub(super) fn record_image(state: &mut State) {
 /// Records a new image for the newest request, even if an older render is being viewed. The last image often
 /// arrives after the end of its render. A section shown at 1:1 scale never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
-    let is_over = !state.work.is_under_way();
+    let is_over = !state.work.is_rendering();
     if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
@@ -78,7 +78,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
 
 /// Returns to the newest render.
 pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
-    if let Some(newest) = state.picture.history.close() {
+    if let Some(newest) = state.picture.history.return_to_newest() {
         state.picture.shown = Some(newest);
         show_notice(state, words);
     }

@@ -13,9 +13,9 @@ use crate::event::{Effect, KeyPress};
 use crate::keymap;
 use crate::messages;
 use crate::pipeline::protocol::Command;
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::ViewMode;
 use crate::preview_kind::PreviewKind;
-use crate::scene::description::{Integrator, Method, Shadows};
+use crate::scene::description::{Integrator, IntegratorProperties, ShadowMode};
 use crate::scene::is_mesh;
 use crate::state::{KeyOverrides, Pane, State};
 
@@ -43,7 +43,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::TogglePhotons => toggle_photons(state),
         Action::CycleIntegrator => cycle_integrator(state),
         Action::NextView => step_view(state, 1),
-        Action::PreviousView => step_view(state, View::ALL.len() - 1),
+        Action::PreviousView => step_view(state, ViewMode::ALL.len() - 1),
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => request_render(state, true),
         Action::WriteImage => write_image_now(state),
@@ -75,7 +75,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ToggleHelp => change_and_redraw(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
-        Action::ShowImageOnly => show_image_only(state),
+        Action::ShowImageOnly => toggle_image_only(state),
         Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
@@ -103,21 +103,24 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
 }
 
 /// Returns the name of an integrator that supports a setting, or `None` if the current integrator does.
-fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<&'static str> {
-    if supports(state.request.integrator().method()) {
+fn find_supporting_integrator(
+    state: &State,
+    supports: impl Fn(IntegratorProperties) -> bool,
+) -> Option<&'static str> {
+    if supports(state.request.integrator().properties()) {
         return None;
     }
-    Integrator::ALL.iter().find(|one| supports(one.method())).map(|one| one.name())
+    Integrator::ALL.iter().find(|one| supports(one.properties())).map(|one| one.name())
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = other_integrator(state, |method| method.honors_shadows) {
+    if let Some(other) = find_supporting_integrator(state, |method| method.honors_shadows) {
         return notify(state, &messages::only_soft_shadows(state.request.integrator().name(), other));
     }
     let next = match state.request.shadows() {
-        Shadows::Soft => Shadows::Hard,
-        Shadows::Hard => Shadows::Off,
-        Shadows::Off => Shadows::Soft,
+        ShadowMode::Soft => ShadowMode::Hard,
+        ShadowMode::Hard => ShadowMode::Off,
+        ShadowMode::Off => ShadowMode::Soft,
     };
     state.request.toggles.shadows =
         Some(next).filter(|next| differs_from_base(next, state.request.base_shadows()));
@@ -141,7 +144,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = other_integrator(state, |method| method.gathers) {
+    if let Some(other) = find_supporting_integrator(state, |method| method.gathers) {
         return notify(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.photons();
@@ -151,11 +154,11 @@ fn toggle_photons(state: &mut State) -> Vec<Effect> {
 }
 
 fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
-    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
-    choose_view(state, View::ALL[(current + steps) % View::ALL.len()])
+    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    choose_view(state, ViewMode::ALL[(current + steps) % ViewMode::ALL.len()])
 }
 
-fn show_image_only(state: &mut State) -> Vec<Effect> {
+fn toggle_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
         PreviewKind::None => return notify(state, messages::NO_PREVIEW),
         PreviewKind::HalfBlock

@@ -19,21 +19,21 @@ pub(super) use self::notices::show_notice;
 use self::notices::show_until_key;
 use self::request::{request_render, request_resized_preview};
 use super::ExitStatus;
-use super::event::{Effect, Event, EventSource, Signal, Window};
+use super::event::{Effect, Event, EventSource, Signal, WindowSize};
 use super::history::ShownImage;
 use super::messages;
-use super::options::Changed;
+use super::options::ContentChange;
 use super::preview_kind::PreviewKind;
-use super::state::{Message, OwnImage, PendingChange, State};
+use super::state::{Message, PendingChange, SceneImageProgress, State};
 use super::view::layout::Layout;
-use crate::film::Picture;
-use crate::pipeline::protocol::{Command, OwnImageState};
+use crate::film::Srgb8Image;
+use crate::pipeline::protocol::{Command, SavedSceneImageState};
 
 /// How long the window size must stay the same before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// Creates the first render request.
-pub(super) fn start(state: &mut State) -> Vec<Effect> {
+pub(super) fn request_first_render(state: &mut State) -> Vec<Effect> {
     request_render(state, false)
 }
 
@@ -41,7 +41,7 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
     let was_paused = state.work.paused;
-    let mut effects = handle(state, event);
+    let mut effects = handle_event(state, event);
     effects.extend(camera::render_waiting_step(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
@@ -52,7 +52,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     effects
 }
 
-fn handle(state: &mut State, event: Event) -> Vec<Effect> {
+fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::handle_key(state, key),
         Event::Mouse(mouse) => pointer::handle_mouse(state, mouse),
@@ -64,12 +64,12 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             state.display.frame = Some(report);
             Vec::new()
         }
-        Event::Resize(window) => resize(state, window),
+        Event::Resize(window) => handle_resize(state, window),
         Event::Worker(event) => worker::handle_worker_event(state, event),
         Event::Picture { generation, picture, range, section, lacks_photons, source } => {
             show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
-        Event::Changed(Changed { noticed }) => {
+        Event::Changed(ContentChange { noticed }) => {
             // Keep the message if glimt made the change by writing the camera, or refused to write the camera
             // because of it.
             const OWN: Duration = Duration::from_secs(1);
@@ -87,7 +87,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.edits += 1;
             let effects = request_render(state, false);
             state.saving.saved_at = state.request.generation;
-            state.saving.own = OwnImage { state: OwnImageState::NotBegun, fraction: 0.0 };
+            state.saving.own = SceneImageProgress { state: SavedSceneImageState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A change saved in the editor becomes visible only when the editor exits.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
@@ -99,11 +99,11 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::Output(change) => worker::handle_output_change(state, &change),
-        Event::Signal(signal) => vec![effect_of_signal(signal)],
+        Event::Signal(signal) => vec![signal_effect(signal)],
         Event::Shown { generation } => {
             // The preview has been sent, so the history can be updated now.
             history::record_newest(state);
-            handle_first_change(state, generation)
+            record_save_to_screen_time(state, generation)
         }
         Event::Tick => tick(state),
         Event::Lost(source) => handle_lost_source(state, source),
@@ -124,7 +124,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
 
 fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
-        && is_whole(&shown.picture)
+        && is_complete_picture(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.update_newest_while_viewing_older(&shown) {
@@ -135,7 +135,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         let is_its = |last: &ShownImage| last.generation == shown.generation || last.shows_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
-            Some(last) if state.display.mixes_colors() => keep_unchanged_pixels(shown, &last),
+            Some(last) if state.display.dithers_colors() => keep_unchanged_pixels(shown, &last),
             Some(_) | None => shown,
         });
         state.dirty = true;
@@ -160,14 +160,14 @@ fn keep_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage
     shown
 }
 
-fn is_whole(picture: &Picture) -> bool {
+fn is_complete_picture(picture: &Srgb8Image) -> bool {
     picture.width > 0
         && picture.height > 0
         && u64::try_from(picture.pixels.len())
             .is_ok_and(|pixels| pixels == u64::from(picture.width) * u64::from(picture.height))
 }
 
-fn handle_first_change(state: &mut State, generation: u64) -> Vec<Effect> {
+fn record_save_to_screen_time(state: &mut State, generation: u64) -> Vec<Effect> {
     if let Some(change) = state.saving.change.take_if(|change| change.generation == generation) {
         state.saving.first_change = Some(state.now.saturating_duration_since(change.noticed));
         state.dirty = true;
@@ -175,7 +175,7 @@ fn handle_first_change(state: &mut State, generation: u64) -> Vec<Effect> {
     Vec::new()
 }
 
-fn resize(state: &mut State, window: Window) -> Vec<Effect> {
+fn handle_resize(state: &mut State, window: WindowSize) -> Vec<Effect> {
     state.display.window = window;
     state.dirty = true;
     state.request.resize_due =
@@ -201,7 +201,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     request_resized_preview(state)
 }
 
-fn effect_of_signal(signal: Signal) -> Effect {
+fn signal_effect(signal: Signal) -> Effect {
     match signal {
         Signal::Interrupt => Effect::Quit(ExitStatus::INTERRUPTED),
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),

@@ -8,7 +8,7 @@ use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap::{self, OverlayAction};
 use crate::messages;
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::ViewMode;
 use crate::state::State;
 use crate::view::{diagnostics, help};
 
@@ -17,7 +17,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
     if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);
     }
-    if let Some(view) = view_of_digit(state, key) {
+    if let Some(view) = view_for_digit(state, key) {
         state.overlays.message = None;
         return Some(choose_view(state, view));
     }
@@ -45,10 +45,10 @@ pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
 }
 
 /// The view selected by a digit while the view list is open.
-fn view_of_digit(state: &State, key: KeyPress) -> Option<View> {
+fn view_for_digit(state: &State, key: KeyPress) -> Option<ViewMode> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
     state.overlays.views.as_ref().filter(|_| key.modifiers.is_empty())?;
-    View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
+    ViewMode::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
 /// Closes a pane, cancels a pending click or drag, hides the inspected values, or returns to the newest

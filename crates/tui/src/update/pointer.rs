@@ -1,15 +1,15 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{notify, prompt, show_change, show_notice};
+use super::notices::{notify, prompt, show_key_change, show_notice};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
-use crate::event::{Effect, Mouse, MouseEventKind};
+use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
-use crate::math::decimal::{decimal_step, rounded};
+use crate::math::decimal::{decimal_step, round_to_step};
 use crate::messages;
-use crate::pipeline::protocol::{Command, Picked, PickedObject};
+use crate::pipeline::protocol::{Command, PickResult, PickedObject};
 use crate::scene::is_mesh;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
 use crate::view;
 use crate::view::layout::Layout;
@@ -20,11 +20,11 @@ use crate::window_title;
 const TURN_ACROSS: f64 = 180.0;
 
 /// Handles a mouse event.
-pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     match mouse.kind {
         MouseEventKind::Press => {
             let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
-            let Mouse { column, row, .. } = mouse;
+            let MouseEvent { column, row, .. } = mouse;
             if let Some(at) = view::history_entry_at(state, column, row) {
                 return history::open_at(state, at);
             }
@@ -56,17 +56,17 @@ pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     }
 }
 
-fn is_on_pane(state: &State, mouse: Mouse) -> bool {
+fn is_on_pane(state: &State, mouse: MouseEvent) -> bool {
     let is_on_errors = || Layout::for_state(state).pane.contains((mouse.column, mouse.row).into());
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
 
 /// Orbits the camera so that the scene follows the mouse.
-fn drag_to_orbit(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+fn drag_to_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     let Some(press) = state.selection.press else { return Vec::new() };
     if state.selection.is_marking {
         if let Some((from, to)) = press.from.zip(image_position_at(state, mouse.column, mouse.row)) {
-            region::drag(state, from, to);
+            region::update_dragged_region(state, from, to);
         }
         return Vec::new();
     }
@@ -81,7 +81,7 @@ fn drag_to_orbit(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     camera::orbit_by(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
 }
 
-fn handle_click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+fn handle_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
     }
@@ -137,7 +137,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the reply to a pick query.
-pub(super) fn handle_pick(state: &mut State, picked: &Picked) -> Vec<Effect> {
+pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect> {
     // An older render was opened after the click.
     if state.picture.history.is_viewing_older() {
         return Vec::new();
@@ -160,7 +160,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &Picked) -> Vec<Effect> {
 }
 
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = rounded(depth, decimal_step(depth));
+    let distance = round_to_step(depth, decimal_step(depth));
     if !(distance > 0.0) {
         return notify(state, messages::NOTHING_TO_FOCUS);
     }
@@ -171,13 +171,13 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::handle_camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
-        show_change(state, messages::focus_moved(distance));
+        show_key_change(state, messages::focus_moved(distance));
     }
     effects
 }
 
 /// Formats the inspected values and the pixel position on one line.
-fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
+fn values_with_pixel(PickResult { thing, pixel: [x, y], .. }: &PickResult, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
@@ -199,20 +199,20 @@ pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
 }
 
 /// Formats the inspected values: shape and name, line, material, distance, position, radiance and normal.
-fn inspected_values(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
+fn inspected_values(PickResult { thing, color, pixel: [x, y] }: &PickResult) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
     let PickedObject { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
-    let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
+    let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", escape_invisible_chars(name)));
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
     // A model's scene is generated, so its lines do not exist in any file.
-    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
+    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
-        visible(material).into_owned(),
+        escape_invisible_chars(material).into_owned(),
         format!("distance {}", format_number(*distance)),
         format!("position {}", format_vector(*position)),
     ]);
@@ -228,7 +228,7 @@ fn format_vector(all: [f64; 3]) -> String {
 /// Formats a number with three significant digits, or more if it has more digits before the decimal point.
 fn format_number(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
-    rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
+    round_to_step(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
 }
 
 #[cfg(test)]
@@ -249,7 +249,7 @@ mod tests {
             distance: 3.8167,
             depth: 3.5,
         };
-        let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
+        let picked = PickResult { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
             inspected_values(&picked),
             [
@@ -264,10 +264,10 @@ mod tests {
         );
         let of_model =
             picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
-        let of_model = inspected_values(&Picked { thing: of_model, ..picked });
+        let of_model = inspected_values(&PickResult { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(
-            inspected_values(&Picked { thing: None, color: None, ..picked }),
+            inspected_values(&PickResult { thing: None, color: None, ..picked }),
             ["nothing at pixel 3, 4"]
         );
     }

@@ -4,7 +4,7 @@ use super::notices::{prompt, show_notice};
 use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{ImagePosition, Section};
+use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
 use crate::state::State;
 
 /// Width and height of a region around a position, as fractions of the image.
@@ -34,8 +34,8 @@ pub(super) fn cancel_selection(state: &mut State) {
 }
 
 /// Updates the region during a drag.
-pub(super) fn drag(state: &mut State, from: ImagePosition, to: ImagePosition) {
-    state.request.first_section = Some(Section::between(from, to));
+pub(super) fn update_dragged_region(state: &mut State, from: ImagePosition, to: ImagePosition) {
+    state.request.first_section = Some(NormalizedRect::between(from, to));
     state.dirty = true;
 }
 
@@ -48,12 +48,12 @@ pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Ef
     }
 }
 
-fn section_around(spot: ImagePosition) -> Section {
+fn section_around(spot: ImagePosition) -> NormalizedRect {
     let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
-    Section { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
+    NormalizedRect { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
 }
 
-fn render_section(state: &mut State, section: Section) -> Vec<Effect> {
+fn render_section(state: &mut State, section: NormalizedRect) -> Vec<Effect> {
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
     let words = if state.work.is_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };

@@ -147,7 +147,7 @@ mod tests {
     use crate::pixel_request::ImageRoute;
     use crate::terminal_replies::TerminalQueries;
     use crate::terminals::{Capabilities, TerminalBrand};
-    use crate::update::start;
+    use crate::update::request_first_render;
 
     /// A UI whose user has requested kitty images.
     fn ui_requesting_pixels(route: ImageRoute) -> TestUi {
@@ -155,7 +155,7 @@ mod tests {
         let request = ImageProtocolRequest { protocol: ImageProtocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
         state.display.pixels_until = Some(request.reply_deadline(state.now));
-        TestUi::with(state)
+        TestUi::from_state(state)
     }
 
     #[test]
@@ -174,14 +174,18 @@ mod tests {
     fn missing_pixel_support_is_reported_once() {
         let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
-        assert!(ui.text().contains("kitty images"), "{}", ui.text());
+        assert!(ui.screen_text().contains("kitty images"), "{}", ui.screen_text());
         let refusal = ui.state.display.pixels.map(ImageProtocolRequest::unsupported_message);
         assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
-        ui.press('s');
+        ui.press_character('s');
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         ui.advance_clock(2000);
-        assert!(!ui.text().contains("kitty images"), "should be reported only once: {}", ui.text());
+        assert!(
+            !ui.screen_text().contains("kitty images"),
+            "should be reported only once: {}",
+            ui.screen_text()
+        );
     }
 
     #[test]
@@ -192,16 +196,16 @@ mod tests {
         assert_eq!(ui.state.overlays.message, None);
         assert!(ui.state.next_tick().is_some_and(|tick| tick <= ui.now + Duration::from_millis(100)));
         ui.advance_clock(100);
-        assert!(ui.text().contains("allow-passthrough on"), "{}", ui.text());
+        assert!(ui.screen_text().contains("allow-passthrough on"), "{}", ui.screen_text());
         ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
         assert_eq!(ui.state.display.kind, PreviewKind::Pixels(ImageProtocol::Kitty));
-        assert!(!ui.text().contains("allow-passthrough"), "{}", ui.text());
+        assert!(!ui.screen_text().contains("allow-passthrough"), "{}", ui.screen_text());
     }
 
     #[test]
     fn octants_increase_the_preview_resolution() {
         let mut state = state(80, 24);
-        start(&mut state);
+        request_first_render(&mut state);
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] });
         assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");

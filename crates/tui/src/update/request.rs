@@ -15,7 +15,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     } else {
         history::record_image(state);
     }
-    state.picture.shown = state.picture.history.close().or_else(|| state.picture.shown.take());
+    state.picture.shown = state.picture.history.return_to_newest().or_else(|| state.picture.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
     let now = KeyOverrides { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
@@ -28,7 +28,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     let is_moved = state.request.toggles.camera.has_changes();
     state.request.moved_since =
         is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
-    state.request.record_moved_parts();
+    state.request.record_original_camera();
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
@@ -42,8 +42,8 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.request.scene.clone(),
         overrides: state.request.overrides(),
         preview: state.request.preview_size,
-        write: if state.request.is_own_image() { WriteMode::Try } else { WriteMode::No },
-        own: state.request.own_image_overrides(),
+        write: if state.request.has_no_key_overrides() { WriteMode::Try } else { WriteMode::No },
+        own: state.request.command_line_overrides(),
         saves: state.saving.edits,
         force,
         first: state.request.first_section,

@@ -2,13 +2,13 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::show_change;
+use super::notices::show_key_change;
 use super::request::request_render;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap::OverlayAction;
 use crate::messages;
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::ViewMode;
 use crate::state::State;
 use crate::view::views::rows_per_column;
 
@@ -17,8 +17,8 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }
-    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
-    let last = View::ALL.len() - 1;
+    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    let last = ViewMode::ALL.len() - 1;
     let column = rows_per_column(state);
     let chosen = match action {
         OverlayAction::LineUp => current.saturating_sub(1),
@@ -38,7 +38,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
         }
         OverlayAction::Close => return None,
     };
-    Some(select_if_changed(state, View::ALL[chosen]))
+    Some(select_if_changed(state, ViewMode::ALL[chosen]))
 }
 
 /// Handles a key while the user is typing a search. `None` if no search is active.
@@ -60,32 +60,32 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
 }
 
 /// Selects a view and opens the list.
-pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
-    state.list_views();
+pub(super) fn choose_view(state: &mut State, view: ViewMode) -> Vec<Effect> {
+    state.open_view_list();
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
     let effects = request_render(state, false);
     if state.request.toggles.view.is_some() {
-        let is_empty = view == View::Photons && !state.request.photons();
+        let is_empty = view == ViewMode::Photons && !state.request.photons();
         let words = if is_empty {
             messages::VIEW_WITHOUT_PHOTONS.to_owned()
         } else {
             messages::view_chosen(view.name())
         };
-        show_change(state, words);
+        show_key_change(state, words);
     }
     effects
 }
 
 /// Finds the first view whose name starts with `name` or, failing that, contains it.
-fn find_view(name: &str) -> Option<View> {
-    let begins = |view: &&View| view.name().starts_with(name);
-    let has = |view: &&View| view.name().contains(name);
-    let all = || View::ALL.iter().filter(|_| !name.is_empty());
+fn find_view(name: &str) -> Option<ViewMode> {
+    let begins = |view: &&ViewMode| view.name().starts_with(name);
+    let has = |view: &&ViewMode| view.name().contains(name);
+    let all = || ViewMode::ALL.iter().filter(|_| !name.is_empty());
     all().find(begins).or_else(|| all().find(has)).copied()
 }
 
 fn search_view(state: &mut State, name: String) {
-    state.list_views();
+    state.open_view_list();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);
     }
@@ -97,8 +97,8 @@ fn close_list(state: &mut State) {
 }
 
 /// Selects a view unless it is already selected.
-fn select_if_changed(state: &mut State, view: View) -> Vec<Effect> {
-    state.list_views();
+fn select_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
+    state.open_view_list();
     if view == state.request.view() {
         return Vec::new();
     }

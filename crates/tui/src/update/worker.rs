@@ -13,14 +13,15 @@ use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, OwnImageState, Report,
-    SampleCounts, Stage, StageReport, Status,
+    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, Report, SampleCounts,
+    SavedSceneImageState, Stage, StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{
-    AssetBar, BlockingErrors, OwnImage, Pane, RenderState, State, WorkerActivity, WrittenFile,
+    AssetProgressBar, BlockingErrors, Pane, RenderState, SceneImageProgress, State, WorkerActivity,
+    WrittenFile,
 };
 use crate::window_title;
 
@@ -32,14 +33,14 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::CameraUndone { outcome, .. } => return camera::handle_undone_camera(state, outcome),
         Event::Picked { picked, .. } => return pointer::handle_pick(state, &picked),
         Event::WriteDone { paths, .. } => {
-            report_written(state, &paths);
+            report_written_files(state, &paths);
             return Vec::new();
         }
         // Images from earlier requests may be written after a new request has started.
         Event::Written { path, bytes, generation, is_own, unfinished }
             if generation != state.request.generation =>
         {
-            record_file(state, path, bytes, (generation, is_own), unfinished);
+            record_written_file(state, path, bytes, (generation, is_own), unfinished);
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
@@ -78,8 +79,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
                 state.work.curve.record(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
-            let is_rendering = OwnImageState::Begun { is_rendering: true };
-            if state.request.is_own_image() {
+            let is_rendering = SavedSceneImageState::Begun { is_rendering: true };
+            if state.request.has_no_key_overrides() {
                 state.saving.own.state = is_rendering;
             }
             if state.saving.own.state == is_rendering {
@@ -93,7 +94,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation, is_own, unfinished } => {
-            record_own_written(state, path, bytes, (generation, is_own), unfinished);
+            record_current_written_file(state, path, bytes, (generation, is_own), unfinished);
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -104,24 +105,38 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             }
             let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
             state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
-            show_until_key(state, format!("error: {}", visible(&message)));
+            show_until_key(state, format!("error: {}", escape_invisible_chars(&message)));
             state.saving.write_failed =
                 Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });
         }
-        Event::NotKept { message, .. } => show_until_key(state, format!("warning: {}", visible(&message))),
+        Event::NotKept { message, .. } => {
+            show_until_key(state, format!("warning: {}", escape_invisible_chars(&message)));
+        }
         Event::Checkpoint { news, .. } => match news {
             CheckpointUpdate::Failed { message } => {
-                show_until_key(state, format!("warning: {}", visible(&message)));
+                show_until_key(state, format!("warning: {}", escape_invisible_chars(&message)));
             }
             CheckpointUpdate::Resumed { path, .. } => {
-                show_notice(state, format!("{} {}", messages::RESUMING, visible(&path.to_string_lossy())));
+                show_notice(
+                    state,
+                    format!("{} {}", messages::RESUMING, escape_invisible_chars(&path.to_string_lossy())),
+                );
             }
             CheckpointUpdate::SetAside { path } => {
-                show_until_key(state, messages::checkpoint_kept(&visible(&path.to_string_lossy())));
+                show_until_key(
+                    state,
+                    messages::checkpoint_kept(&escape_invisible_chars(&path.to_string_lossy())),
+                );
             }
             CheckpointUpdate::Unused { path, why } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                show_until_key(state, messages::checkpoint_ignored(&visible(&name), &visible(&why)));
+                show_until_key(
+                    state,
+                    messages::checkpoint_ignored(
+                        &escape_invisible_chars(&name),
+                        &escape_invisible_chars(&why),
+                    ),
+                );
             }
             CheckpointUpdate::Written { .. }
             | CheckpointUpdate::Finished { .. }
@@ -143,7 +158,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             handle_failure(state, failure);
             return notify_render_ended(state, time);
         }
-        Event::LastGoodEnded { end, .. } => handle_last_valid_end(state, end),
+        Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
         Event::Cancelled { .. } => {
             (state.work.activity, state.work.rendering) = (WorkerActivity::Cancelled, RenderState::Stopped);
             state.set_paused(false);
@@ -207,8 +222,9 @@ fn handle_started(state: &mut State) {
     state.work.report = None;
     state.saving.unwritten = None;
     // A written image stays up to date until the render of another image begins.
-    if state.request.is_own_image() && state.saving.own.state != OwnImageState::Written {
-        state.saving.own = OwnImage { state: OwnImageState::Begun { is_rendering: true }, fraction: 0.0 };
+    if state.request.has_no_key_overrides() && state.saving.own.state != SavedSceneImageState::Written {
+        state.saving.own =
+            SceneImageProgress { state: SavedSceneImageState::Begun { is_rendering: true }, fraction: 0.0 };
     }
     close_empty_pane(state);
     state.work.unchanged = false;
@@ -227,7 +243,7 @@ fn record_stage(state: &mut State, stage: StageReport) {
 /// Updates an asset's progress bar. Each asset name has one bar.
 fn update_asset_bar(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
-    let bar = AssetBar { progress, finished };
+    let bar = AssetProgressBar { progress, finished };
     match state.work.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
         Some(asset) => *asset = bar,
         None => state.work.assets.push(bar),
@@ -235,16 +251,17 @@ fn update_asset_bar(state: &mut State, progress: AssetProgress) {
 }
 
 /// Reports the files written at the user's request.
-fn report_written(state: &mut State, paths: &[PathBuf]) {
+fn report_written_files(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
     let is_open = state.picture.history.is_viewing_older();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
-    let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
+    let names: Vec<String> =
+        paths.iter().map(|path| escape_invisible_chars(&path.to_string_lossy()).into_owned()).collect();
     show_notice(state, messages::files_written(&names.join(", ")) + which);
 }
 
 /// Records a written file. It is listed next to the image because a message would cover the keys.
-fn record_own_written(
+fn record_current_written_file(
     state: &mut State,
     path: PathBuf,
     bytes: u64,
@@ -257,12 +274,12 @@ fn record_own_written(
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
     }
-    record_file(state, path, bytes, (generation, is_own), unfinished);
+    record_written_file(state, path, bytes, (generation, is_own), unfinished);
 }
 
 /// Records that an image has been written. Its render may still be running. Any existing report belongs to
 /// the same image.
-fn record_file(
+fn record_written_file(
     state: &mut State,
     path: PathBuf,
     bytes: u64,
@@ -272,14 +289,14 @@ fn record_file(
     let shows = (!is_own).then_some(state.saving.write_shows);
     let view = shows.and_then(|shows| shows.view).unwrap_or(state.request.base_view());
     let made = match (unfinished, &state.work.report) {
-        (Some(samples), _) => exit_summary::describe_unfinished(samples, view),
+        (Some(samples), _) => exit_summary::describe_unfinished_image(samples, view),
         (None, Some(report)) => exit_summary::describe_image(report, view),
         (None, None) if generation == state.request.generation => exit_summary::view_label(view),
         (None, None) => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
-    if !is_own && state.saving.own.state == OwnImageState::Written {
-        state.saving.own.state = OwnImageState::Begun { is_rendering: false };
+    if !is_own && state.saving.own.state == SavedSceneImageState::Written {
+        state.saving.own.state = SavedSceneImageState::Begun { is_rendering: false };
     }
     let is_unfinished = unfinished.is_some();
     let (is_stale, lost) = (false, None);
@@ -293,13 +310,13 @@ fn record_file(
         is_stale,
         lost,
     });
-    if generation >= state.saving.saved_at && is_own_image_complete(state, generation) {
-        state.saving.own = OwnImage { state: OwnImageState::Written, fraction: 1.0 };
+    if generation >= state.saving.saved_at && is_scene_image_complete(state, generation) {
+        state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
 }
 
 /// Whether all output files contain the scene's own finished image from this request.
-fn is_own_image_complete(state: &State, generation: u64) -> bool {
+fn is_scene_image_complete(state: &State, generation: u64) -> bool {
     let is_complete = |written: &WrittenFile| {
         written.generation == generation && written.shows.is_none() && !written.is_unfinished
     };
@@ -328,7 +345,7 @@ pub(super) fn handle_output_change(
         return Vec::new();
     };
     (written.lost, state.dirty) = (*lost, true);
-    if let Some(words) = written.loss() {
+    if let Some(words) = written.describe_external_change() {
         show_until_key(state, words);
     }
     Vec::new()
@@ -369,9 +386,9 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
-    if state.request.is_own_image() && is_on_disk && state.saving.unwritten.is_none() {
+    if state.request.has_no_key_overrides() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
-        state.saving.own = OwnImage { state: OwnImageState::Written, fraction: 1.0 };
+        state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
     describe_files(state, state.request.generation, &report);
@@ -416,18 +433,18 @@ fn count_render(state: &mut State, unchanged: bool) {
 /// or differs only in exposure.
 fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
-    let origin = state.request.origin(false).without_exposure();
+    let origin = state.request.image_provenance(false).without_exposure();
     match render.status {
         Status::Done => {
             if let Some(error) = report.image.error {
                 state.work.curve.record_final(render.seconds, error);
             }
-            state.work.store_curve(origin);
+            state.work.store_noise_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
         }
-        Status::Reused => state.work.restore_curve(&origin),
+        Status::Reused => state.work.restore_noise_curve(&origin),
         Status::Running | Status::Skipped => {}
     }
     state.work.last_curve = state.work.curve.clone();
@@ -470,7 +487,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
 
 /// Handles the end of a render of the last valid scene. Such a render continues while the scene file is
 /// broken.
-fn handle_last_valid_end(state: &mut State, end: LastValidSceneOutcome) {
+fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneOutcome) {
     match end {
         LastValidSceneOutcome::Finished { unchanged } => {
             state.work.rendering = RenderState::Finished;

@@ -7,7 +7,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::Span;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
-use super::text::{Tone, put_text, row_of, seconds, two_digit_percent, wrapped};
+use super::text::{TextRole, format_seconds, format_two_digit_percent, nth_row, put_text, wrap_text};
 use crate::color::ColorDepth;
 use crate::messages;
 use crate::preview_kind::PreviewKind;
@@ -24,16 +24,16 @@ const MIN_RATIO: f64 = 1.5;
 
 /// Draws the chart at the top of an area. Returns the number of rows used, or 0 if there is no curve or too
 /// little space.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
+pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
     let (Some(rows), Some(points)) = (chart_rows(state, area), curve_points(state)) else { return 0 };
     let depth = state.display.depth;
-    put_text(buffer, row_of(area, 0), &[(messages::NOISE_OVER_TIME, Tone::Strong)], depth);
+    put_text(buffer, nth_row(area, 0), &[(messages::NOISE_OVER_TIME, TextRole::Strong)], depth);
     let caption = caption(state, points, area.width);
     let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
     plot(state, points, chart, buffer);
     for (index, line) in (chart.bottom() - area.y..).zip(&caption) {
-        put_text(buffer, row_of(area, index), &[(line, Tone::Faint)], depth);
+        put_text(buffer, nth_row(area, index), &[(line, TextRole::Faint)], depth);
     }
     rows
 }
@@ -64,17 +64,17 @@ const UNBROKEN: &str = "\u{a0}";
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', UNBROKEN);
-    let (from, first) = (whole(two_digit_percent(*from)), whole(seconds(*first)));
-    let (to, last) = (whole(two_digit_percent(*to)), whole(seconds(*last)));
+    let (from, first) = (whole(format_two_digit_percent(*from)), whole(format_seconds(*first)));
+    let (to, last) = (whole(format_two_digit_percent(*to)), whole(format_seconds(*last)));
     let fell = format!("{from} after {first}, {to} after {last}");
     let line = match requested_noise(state) {
         Some(target) => {
-            let share = whole(two_digit_percent(f64::from((target * 1e6).round() as f32) / 1e6));
+            let share = whole(format_two_digit_percent(f64::from((target * 1e6).round() as f32) / 1e6));
             format!("; {}", messages::noise_target(&share))
         }
         None => String::new(),
     };
-    wrapped(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
+    wrap_text(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
 }
 
 fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
@@ -91,23 +91,23 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     // Add a margin, since a line at the very edge would not be visible.
     let margin = 0.05 * (y[1] - y[0]).max(0.1);
     let bounds = [y[0] - margin, y[1] + margin];
-    let style = |tone: Tone| tone.style(depth);
+    let style = |tone: TextRole| tone.style(depth);
     let dataset = |data, tone| {
         Dataset::default().data(data).marker(marker(state)).graph_type(GraphType::Line).style(style(tone))
     };
     let mut sets = Vec::new();
-    sets.extend(line.as_ref().map(|line| dataset(&line[..], Tone::Good)));
-    sets.push(dataset(&curve, Tone::Working));
+    sets.extend(line.as_ref().map(|line| dataset(&line[..], TextRole::Good)));
+    sets.push(dataset(&curve, TextRole::Working));
     let axis = |bounds, labels: [String; 2]| {
-        let labels = labels.map(|label| Span::styled(label, style(Tone::Faint)));
-        Axis::default().bounds(bounds).labels(labels).style(style(Tone::Faint))
+        let labels = labels.map(|label| Span::styled(label, style(TextRole::Faint)));
+        Axis::default().bounds(bounds).labels(labels).style(style(TextRole::Faint))
     };
     let ten = |power: f64| 10_f64.powf(power);
     Chart::new(sets)
         .style(Style::new())
         .legend_position(None)
-        .x_axis(axis(x, x.map(|x| seconds(ten(x)))))
-        .y_axis(axis(bounds, y.map(|y| two_digit_percent(ten(y)))))
+        .x_axis(axis(x, x.map(|x| format_seconds(ten(x)))))
+        .y_axis(axis(bounds, y.map(|y| format_two_digit_percent(ten(y)))))
         .render(area, buffer);
 }
 

@@ -8,10 +8,10 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::stages::StyledLine;
-use super::text::{Tone, format_count, put_text, put_text_right, row_of, wrapped};
+use super::text::{TextRole, format_count, nth_row, put_text, put_text_right, wrap_text};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, SpanRole};
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
 /// Maximum number of distinct diagnostics shown. The others appear once these are fixed.
@@ -28,10 +28,10 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let (page, last) = page_and_max_scroll(&text, area);
     let first = state.overlays.diagnostics.scroll.min(last);
     Clear.render(area, buffer);
-    draw_title(state, row_of(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
+    draw_title(state, nth_row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
     for (index, line) in (1..area.height).zip(text.iter().skip(first)) {
-        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put_text(buffer, row_of(area, index), &pieces, state.display.depth);
+        let pieces: Vec<(&str, TextRole)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
+        put_text(buffer, nth_row(area, index), &pieces, state.display.depth);
     }
 }
 
@@ -59,12 +59,13 @@ fn pane_area(area: Rect, lines: usize, is_panel: bool) -> Rect {
 fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
     let reported = state.reported_diagnostics();
     let has_error = reported.iter().any(|one| one.severity == Severity::Error);
-    let tone = if state.overlays.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
+    let tone =
+        if state.overlays.problems.is_some() || has_error { TextRole::Error } else { TextRole::Warning };
     let rule = "─".repeat(usize::from(area.width));
     put_text(buffer, area, &[(&rule, tone)], state.display.depth);
     let words = match &state.overlays.problems {
         Some(_) => super::header::format_error_count(state),
-        None => report::summary(&reported),
+        None => report::summarize_counts(&reported),
     };
     let mut room = area;
     if let Some((first, page, all)) = shown {
@@ -94,7 +95,11 @@ fn pane_lines(state: &State, area: Rect) -> Vec<StyledLine> {
     };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
-        text.extend(styled_lines(&format!("error: {}", visible(work)), width, Tone::Error));
+        text.extend(styled_lines(
+            &format!("error: {}", escape_invisible_chars(work)),
+            width,
+            TextRole::Error,
+        ));
     }
     text.extend(format_diagnostics(&problems.diagnostics, width));
     text
@@ -121,27 +126,27 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
     let mut lines: Vec<StyledLine> =
-        faults.iter().take(MAX).flat_map(|fault| format_fault(fault, width)).collect();
+        faults.iter().take(MAX).flat_map(|fault| format_diagnostic_group(fault, width)).collect();
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
-        lines.push(vec![(format!("… {} not shown", format_count(more, "more diagnostic")), Tone::Plain)]);
+        lines.push(vec![(format!("… {} not shown", format_count(more, "more diagnostic")), TextRole::Plain)]);
     }
     lines
 }
 
 /// Formats the first position in full and the others only as line and column. An empty line follows.
-fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
+fn format_diagnostic_group(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
-        SpanRole::Text => Tone::Plain,
-        SpanRole::Error => Tone::Error,
-        SpanRole::Warning => Tone::Warning,
-        SpanRole::Frame => Tone::Faint,
-        SpanRole::Message => Tone::Strong,
+        SpanRole::Text => TextRole::Plain,
+        SpanRole::Error => TextRole::Error,
+        SpanRole::Warning => TextRole::Warning,
+        SpanRole::Frame => TextRole::Faint,
+        SpanRole::Message => TextRole::Strong,
     };
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
-    let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
+    let mut lines = report::report_lines(std::slice::from_ref(fault[0]), width);
     // Drop the empty line and the count that end the report, because the title already contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
@@ -154,7 +159,7 @@ fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
         };
         let number = format_count(places.len(), "place");
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
-        lines.extend(styled_lines(&text, width, Tone::Plain));
+        lines.extend(styled_lines(&text, width, TextRole::Plain));
     }
     lines.push(StyledLine::new());
     lines
@@ -167,6 +172,6 @@ fn format_position(one: &Diagnostic) -> Option<String> {
     Some(format!("{line}:{column}"))
 }
 
-fn styled_lines(text: &str, width: usize, tone: Tone) -> Vec<StyledLine> {
-    wrapped(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
+fn styled_lines(text: &str, width: usize, tone: TextRole) -> Vec<StyledLine> {
+    wrap_text(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
 }

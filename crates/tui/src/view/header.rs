@@ -9,8 +9,8 @@ use super::layout::{BLOCK, Layout};
 use super::message;
 use super::stages::running_stage;
 use super::text::{
-    Tone, floor_percent, format_count, format_number, format_running_time, put_text, put_text_right,
-    right_part, seconds, text_columns,
+    TextRole, floor_percent, format_count, format_number, format_running_time, format_seconds, put_text,
+    put_text_right, right_part, text_columns,
 };
 use crate::action::Action;
 use crate::choice::Choice;
@@ -18,10 +18,10 @@ use crate::history::age_in_words;
 use crate::keymap;
 use crate::messages;
 use crate::pipeline::protocol::RenderProgress;
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::ViewMode;
 use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{State, WorkerActivity};
 
 /// Minimum header width at which the state block has a fixed width.
@@ -40,15 +40,20 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if state.picture.is_alone {
         let back = keymap::binding_for(Action::ShowImageOnly)
             .map_or(String::new(), |it| format!("  {} back", it.label));
-        room.width -= put_text_right(buffer, room, &back, Tone::Faint, state.display.depth);
+        room.width -= put_text_right(buffer, room, &back, TextRole::Faint, state.display.depth);
     }
     let figures = progress_or_result(state);
     // Choose a variant that leaves some space for the name, if possible.
     let fitting = [MIN_NAME + 1, 0]
         .into_iter()
         .find_map(|name| figures.iter().find(|words| text_columns(words) + name <= room.width));
-    room.width -=
-        put_text_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
+    room.width -= put_text_right(
+        buffer,
+        room,
+        fitting.map_or("", String::as_str),
+        TextRole::Strong,
+        state.display.depth,
+    );
     room.width = room.width.saturating_sub(1);
     if room.width >= MIN_NAME {
         draw_scene_info(state, room, buffer);
@@ -67,25 +72,29 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
         return 0;
     }
     let width = usize::from(area.width);
-    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block(state.display.depth)).0;
+    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block_style(state.display.depth)).0;
     end - area.x
 }
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
-pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, Tone) {
-    if state.picture.history.is_viewing_older() { ("◂", "older", Tone::Warning) } else { work_label(state) }
+pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, TextRole) {
+    if state.picture.history.is_viewing_older() {
+        ("◂", "older", TextRole::Warning)
+    } else {
+        work_label(state)
+    }
 }
 
-fn work_label(state: &State) -> (&'static str, &'static str, Tone) {
+fn work_label(state: &State) -> (&'static str, &'static str, TextRole) {
     match state.work.activity {
-        _ if state.work.paused => ("‖", "paused", Tone::Warning),
-        WorkerActivity::Running { .. } => ("●", "rendering", Tone::Working),
-        WorkerActivity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
-        WorkerActivity::Done => ("✓", "done", Tone::Good),
-        WorkerActivity::Waiting => ("…", "waiting", Tone::Warning),
-        WorkerActivity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", Tone::Error),
-        WorkerActivity::Broken => ("✗", "broken", Tone::Error),
-        WorkerActivity::Cancelled => ("■", "stopped", Tone::Warning),
+        _ if state.work.paused => ("‖", "paused", TextRole::Warning),
+        WorkerActivity::Running { .. } => ("●", "rendering", TextRole::Working),
+        WorkerActivity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", TextRole::Error),
+        WorkerActivity::Done => ("✓", "done", TextRole::Good),
+        WorkerActivity::Waiting => ("…", "waiting", TextRole::Warning),
+        WorkerActivity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", TextRole::Error),
+        WorkerActivity::Broken => ("✗", "broken", TextRole::Error),
+        WorkerActivity::Cancelled => ("■", "stopped", TextRole::Warning),
     }
 }
 
@@ -98,16 +107,17 @@ pub(super) fn work_word(state: &State) -> &'static str {
 fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
-    let (folder, file) = (visible(folder), visible(file));
+    let (folder, file) = (escape_invisible_chars(folder), escape_invisible_chars(file));
     // The image size of older renders is unknown.
     let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up_label(state) + &view_label(state);
-    let view = (&*view, Tone::Strong);
-    let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
+    let view = (&*view, TextRole::Strong);
+    let mut pieces =
+        vec![(&*folder, TextRole::Faint), (&*file, TextRole::Strong), view, (&*size, TextRole::Faint)];
     // Omit parts before truncating the name.
-    let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| text_columns(text)).sum::<u16>();
+    let width = |pieces: &[(&str, TextRole)]| pieces.iter().map(|(text, _)| text_columns(text)).sum::<u16>();
     if width(&pieces) > area.width {
         pieces.remove(0);
     }
@@ -119,10 +129,10 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values. Empty for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.viewed_origin();
+    let open = state.picture.history.viewed_provenance();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
     let view = of_open.unwrap_or_else(|| state.request.view());
-    if view == View::Beauty {
+    if view == ViewMode::Beauty {
         return String::new();
     }
     let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
@@ -152,7 +162,8 @@ fn close_up_label(state: &State) -> String {
 /// Progress or result in several variants, from longest to shortest.
 fn progress_or_result(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
-        let is_unfinished = state.picture.history.viewed_origin().is_some_and(|origin| origin.is_unfinished);
+        let is_unfinished =
+            state.picture.history.viewed_provenance().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));
@@ -166,7 +177,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         let age = age_in_words(state.now.saturating_duration_since(time));
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
         // The newest render is still running in the background.
-        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
+        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_rendering()) {
             let done = format!("newest {} %", floor_percent(progress.fraction));
             let eta = format_eta(state, progress);
             figures = [
@@ -197,7 +208,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
             ]
         }
         (WorkerActivity::Done, Some(report), _) => {
-            let time = seconds(report.seconds);
+            let time = format_seconds(report.seconds);
             vec![format!("{time} · {}", messages::render_number(state.work.renders)), time]
         }
         (WorkerActivity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
@@ -212,7 +223,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
 /// Number of the newest render. A running render counts if it has an image.
 fn newest_render_number(state: &State) -> u64 {
     let history = &state.picture.history;
-    let is_under_way = state.work.is_under_way()
+    let is_under_way = state.work.is_rendering()
         && history.is_newest(state.request.generation)
         && history.is_newest_unfinished();
     state.work.renders + u64::from(is_under_way)
@@ -222,9 +233,9 @@ fn newest_render_number(state: &State) -> u64 {
 fn format_eta(state: &State, progress: &RenderProgress) -> String {
     /// Minimum time shown, in seconds. Shorter times would round to zero.
     const MIN: f64 = 0.05;
-    let eta = match Eta::of(progress) {
+    let eta = match Eta::from_progress(progress) {
         None => "…".to_owned(),
-        Some(Eta::OverADay) => Eta::OverADay.words(),
+        Some(Eta::OverADay) => Eta::OverADay.format(),
         Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
         Some(Eta::Seconds(eta)) => format_running_time(Duration::try_from_secs_f64(eta).unwrap_or_default()),
     };

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Block, BorderType, Clear, Widget};
 
 use super::layout::Layout;
-use super::text::{Tone, put_text, row_of, text_columns, wrapped};
+use super::text::{TextRole, nth_row, put_text, text_columns, wrap_text};
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::state::State;
@@ -39,20 +39,20 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         Clear.render(line.intersection(buffer.area), buffer);
     }
     if inner != area {
-        let border = Tone::Faint.style(state.display.depth);
-        let title_style = Tone::Strong.style(state.display.depth);
+        let border = TextRole::Faint.style(state.display.depth);
+        let title_style = TextRole::Strong.style(state.display.depth);
         let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
         block.title_style(title_style).title(title).render(area, buffer);
     }
     let labels = label_width(inner.width);
     for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
-        let line = row_of(inner, index);
+        let line = nth_row(inner, index);
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
-        put_text(buffer, place, &[(label, Tone::Strong)], state.display.depth);
+        put_text(buffer, place, &[(label, TextRole::Strong)], state.display.depth);
         put_text(
             buffer,
             super::text::right_part(line, labels + BESIDE),
-            &[(help, Tone::Plain)],
+            &[(help, TextRole::Plain)],
             state.display.depth,
         );
     }
@@ -71,8 +71,8 @@ fn label_width(width: u16) -> u16 {
 fn help_lines(width: u16) -> Vec<(String, String)> {
     let labels = label_width(width);
     let both = |(label, help)| {
-        let label = wrapped(label, usize::from(labels));
-        let help = wrapped(help, usize::from(width.saturating_sub(labels + BESIDE)));
+        let label = wrap_text(label, usize::from(labels));
+        let help = wrap_text(help, usize::from(width.saturating_sub(labels + BESIDE)));
         let line = |of: &[String], index: usize| of.get(index).cloned().unwrap_or_default();
         let count = label.len().max(help.len());
         (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()

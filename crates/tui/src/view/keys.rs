@@ -6,13 +6,13 @@ use ratatui::layout::Rect;
 use super::header::activity_label;
 use super::layout::Layout;
 use super::message;
-use super::text::{Tone, put_text, right_part, text_columns};
+use super::text::{TextRole, put_text, right_part, text_columns};
 use crate::action::Action;
 use crate::choice::Choice;
-use crate::keymap::{self, Binding, KEYMAP, OVERLAY, OverlayAction};
+use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
-use crate::scene::report::summary;
+use crate::scene::report::summarize_counts;
 use crate::state::{KeyOverrides, State, ViewList, WorkerActivity};
 
 /// A hint in the key line: a key with long and short descriptions.
@@ -20,13 +20,13 @@ struct KeyHint {
     key: &'static str,
     words: String,
     short: String,
-    tone: Tone,
+    tone: TextRole,
 }
 
 impl KeyHint {
     fn new(key: &'static str, words: impl Into<String>) -> Self {
         let words = words.into();
-        Self { key, short: words.clone(), words, tone: Tone::Faint }
+        Self { key, short: words.clone(), words, tone: TextRole::Faint }
     }
 
     fn for_action(action: Action) -> Option<Self> {
@@ -94,7 +94,7 @@ fn fit_hints(
 }
 
 fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
-    let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.label(is_long), hint.tone)];
+    let pieces = [(hint.key, TextRole::Strong), (" ", TextRole::Plain), (hint.label(is_long), hint.tone)];
     put_text(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }
@@ -105,7 +105,7 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
-    let honors_shadows = state.request.integrator().method().honors_shadows;
+    let honors_shadows = state.request.integrator().properties().honors_shadows;
     let shadows = if honors_shadows { state.request.shadows().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
     let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
@@ -125,7 +125,12 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
         let key = keymap::binding_for(action)?.label.split(' ').next()?;
         let words = format!("{name} {value}").trim_start().to_owned();
-        Some(KeyHint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
+        Some(KeyHint {
+            key,
+            words,
+            short: value,
+            tone: if is_changed { TextRole::Strong } else { TextRole::Faint },
+        })
     };
     all.into_iter().filter_map(hint).collect()
 }
@@ -176,11 +181,11 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     }
     if state.request.first_section.is_some() {
         let first = named(Action::RenderRegionFirst, "region first");
-        urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
+        urgent.extend(first.map(|hint| KeyHint { tone: TextRole::Strong, ..hint }));
     }
     let reset = keymap::binding_for(Action::ResetSettings).map_or("", |it| it.label);
-    let changed = |words| KeyHint { tone: Tone::Strong, ..KeyHint::new(reset, words) };
-    let changes = state.request.key_changes().join(", ");
+    let changed = |words| KeyHint { tone: TextRole::Strong, ..KeyHint::new(reset, words) };
+    let changes = state.request.describe_key_changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
@@ -194,15 +199,16 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         now.iter().filter_map(|action| KeyHint::for_action(*action)).map(|hint| pause_hint(hint, state));
     let (held, first): (Vec<KeyHint>, Vec<KeyHint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
-    let is_other =
-        |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
+    let is_other = |it: &&KeyBinding| {
+        !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action)
+    };
     let has_picture = state.display.kind != PreviewKind::None;
-    let is_shown = |it: &&Binding| it.action != Action::ShowImageOnly || has_picture;
-    let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
+    let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
+    let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_running();
     // If there are changes to list, a hint added above already shows them next to this key.
     let is_of_use =
-        state.request.toggles != KeyOverrides::default() && state.request.key_changes().is_empty();
-    let is_back = |it: &&Binding| it.action != Action::ResetSettings || is_of_use;
+        state.request.toggles != KeyOverrides::default() && state.request.describe_key_changes().is_empty();
+    let is_back = |it: &&KeyBinding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
         .iter()
         .filter(is_other)
@@ -216,7 +222,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
 /// Keys for the view list, or the search text.
 fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
     match &views.name {
-        Some(name) => vec![KeyHint { tone: Tone::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
+        Some(name) => vec![KeyHint { tone: TextRole::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
         None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]
             .map(|(key, words)| KeyHint::new(key, words))
             .into(),
@@ -248,7 +254,7 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
         Some(_) => (super::header::format_error_count(state), activity_label(state).2),
         None => match state.reported_diagnostics() {
             none if none.is_empty() => return None,
-            reported => (summary(&reported), Tone::Warning),
+            reported => (summarize_counts(&reported), TextRole::Warning),
         },
     };
     Some(KeyHint { tone, ..KeyHint::new(key, words) })

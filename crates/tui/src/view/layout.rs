@@ -57,7 +57,7 @@ impl Layout {
     /// Size of the largest preview that fits into the window, assuming square pixels.
     pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::for_state(state).preview;
-        let across = state.display.pixels_across();
+        let across = state.display.horizontal_pixels_per_cell();
         let height =
             (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
         (area.width > 0 && height > 0).then_some(PreviewSize {

@@ -3,8 +3,8 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::text::Tone;
-use crate::pipeline::protocol::{ImagePosition, Section};
+use super::text::TextRole;
+use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
@@ -12,13 +12,13 @@ use crate::state::State;
 pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
-        let cell = cell_of(state, spot, cells).and_then(|place| buffer.cell_mut(place));
+        let cell = cell_for_position(state, spot, cells).and_then(|place| buffer.cell_mut(place));
         if let Some(cell) = cell {
             cell.reset();
-            cell.set_symbol(symbol).set_style(Tone::Chosen.style(state.display.depth));
+            cell.set_symbol(symbol).set_style(TextRole::Chosen.style(state.display.depth));
         }
     };
-    if let Some(Section { left, top, width, height }) =
+    if let Some(NormalizedRect { left, top, width, height }) =
         state.request.first_section.filter(|_| is_region_marked(state))
     {
         // Keep the marks inside the region.
@@ -42,10 +42,10 @@ fn is_region_marked(state: &State) -> bool {
 }
 
 /// The cell at a position in the image, if visible.
-fn cell_of(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
+fn cell_for_position(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
     let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
-    let Section { left, top, width, height } =
-        section.unwrap_or(Section { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });
+    let NormalizedRect { left, top, width, height } =
+        section.unwrap_or(NormalizedRect { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });
     let along = |at: f64, start: f64, length: f64, cells: u16| {
         let share = (at - start) / length;
         (0.0..1.0).contains(&share).then(|| ((share * f64::from(cells)) as u16).min(cells.saturating_sub(1)))

@@ -8,8 +8,8 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::status_line;
-use super::text::{Tone, put_text, right_part, row_of, text_columns, wrapped};
-use crate::scene::sanitize::visible;
+use super::text::{TextRole, nth_row, put_text, right_part, text_columns, wrap_text};
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
 /// Panel height needed for the inspected values.
@@ -35,7 +35,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         }
         MessagePosition::Over(room) => room,
     };
-    let lines = wrapped(&words, usize::from(room.width));
+    let lines = wrap_text(&words, usize::from(room.width));
     let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height);
     let area = Rect { y: room.bottom() - height, height, ..room };
     Clear.render(area.intersection(buffer.area), buffer);
@@ -43,7 +43,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         // Lines that do not fit are truncated with an ellipsis.
         let is_cut = index + 1 == height && lines.len() > usize::from(height);
         let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
-        put_text(buffer, row_of(area, index), &[(&rest, tone)], state.display.depth);
+        put_text(buffer, nth_row(area, index), &[(&rest, tone)], state.display.depth);
     }
 }
 
@@ -77,19 +77,19 @@ pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
     layout.panel.height >= FACTS && !is_covered
 }
 
-fn message_text(state: &State, layout: &Layout) -> Option<(String, Tone)> {
+fn message_text(state: &State, layout: &Layout) -> Option<(String, TextRole)> {
     if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(state, layout)) {
-        return Some((facts.join(" · "), Tone::Strong));
+        return Some((facts.join(" · "), TextRole::Strong));
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
-    let words = visible(&message.words).into_owned();
+    let words = escape_invisible_chars(&message.words).into_owned();
     // The view list hides a long message. The list's keys hide a short message that has no line of its own.
     let has_place = !layout.under.is_empty()
         && matches!(message_position(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
         return None;
     }
-    let tone = if words.starts_with("error") { Tone::Error } else { Tone::Strong };
+    let tone = if words.starts_with("error") { TextRole::Error } else { TextRole::Strong };
     Some((words, tone))
 }
 

@@ -22,7 +22,7 @@ pub(super) mod views;
 
 use ratatui::buffer::Buffer;
 
-pub(super) use self::extras::ViewExtras;
+pub(super) use self::extras::FileLinksAndDelayedText;
 use self::layout::Layout;
 use super::state::State;
 
@@ -39,7 +39,7 @@ pub(super) fn history_entry_at(state: &State, column: u16, row: u16) -> Option<u
 }
 
 /// Draws the whole screen.
-pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
+pub(super) fn draw(state: &State, buffer: &mut Buffer) -> FileLinksAndDelayedText {
     let layout = Layout::for_state(state);
     header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
@@ -52,7 +52,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     // A long message covers everything drawn before it.
     message::draw(state, &layout, buffer);
     if state.overlays.views.is_some() {
-        views::draw(state, &layout, buffer);
+        views::draw_view_list(state, &layout, buffer);
     }
     if state.overlays.help.open {
         help::draw(state, buffer);
@@ -61,7 +61,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     let is_covered =
         state.overlays.help.open || state.overlays.views.is_some() || message::covers_preview(state);
     if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {
-        ViewExtras::default()
+        FileLinksAndDelayedText::default()
     } else {
         drawn
     }

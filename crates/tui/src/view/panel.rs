@@ -4,20 +4,20 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::extras::ViewExtras;
+use super::extras::FileLinksAndDelayedText;
 use super::layout::{ENTRY_WIDTH, Layout};
 use super::message;
 use super::side_panel;
 use super::stages::{self, StyledLine};
 use super::status_line;
 use super::text::{
-    Tone, floor_percent, format_bytes, progress_bar_parts, row_of, text_columns, truncated_text,
-    two_digit_percent, wrapped,
+    TextRole, floor_percent, format_bytes, format_two_digit_percent, nth_row, progress_bar_parts,
+    text_columns, truncated_text, wrap_text,
 };
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
-use crate::scene::sanitize::visible;
-use crate::state::{AssetBar, State, WorkerActivity};
+use crate::scene::sanitize::escape_invisible_chars;
+use crate::state::{AssetProgressBar, State, WorkerActivity};
 
 /// Width of an asset's progress bar.
 const BAR: u16 = 8;
@@ -25,13 +25,13 @@ const BAR: u16 = 8;
 const LABEL: usize = 8;
 
 /// Draws the panel, using several columns if necessary and possible. Lines that do not fit are omitted.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras {
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksAndDelayedText {
     if area.is_empty() {
-        return ViewExtras::default();
+        return FileLinksAndDelayedText::default();
     }
     let PanelLayout { lines, columns, room } = panel_layout(state, area);
     let width = room.width / columns;
-    let mut drawn = ViewExtras::default();
+    let mut drawn = FileLinksAndDelayedText::default();
     for (index, line) in (0..).zip(lines.iter()) {
         let (column, line_of) = (index / room.height, index % room.height);
         if column >= columns {
@@ -39,7 +39,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
         }
         let gap = u16::from(column + 1 < columns);
         let place = Rect { x: room.x + column * width, width: width - gap, ..room };
-        drawn.put_line(state, row_of(place, line_of), line, buffer);
+        drawn.put_line_with_links(state, nth_row(place, line_of), line, buffer);
     }
     drawn.later = side_panel::draw(state, area, rows_used(&lines, columns, room), buffer);
     drawn
@@ -111,8 +111,8 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
         .iter()
         .filter(|_| message::is_in_panel(state, &Layout::for_state(state)))
         .flatten();
-    let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
-    let mut lines: Vec<StyledLine> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
+    let lines = facts.flat_map(|fact| wrap_text(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
+    let mut lines: Vec<StyledLine> = lines.map(|line| vec![(line, TextRole::Strong)]).collect();
     if !lines.is_empty() {
         lines.push(StyledLine::new());
     }
@@ -128,34 +128,40 @@ fn is_scene_broken(state: &State) -> bool {
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
-fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
+fn asset_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
     let fraction = stages::loaded_fraction(asset);
     let (filled_squares, empty) = progress_bar_parts(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", floor_percent(fraction));
     let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + text_columns(&percent) + 1);
-    let name = truncated_text(&visible(&asset.progress.name), room);
+    let name = truncated_text(&escape_invisible_chars(&asset.progress.name), room);
     let pad = usize::from(room - text_columns(&name).min(room)) + 1;
     let name = name + &" ".repeat(pad);
-    vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
+    vec![
+        (name, TextRole::Plain),
+        (filled_squares, TextRole::Working),
+        (empty, TextRole::Faint),
+        (percent, TextRole::Plain),
+    ]
 }
 
 /// The results as lines, each with a label and a value.
 fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
-    let fact =
-        |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
-    let mut lines = Vec::new();
-    lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
-    let mut add = |words: &str, tone| {
-        lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
+    let fact = |label: &str, value: String| {
+        vec![(format!("{label:<LABEL$} "), TextRole::Faint), (value, TextRole::Plain)]
     };
-    status_line::unsaved_messages(state).iter().for_each(|words| add(words, Tone::Faint));
-    status_line::changed_file_messages(state).for_each(|words| add(&words, Tone::Warning));
+    let mut lines = Vec::new();
+    lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), TextRole::Error)]));
+    let mut add = |words: &str, tone| {
+        lines.extend(wrap_text(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
+    };
+    status_line::unsaved_messages(state).iter().for_each(|words| add(words, TextRole::Faint));
+    status_line::changed_file_messages(state).for_each(|words| add(&words, TextRole::Warning));
     for written in status_line::current_image_files(state) {
-        lines.push(vec![("→ ".to_owned(), Tone::Good), (written.name(), Tone::File)]);
+        lines.push(vec![("→ ".to_owned(), TextRole::Good), (written.name(), TextRole::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
         lines.push(vec![(
             format!("  {}{}", format_bytes(written.bytes), size.unwrap_or_default()),
-            Tone::Faint,
+            TextRole::Faint,
         )]);
     }
     if let Some(report) = &state.work.report {
@@ -168,24 +174,25 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
                 format!("{} to {}", samples.min, samples.max)
             },
         ));
-        lines.extend(report.image.error.map(|error| fact("noise", two_digit_percent(error))));
+        lines.extend(report.image.error.map(|error| fact("noise", format_two_digit_percent(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
-            let label = if render_end(state) == Some(RenderEnd::Error) { "target ✓" } else { "target" };
+            let label =
+                if reached_limit(state) == Some(RenderLimit::Error) { "target ✓" } else { "target" };
             fact(label, format!("{} % per tile", f64::from((it.error * 1e4).round()) / 100.0))
         }));
     }
-    match render_end(state) {
-        Some(RenderEnd::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
-        Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
-        Some(RenderEnd::Error) | None => {}
+    match reached_limit(state) {
+        Some(RenderLimit::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
+        Some(RenderLimit::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
+        Some(RenderLimit::Error) | None => {}
     }
-    lines.extend(status_line::save_to_screen_time(state).map(|words| vec![(words, Tone::Faint)]));
+    lines.extend(status_line::save_to_screen_time(state).map(|words| vec![(words, TextRole::Faint)]));
     lines
 }
 
 /// A limit that can end a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum RenderEnd {
+enum RenderLimit {
     Time,
     Samples,
     /// All tiles have reached the requested `error`.
@@ -193,15 +200,15 @@ enum RenderEnd {
 }
 
 /// Determines which limit ended the render. `None` if only one was set.
-fn render_end(state: &State) -> Option<RenderEnd> {
+fn reached_limit(state: &State) -> Option<RenderLimit> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;
     match () {
         () if !is_by_error && state.request.command_line.time_seconds.is_none() => None,
-        () if !image.complete => Some(RenderEnd::Time),
+        () if !image.complete => Some(RenderLimit::Time),
         // If a tile has reached the maximum number of samples, its error may still be too large.
-        () if is_by_error && image.samples.max < effective.samples => Some(RenderEnd::Error),
-        () => Some(RenderEnd::Samples),
+        () if is_by_error && image.samples.max < effective.samples => Some(RenderLimit::Error),
+        () => Some(RenderLimit::Samples),
     }
 }
 
@@ -223,5 +230,5 @@ fn save_hint_lines(state: &State, width: u16) -> Vec<StyledLine> {
     if !lines.is_empty() {
         lines.insert(0, String::new());
     }
-    lines.into_iter().map(|line| vec![(line, Tone::Faint)]).collect()
+    lines.into_iter().map(|line| vec![(line, TextRole::Faint)]).collect()
 }

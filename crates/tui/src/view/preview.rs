@@ -8,13 +8,13 @@ use super::layout::Layout;
 use super::marks;
 use super::message;
 use super::ramp::AsciiRamp;
-use super::text::{Tone, put_text};
+use super::text::{TextRole, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
-use crate::film::Picture;
-use crate::graphics::PixelPlacement;
+use crate::film::Srgb8Image;
+use crate::graphics::ImagePlacement;
 use crate::history::ShownImage;
 use crate::messages;
-use crate::mosaic::{Grid, fit_cell};
+use crate::mosaic::{CellGrid, fit_cell};
 use crate::options::PreviewChoice;
 use crate::pipeline::protocol::ImagePosition;
 use crate::preview_kind::PreviewKind;
@@ -25,7 +25,7 @@ use crate::state::State;
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     match &state.picture.shown {
-        Some(_) if is_in_pixels(state) => {}
+        Some(_) if is_drawn_as_pixels(state) => {}
         Some(shown) => {
             let kind = cell_based_kind(state.display.kind, state.display.depth);
             let placed = PlacedImage::for_preview(state, shown, area, kind);
@@ -37,14 +37,14 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
             let middle = Rect { y: area.y + area.height / 2, height: 1, ..area };
             let indent = area.width.saturating_sub(super::text::text_columns(text)) / 2;
             let line = Rect { x: middle.x + indent, width: middle.width - indent, ..middle };
-            put_text(buffer, line, &[(text, Tone::Faint)], state.display.depth);
+            put_text(buffer, line, &[(text, TextRole::Faint)], state.display.depth);
         }
         None => {}
     }
 }
 
 /// Draws the thumbnail of a history entry.
-pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
         let kind = cell_based_kind(state.display.kind, state.display.depth);
@@ -82,7 +82,7 @@ fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
 }
 
 /// Whether the preview is drawn as pixels. This requires that nothing covers it.
-fn is_in_pixels(state: &State) -> bool {
+fn is_drawn_as_pixels(state: &State) -> bool {
     matches!(state.display.kind, PreviewKind::Pixels(_))
         && !state.overlays.help.open
         && !state.overlays.diagnostics.open
@@ -91,11 +91,11 @@ fn is_in_pixels(state: &State) -> bool {
 }
 
 /// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
-pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
-    let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
+pub(crate) fn image_placement(state: &State, area: Rect) -> Option<ImagePlacement> {
+    let shown = state.picture.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
     let placed = PlacedImage::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
-    (!cells.is_empty()).then_some(PixelPlacement { picture, cells, cell: state.display.window.cell_pixels })
+    (!cells.is_empty()).then_some(ImagePlacement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
 /// Color settings for a preview.
@@ -116,7 +116,7 @@ impl<'a> PreviewColors<'a> {
 /// Draws an image into these cells for a terminal with a dark background, xterm's colors, and cells that are
 /// twice as tall as wide.
 pub fn draw_for_dark_xterm(
-    picture: &Picture,
+    picture: &Srgb8Image,
     choice: PreviewChoice,
     depth: ColorDepth,
     area: Rect,
@@ -128,7 +128,7 @@ pub fn draw_for_dark_xterm(
 
 /// Draws an image using these color settings and this cell aspect ratio.
 pub(crate) fn draw_image(
-    picture: &Picture,
+    picture: &Srgb8Image,
     choice: PreviewChoice,
     inks: PreviewColors<'_>,
     (area, cell_aspect): (Rect, f32),
@@ -142,7 +142,7 @@ pub(crate) fn draw_image(
 /// Returns the size in cells of an image drawn with half blocks or ASCII characters, limited to the available
 /// space.
 pub(crate) fn size_in_cells(
-    picture: &Picture,
+    picture: &Srgb8Image,
     depth: ColorDepth,
     (columns, rows): (u16, u16),
     cell_aspect: f32,
@@ -164,15 +164,15 @@ struct PlacedImage {
 impl PlacedImage {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
     fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
-        let across = kind.grid().map_or(1, Grid::columns);
-        let one_to_one = across as f32 / state.display.pixels_across() as f32;
+        let across = kind.grid().map_or(1, CellGrid::columns);
+        let one_to_one = across as f32 / state.display.horizontal_pixels_per_cell() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
         Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
     }
 
     /// Computes the largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's
     /// height divided by its width. An image pixel covers at most `most` cell parts horizontally.
-    fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
+    fn fit(picture: &Srgb8Image, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
         let room = (f32::from(area.width * across), f32::from(area.height * down));
@@ -192,7 +192,7 @@ impl PlacedImage {
         Self { cells, width: u32::from(width), height: u32::from(height) }
     }
 
-    fn draw(self, picture: &Picture, kind: PreviewKind, inks: PreviewColors<'_>, buffer: &mut Buffer) {
+    fn draw(self, picture: &Srgb8Image, kind: PreviewKind, inks: PreviewColors<'_>, buffer: &mut Buffer) {
         let pixels = resized_pixels(picture, self.width, self.height);
         let scaled = ScaledImage { width: self.width, height: self.height, pixels: &pixels };
         let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
@@ -205,7 +205,7 @@ impl PlacedImage {
             }
         };
         match kind.grid() {
-            Some(grid) => each(&|x, y, cell| draw_mosaic_cell(&scaled, grid, inks.shades, (x, y), cell)),
+            Some(grid) => each(&|x, y, cell| draw_two_color_cell(&scaled, grid, inks.shades, (x, y), cell)),
             None if kind == PreviewKind::None => {}
             None => {
                 let ramp = AsciiRamp::for_picture(picture, inks.is_light);
@@ -230,9 +230,9 @@ impl ScaledImage<'_> {
 }
 
 /// Draws a cell with two colors.
-fn draw_mosaic_cell(
+fn draw_two_color_cell(
     scaled: &ScaledImage<'_>,
-    grid: Grid,
+    grid: CellGrid,
     shades: &ColorMapper,
     (x, y): (usize, usize),
     cell: &mut Cell,
@@ -274,10 +274,10 @@ mod tests {
     use super::*;
     use crate::fixtures::state;
 
-    fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
+    fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Srgb8Image {
         let pixels =
             (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
-        Picture { width, height, pixels }
+        Srgb8Image { width, height, pixels }
     }
 
     fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> PlacedImage {

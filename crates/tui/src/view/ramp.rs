@@ -1,6 +1,6 @@
 //! Draws the preview using characters whose ink coverage approximates the brightness.
 
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 
@@ -39,7 +39,7 @@ impl AsciiRamp {
     /// Creates a ramp from an image's darkest to its brightest values, ignoring a thirtieth of the pixels at
     /// each end. The limits are quantized to keep most characters stable under noise. Contrast is increased
     /// by no more than a factor of four.
-    pub(super) fn for_picture(picture: &Picture, is_light: bool) -> Self {
+    pub(super) fn for_picture(picture: &Srgb8Image, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
         const MIN: f32 = 0.25;
         let mut counts = [0_usize; 256];
@@ -141,13 +141,13 @@ mod tests {
     fn low_contrast_is_increased_and_stable() {
         let dull = |noise: u8| {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
-            Picture { width: 100, height: 10, pixels }
+            Srgb8Image { width: 100, height: 10, pixels }
         };
         let ramp = AsciiRamp::for_picture(&dull(0), false);
         assert!(rank(ramp.glyph([80; 3])) < 3 && rank(ramp.glyph([139; 3])) > 11, "{ramp:?}");
         assert_eq!(ramp, AsciiRamp::for_picture(&dull(2), false));
         let flat =
-            AsciiRamp::for_picture(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
+            AsciiRamp::for_picture(&Srgb8Image { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
         assert!((flat.high - flat.low - 0.25).abs() < 1e-6);
     }
 

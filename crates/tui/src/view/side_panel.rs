@@ -49,8 +49,8 @@ fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
 /// Draws the curve and the history strip if they fit. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
     let (curve, strip) = divide_curve_and_strip(state, panel, lines);
-    curve::draw(state, curve, buffer);
-    strip::draw(state, strip, buffer);
+    curve::draw_noise_chart(state, curve, buffer);
+    strip::draw_history_strip(state, strip, buffer);
     // Skip empty areas, since their origin would extend the union.
     [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }

@@ -4,21 +4,21 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::extras::ViewExtras;
+use super::extras::FileLinksAndDelayedText;
 use super::layout::Layout;
 use super::stages::{self, running_stage};
 use super::text::{
-    Tone, approximate_time, floor_percent, format_bytes, format_duration, format_running_time,
-    progress_bar_parts, put_text, put_text_right, right_part, text_columns, two_digit_percent,
+    TextRole, floor_percent, format_approximate_time, format_bytes, format_duration, format_running_time,
+    format_two_digit_percent, progress_bar_parts, put_text, put_text_right, right_part, text_columns,
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::protocol::{NoiseProgress, OwnImageState, RenderProgress};
+use crate::pipeline::protocol::{NoiseProgress, RenderProgress, SavedSceneImageState};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
-use crate::scene::sanitize::visible;
-use crate::state::{OwnImage, State, WorkerActivity, WrittenFile};
+use crate::scene::sanitize::escape_invisible_chars;
+use crate::state::{SceneImageProgress, State, WorkerActivity, WrittenFile};
 
 /// Short save hints, for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
@@ -27,13 +27,19 @@ const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
 const MIN_BAR: u16 = 6;
 
 /// Draws the status line in the space that no message uses.
-pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
+pub(super) fn draw(
+    state: &State,
+    layout: &Layout,
+    area: Rect,
+    buffer: &mut Buffer,
+    drawn: &mut FileLinksAndDelayedText,
+) {
     match status_content(state) {
         StatusContent::Nothing => {}
         StatusContent::ProgressBar => draw_progress_bar(state, layout, area, buffer),
         StatusContent::Summary => draw_summary(state, layout, area, buffer, drawn),
         StatusContent::Words(words) => {
-            put_text(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
+            put_text(buffer, area, &[(&words, TextRole::Faint)], state.display.depth);
         }
     }
 }
@@ -71,7 +77,7 @@ pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
         StatusContent::Nothing => 0,
         StatusContent::ProgressBar => text_columns(&progress_text(state, layout).1),
         StatusContent::Summary => {
-            file_pieces(state, layout).iter().flatten().map(|(text, _)| text_columns(text)).sum()
+            written_file_pieces(state, layout).iter().flatten().map(|(text, _)| text_columns(text)).sum()
         }
         StatusContent::Words(words) => text_columns(&words),
     }
@@ -97,7 +103,7 @@ fn progress_text(state: &State, layout: &Layout) -> (f64, String) {
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {
-            (stages::loaded_fraction(asset), visible(&asset.progress.name).into_owned())
+            (stages::loaded_fraction(asset), escape_invisible_chars(&asset.progress.name).into_owned())
         }
         (None, asset) => (asset.map_or(0.0, stages::loaded_fraction), time),
     }
@@ -116,19 +122,20 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     if room < MIN_BAR {
-        put_text(buffer, area, &[(&words, Tone::Plain)], state.display.depth);
+        put_text(buffer, area, &[(&words, TextRole::Plain)], state.display.depth);
         return;
     }
     let (filled_squares, empty) =
         progress_bar_parts(fraction, room, state.display.kind == PreviewKind::Ascii);
-    let (tone, gap) = (if state.work.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
+    let (tone, gap) =
+        (if state.work.paused { TextRole::Warning } else { TextRole::Working }, (" ", TextRole::Plain));
     let pieces = [
-        (name, Tone::Faint),
+        (name, TextRole::Faint),
         gap,
         (&*filled_squares, tone),
-        (&*empty, Tone::Faint),
+        (&*empty, TextRole::Faint),
         gap,
-        (&*words, Tone::Plain),
+        (&*words, TextRole::Plain),
     ];
     put_text(buffer, area, &pieces, state.display.depth);
 }
@@ -136,21 +143,27 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
 /// Formats the noise as `noise 2.1 % → 1 % in about 14 s` and in a shorter variant. It is called noise rather
 /// than error because a noise-free image may still be biased.
 fn noise_texts(noise: &NoiseProgress) -> [String; 2] {
-    let now = format!("noise {}", two_digit_percent(noise.now));
+    let now = format!("noise {}", format_two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {
-        format!("{now} → {} in {}", two_digit_percent(level), approximate_time(seconds))
+        format!("{now} → {} in {}", format_two_digit_percent(level), format_approximate_time(seconds))
     });
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
 /// Draws the stages on one line, followed by other information that the panel does not show.
-fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
-    let of_files = file_pieces(state, layout);
+fn draw_summary(
+    state: &State,
+    layout: &Layout,
+    area: Rect,
+    buffer: &mut Buffer,
+    drawn: &mut FileLinksAndDelayedText,
+) {
+    let of_files = written_file_pieces(state, layout);
     // Files take precedence if there is not enough space.
     let room = area.width.saturating_sub(reserved_columns(state, layout));
-    let mut pieces = stages::summary_line(state, room);
+    let mut pieces = stages::stage_summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
-    let mut is_room = |more: Vec<(String, Tone)>| {
+    let mut is_room = |more: Vec<(String, TextRole)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| text_columns(text)).sum();
         if width <= area.width {
             pieces.extend(more);
@@ -159,40 +172,41 @@ fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer,
     if layout.panel.is_empty() {
         let mut comma = comma;
         for words in unsaved_messages(state) {
-            is_room(vec![(format!("{comma}{words}"), Tone::Faint)]);
+            is_room(vec![(format!("{comma}{words}"), TextRole::Faint)]);
             comma = " · ";
         }
     }
     if layout.panel.is_empty() {
         for words in changed_file_messages(state) {
-            is_room(vec![(format!(" {words}"), Tone::Warning)]);
+            is_room(vec![(format!(" {words}"), TextRole::Warning)]);
         }
     }
     for file in of_files {
         is_room(file);
     }
-    let used = drawn.put_line(state, area, &pieces, buffer);
+    let used = drawn.put_line_with_links(state, area, &pieces, buffer);
     let free = right_part(area, used + 2);
     let short = if is_mesh(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
     let words = [save_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| text_columns(words) <= free.width);
-        put_text_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
+        put_text_right(buffer, free, &fitting.unwrap_or_default(), TextRole::Faint, state.display.depth);
         return;
     }
     let fitting = preview_cost_variants(state).into_iter().find(|words| text_columns(words) <= free.width);
-    let used = put_text_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
+    let used =
+        put_text_right(buffer, free, &fitting.unwrap_or_default(), TextRole::Faint, state.display.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = save_to_screen_time(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
-    put_text_right(buffer, free, &seen, Tone::Faint, state.display.depth);
+    put_text_right(buffer, free, &seen, TextRole::Faint, state.display.depth);
 }
 
 /// Name and size of each written file. Empty if the panel lists the files.
-fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
+fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextRole)>> {
     let pieces = |written: &WrittenFile| {
         let name = written.name();
         let size = format!(" {}", format_bytes(written.bytes));
-        vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]
+        vec![(" → ".to_owned(), TextRole::Faint), (name, TextRole::File), (size, TextRole::Faint)]
     };
     current_image_files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
 }
@@ -200,7 +214,7 @@ fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
 /// The files that contain the current image.
 pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &WrittenFile> {
     // If the scene's own image has not changed, it may have been written by an earlier request.
-    let is_own = state.request.is_own_image();
+    let is_own = state.request.has_no_key_overrides();
     let of_any_request = is_own && state.saving.unwritten.is_none();
     state
         .saving
@@ -217,28 +231,32 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
     if current_image_files(state).next().is_some() {
         return Vec::new();
     }
-    let by_hand = saving.image_by_hand();
-    if state.request.is_own_image() {
+    let by_hand = saving.manually_written_image();
+    if state.request.has_no_key_overrides() {
         let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
-        let words = |file: &WrittenFile| messages::other_image_with(&file.name(), &file.changes().join(", "));
+        let words = |file: &WrittenFile| {
+            messages::written_image_differs(&file.name(), &file.describe_key_changes().join(", "))
+        };
         return by_hand.map(words).into_iter().collect();
     }
     if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
         return vec![messages::unfinished_image(&file.name())];
     }
-    if !state.can_write() {
+    if !state.can_write_image() {
         return vec![messages::NOT_SAVED_WITH_CONFLICT.to_owned()];
     }
-    let image_name = exit_summary::image_name(state);
+    let image_name = exit_summary::output_file_names(state);
     let other = match (saving.own, by_hand, image_name) {
-        (_, Some(file), _) => Some(messages::image_with(&file.name(), &file.changes().join(", "))),
-        (OwnImage { state: OwnImageState::Written, .. }, None, _) | (_, None, None) => None,
-        (OwnImage { state: OwnImageState::Begun { .. }, fraction }, None, Some(name)) => {
-            Some(messages::own_image_unfinished(&name, floor_percent(fraction)))
+        (_, Some(file), _) => {
+            Some(messages::image_written_with_changes(&file.name(), &file.describe_key_changes().join(", ")))
         }
-        (OwnImage { state: OwnImageState::NotBegun, .. }, None, Some(name)) => {
+        (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
+        (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {
+            Some(messages::scene_image_unfinished(&name, floor_percent(fraction)))
+        }
+        (SceneImageProgress { state: SavedSceneImageState::NotBegun, .. }, None, Some(name)) => {
             let is_older = !saving.written.is_empty() && saving.is_older_than_edit();
-            is_older.then(|| messages::own_image_outdated(&name))
+            is_older.then(|| messages::scene_image_outdated(&name))
         }
     };
     [messages::NOT_SAVED.to_owned()].into_iter().chain(other).collect()
@@ -246,7 +264,7 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
 
 /// Returns a message for each written file that another program has changed.
 pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
-    state.saving.written.iter().filter_map(WrittenFile::loss)
+    state.saving.written.iter().filter_map(WrittenFile::describe_external_change)
 }
 
 /// Time between saving the file and drawing the first changed cell.
@@ -256,12 +274,12 @@ pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
 
 /// A hint for users who have not saved yet. Empty if there is nothing to save.
 pub(super) fn save_hint(state: &State) -> String {
-    if state.saving.edits > 0 || is_unreadable(state) {
+    if state.saving.edits > 0 || is_scene_unreadable(state) {
         return String::new();
     }
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let name = visible(&name);
+    let name = escape_invisible_chars(&name);
     // Models are usually exported by a program rather than saved by the user.
     if is_mesh(&state.request.scene) {
         return messages::renders_on_changes(&name);
@@ -270,7 +288,7 @@ pub(super) fn save_hint(state: &State) -> String {
 }
 
 /// Whether the scene cannot be read at all, for example because the file does not exist.
-fn is_unreadable(state: &State) -> bool {
+fn is_scene_unreadable(state: &State) -> bool {
     let overlays = &state.overlays;
     let found = overlays.problems.as_ref().filter(|problems| problems.work.is_none());
     let diagnostics = found.map(|problems| &problems.diagnostics).or(overlays.unconfirmed.as_ref());
@@ -280,7 +298,7 @@ fn is_unreadable(state: &State) -> bool {
 /// Describes the cost of the last preview in two variants: bytes sent with and without the round-trip time.
 fn preview_cost_variants(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
-    let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);
+    let cost = |time| messages::preview_transfer_cost(frame.bytes.div_ceil(1000), time);
     let time = frame.round_trip.map(|time| time.as_millis().max(1));
     time.map(|time| cost(Some(time))).into_iter().chain([cost(None)]).collect()
 }

@@ -3,9 +3,9 @@
 
 use super::preview;
 use super::strip_words::{EntryText, fit_text};
-use super::text::{Tone, put_text, right_part, row_of};
+use super::text::{TextRole, nth_row, put_text, right_part};
 use crate::action::Action;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 use crate::keymap;
 use crate::messages;
 use crate::state::State;
@@ -15,15 +15,15 @@ use ratatui::layout::Rect;
 /// Row counts in the strip: height of a thumbnail, height of an entry, and distance from one entry's top to
 /// the next.
 #[derive(Clone, Copy)]
-struct EntryRows {
+struct EntryRowCounts {
     picture: u16,
     entry: u16,
     pitch: u16,
 }
 
 /// In a narrow strip, the row below a thumbnail is empty unless the text needs it.
-const NARROW_ROWS: EntryRows = EntryRows { picture: 3, entry: 4, pitch: 4 };
-const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
+const NARROW_ROWS: EntryRowCounts = EntryRowCounts { picture: 3, entry: 4, pitch: 4 };
+const WIDE_ROWS: EntryRowCounts = EntryRowCounts { picture: 5, entry: 5, pitch: 6 };
 /// Minimum width of a wide strip.
 const WIDE: u16 = 40;
 /// Minimum width of the text next to a thumbnail.
@@ -36,11 +36,11 @@ struct StripEntry {
     /// Index into the history.
     index: usize,
     cells: Rect,
-    rows: EntryRows,
+    rows: EntryRowCounts,
 }
 
 /// Draws the strip at the bottom of an area.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw_history_strip(state: &State, area: Rect, buffer: &mut Buffer) {
     let items = visible_entries(state, area);
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
@@ -50,7 +50,12 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     put_text(
         buffer,
         title,
-        &[(messages::HISTORY, Tone::Strong), ("  (", Tone::Faint), (&keys, Tone::Faint), (")", Tone::Faint)],
+        &[
+            (messages::HISTORY, TextRole::Strong),
+            ("  (", TextRole::Faint),
+            (&keys, TextRole::Faint),
+            (")", TextRole::Faint),
+        ],
         depth,
     );
     for item in items {
@@ -65,32 +70,32 @@ fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buf
     let place = Rect { width: thumbnail_width(state, picture, place), ..place };
     preview::draw_thumbnail(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
-    let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
+    let (mark, tone) = if is_looked_at { ("▸", TextRole::Strong) } else { (" ", TextRole::Plain) };
     // The text next to the thumbnail starts at the same column with or without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", render_label(state, *index)),
-        changes: history.changes(*index, is_under_way(state, *index)),
+        changes: history.changes(*index, is_entry_rendering(state, *index)),
     };
     let beside = right_part(*cells, place.width + 1);
     let lines = fit_text(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
     for (y, line) in (0..rows.entry).zip(&lines) {
-        put_text(buffer, row_of(beside, y), &[(line, tone)], state.display.depth);
+        put_text(buffer, nth_row(beside, y), &[(line, tone)], state.display.depth);
     }
 }
 
 /// Number of the render that produced an entry, or a dash if the render was stopped.
 fn render_label(state: &State, index: usize) -> String {
-    let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
-    state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
+    let under_way = is_entry_rendering(state, index).then_some(state.work.renders + 1);
+    state.picture.history.render_number(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
 }
 
 /// Whether an entry's render is still running.
-fn is_under_way(state: &State, index: usize) -> bool {
-    state.work.is_under_way() && state.picture.history.belongs_to_request(index, state.request.generation)
+fn is_entry_rendering(state: &State, index: usize) -> bool {
+    state.work.is_rendering() && state.picture.history.belongs_to_request(index, state.request.generation)
 }
 
 /// Computes a thumbnail's width from its height, leaving space for text.
-fn thumbnail_width(state: &State, picture: &Picture, cells: Rect) -> u16 {
+fn thumbnail_width(state: &State, picture: &Srgb8Image, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
     width.clamp(1, cells.width.saturating_sub(MIN_WORDS + 1).max(1))

@@ -3,7 +3,7 @@
 use unicode_width::UnicodeWidthStr;
 
 use crate::messages;
-use crate::scene::{key_parts, shortened_key, split_key};
+use crate::scene::{key_parts, shortened_key, split_leading_key};
 
 /// Text of a history entry.
 pub(super) struct EntryText {
@@ -15,7 +15,7 @@ pub(super) struct EntryText {
 
 /// How much of a change to show, from most to least.
 #[derive(Clone, Copy)]
-enum ChangeForm {
+enum ChangeDetail {
     /// The key with its old and new values.
     Full,
     /// The key with its new value.
@@ -32,21 +32,21 @@ enum ChangeForm {
 /// it fits neither, the excess is appended to the last line.
 pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
-    let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];
+    let all = [ChangeDetail::Full, ChangeDetail::New, ChangeDetail::Short];
     let count = words.changes.len();
-    let fewer = (1..count).rev().map(ChangeForm::First).chain([ChangeForm::Cut]);
+    let fewer = (1..count).rev().map(ChangeDetail::First).chain([ChangeDetail::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| fill_lines(&words.head, &shown_pieces(words, form, width), width);
+    let lines = |form| fill_lines(&words.head, &shown_change_pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
-    let fits = |(form, rows): (ChangeForm, usize)| {
+    let fits = |(form, rows): (ChangeDetail, usize)| {
         let lines = lines(form);
         let is_whole = lines.iter().all(|line| line.width() <= width);
         (lines.len() <= rows && is_whole && !is_lone(&lines)).then_some(lines)
     };
     let mut lines =
-        in_few.into_iter().chain(in_most).find_map(fits).unwrap_or_else(|| lines(ChangeForm::Cut));
+        in_few.into_iter().chain(in_most).find_map(fits).unwrap_or_else(|| lines(ChangeDetail::Cut));
     if lines.len() > most {
         let rest = lines.split_off(most.saturating_sub(1)).join(" ");
         lines.push(rest);
@@ -55,12 +55,12 @@ pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec
 }
 
 /// Splits all displayed changes into pieces.
-fn shown_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
+fn shown_change_pieces(words: &EntryText, form: ChangeDetail, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
-        ChangeForm::Full | ChangeForm::New | ChangeForm::Short => changes.len(),
-        ChangeForm::First(told) => told,
-        ChangeForm::Cut => 1,
+        ChangeDetail::Full | ChangeDetail::New | ChangeDetail::Short => changes.len(),
+        ChangeDetail::First(told) => told,
+        ChangeDetail::Cut => 1,
     };
     let mut pieces = Vec::new();
     for (number, change) in (1..).zip(changes.iter().take(told)) {
@@ -75,7 +75,7 @@ fn shown_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<Change
         }
     }
     if told < changes.len() {
-        pieces.push(ChangePiece::words("…"));
+        pieces.push(ChangePiece::from_text("…"));
     }
     pieces
 }
@@ -87,7 +87,7 @@ struct ChangePiece {
 }
 
 impl ChangePiece {
-    fn words(text: impl Into<String>) -> Self {
+    fn from_text(text: impl Into<String>) -> Self {
         Self { text: text.into(), is_key: false }
     }
 
@@ -105,39 +105,41 @@ impl ChangePiece {
 }
 
 /// Splits a change into pieces: the key and its values, or single words.
-fn change_pieces(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
-    let words = |text: &str| text.split(' ').map(ChangePiece::words).collect::<Vec<_>>();
+fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<ChangePiece> {
+    let words = |text: &str| text.split(' ').map(ChangePiece::from_text).collect::<Vec<_>>();
     let key = |key: &str| ChangePiece { text: format_key(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
-        let (name, value) = split_key(rest).unwrap_or((rest, ""));
+        let (name, value) = split_leading_key(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
-        return [ChangePiece::words(sign), key(name)].into_iter().chain(value).collect();
+        return [ChangePiece::from_text(sign), key(name)].into_iter().chain(value).collect();
     }
-    let of_key = split_key(change).filter(|_| !change.starts_with("line "));
+    let of_key = split_leading_key(change).filter(|_| !change.starts_with("line "));
     let Some((name, old, new)) = of_key.and_then(|(name, values)| {
         let (old, new) = values.rsplit_once(" → ")?;
         Some((name, old, new))
     }) else {
         return words(change);
     };
-    let new = ChangePiece::words(format!("→ {new}"));
+    let new = ChangePiece::from_text(format!("→ {new}"));
     match form {
-        ChangeForm::Full => vec![key(name), ChangePiece::words(old), new],
-        ChangeForm::New | ChangeForm::Short | ChangeForm::First(_) | ChangeForm::Cut => vec![key(name), new],
+        ChangeDetail::Full => vec![key(name), ChangePiece::from_text(old), new],
+        ChangeDetail::New | ChangeDetail::Short | ChangeDetail::First(_) | ChangeDetail::Cut => {
+            vec![key(name), new]
+        }
     }
 }
 
-fn format_key(key: &str, form: ChangeForm, beside_head: usize) -> String {
+fn format_key(key: &str, form: ChangeDetail, beside_head: usize) -> String {
     match form {
-        ChangeForm::Full | ChangeForm::New => key.to_owned(),
-        ChangeForm::Short | ChangeForm::First(_) => last_parts(key),
-        ChangeForm::Cut => shortened_key(&last_parts(key), beside_head),
+        ChangeDetail::Full | ChangeDetail::New => key.to_owned(),
+        ChangeDetail::Short | ChangeDetail::First(_) => last_key_parts(key),
+        ChangeDetail::Cut => shortened_key(&last_key_parts(key), beside_head),
     }
 }
 
 /// Returns the last parts of a key, which identify an object and its property: `lamp.emission` for
 /// `materials.lamp.emission`, but all of `light.1.direction`.
-fn last_parts(key: &str) -> String {
+fn last_key_parts(key: &str) -> String {
     let parts = key_parts(key);
     let first = parts.len().saturating_sub(2);
     let is_number = parts[first].parse::<u64>().is_ok();

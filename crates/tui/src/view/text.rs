@@ -8,12 +8,12 @@ use ratatui::style::{Color, Modifier, Style};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 use crate::color::ColorDepth;
-pub(super) use crate::pipeline::words::seconds;
+pub(super) use crate::pipeline::words::format_seconds;
 
 /// Role of a piece of text. Each role's color is one of the 16 ANSI colors, so it matches the terminal's
 /// theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tone {
+pub(super) enum TextRole {
     Plain,
     /// Text that is less important.
     Faint,
@@ -29,7 +29,7 @@ pub(super) enum Tone {
     Chosen,
 }
 
-impl Tone {
+impl TextRole {
     /// Returns the style for text with this tone. Without color support, only modifiers are used.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
@@ -49,7 +49,7 @@ impl Tone {
 
     /// Returns a style for a solid block of color with black or white text that is readable in any theme.
     /// Without color support, the text is reversed.
-    pub(super) fn block(self, depth: ColorDepth) -> Style {
+    pub(super) fn block_style(self, depth: ColorDepth) -> Style {
         let (fg, bg) = match self {
             _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
             Self::Working => (Color::White, Color::Blue),
@@ -69,7 +69,12 @@ impl Tone {
 
 /// Writes text into the first row of an area, truncated with an ellipsis if necessary. Returns the number of
 /// columns used.
-pub(super) fn put_text(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
+pub(super) fn put_text(
+    buffer: &mut Buffer,
+    area: Rect,
+    pieces: &[(&str, TextRole)],
+    depth: ColorDepth,
+) -> u16 {
     let area = area.intersection(buffer.area);
     if area.is_empty() {
         return 0;
@@ -94,7 +99,7 @@ pub(super) fn put_text_right(
     buffer: &mut Buffer,
     area: Rect,
     text: &str,
-    tone: Tone,
+    tone: TextRole,
     depth: ColorDepth,
 ) -> u16 {
     let width = text_columns(text);
@@ -110,7 +115,7 @@ pub(crate) fn text_columns(text: &str) -> u16 {
 }
 
 /// Returns a row of an area, counting from the top. Empty if `index` is out of range.
-pub(super) fn row_of(area: Rect, index: u16) -> Rect {
+pub(super) fn nth_row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
@@ -138,7 +143,7 @@ pub(crate) fn truncated_text(text: &str, room: u16) -> String {
 }
 
 /// Wraps text into lines, breaking between words if possible.
-pub fn wrapped(text: &str, width: usize) -> Vec<String> {
+pub fn wrap_text(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
     for word in text.split_inclusive(' ') {
@@ -163,7 +168,7 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// Formats a duration in a few characters.
 pub(crate) fn format_duration(time: Duration) -> String {
-    seconds(time.as_secs_f64())
+    format_seconds(time.as_secs_f64())
 }
 
 /// Formats a running time. Always shows tenths of a second up to a minute, so that the format does not keep
@@ -183,7 +188,7 @@ pub(super) fn format_bytes(bytes: u64) -> String {
 }
 
 /// Formats an estimated time with one or two digits: `about 9 s`.
-pub(super) fn approximate_time(seconds: f64) -> String {
+pub(super) fn format_approximate_time(seconds: f64) -> String {
     match seconds {
         x if x < 1.0 => "under 1 s".to_owned(),
         x if x < 99.5 => format!("about {x:.0} s"),
@@ -212,7 +217,7 @@ pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> Strin
     let sign = if change < 0.0 { "−" } else { "+" };
     let is_far_more = seconds < 0.999_5 && change.abs() >= 0.999_5;
     if is_far_more {
-        format!("{sign}{}", self::seconds(change.abs()))
+        format!("{sign}{}", self::format_seconds(change.abs()))
     } else {
         format!("{sign}{amount} {unit}")
     }
@@ -232,7 +237,7 @@ pub(crate) fn floor_percent(fraction: f64) -> u32 {
 }
 
 /// Formats a fraction as a percentage with one or two digits: `2.1 %`, `1 %`.
-pub(super) fn two_digit_percent(part: f64) -> String {
+pub(super) fn format_two_digit_percent(part: f64) -> String {
     let percent = part * 100.0;
     let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
     let text = format!("{percent:.0$}", digits as usize);
@@ -265,16 +270,16 @@ mod tests {
     /// xterm draws bold black as gray.
     #[test]
     fn text_on_color_blocks_is_not_bold() {
-        for tone in [Tone::Working, Tone::Good, Tone::Warning, Tone::Error] {
-            let style = tone.block(ColorDepth::TrueColor);
+        for tone in [TextRole::Working, TextRole::Good, TextRole::Warning, TextRole::Error] {
+            let style = tone.block_style(ColorDepth::TrueColor);
             assert!(!style.add_modifier.contains(Modifier::BOLD), "{tone:?}");
-            assert!(tone.block(ColorDepth::None).add_modifier.contains(Modifier::REVERSED), "{tone:?}");
+            assert!(tone.block_style(ColorDepth::None).add_modifier.contains(Modifier::REVERSED), "{tone:?}");
         }
     }
 
     #[test]
     fn percentages_have_two_digits() {
-        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(two_digit_percent);
+        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(format_two_digit_percent);
         assert_eq!(shares, ["2.1 %", "1 %", "0.043 %", "50 %", "170 %", "0 %", "10 %"]);
     }
 
@@ -311,7 +316,7 @@ mod tests {
 
     #[test]
     fn estimated_times_have_two_digits() {
-        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(approximate_time);
+        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(format_approximate_time);
         let words = [
             "under 1 s",
             "about 1 s",
@@ -340,7 +345,12 @@ mod tests {
                 let area = Rect::new(0, 0, room, 1);
                 let mut buffer = Buffer::empty(area);
                 let (first, second) = text.split_at(split);
-                put_text(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
+                put_text(
+                    &mut buffer,
+                    area,
+                    &[(first, TextRole::Plain), (second, TextRole::Faint)],
+                    ColorDepth::None,
+                );
                 let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
                 // The cell after a wide character is blank in the buffer.
                 assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");

@@ -5,9 +5,9 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
-use super::text::{Tone, put_text};
+use super::text::{TextRole, put_text};
 use crate::choice::Choice;
-use crate::pipeline::settings::View;
+use crate::pipeline::settings::ViewMode;
 use crate::state::State;
 
 /// Width of a list entry, including its digit.
@@ -15,8 +15,8 @@ const WIDTH: u16 = 16;
 /// Number of views that can be selected with a digit.
 pub(crate) const DIGITS: usize = 9;
 
-pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
-    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+pub(super) fn draw_view_list(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     let area = list_area(layout).intersection(buffer.area);
     if area.is_empty() {
         return;
@@ -27,12 +27,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
     // Center the current view if not all views fit.
     let shown = columns * rows;
-    let first = current.saturating_sub(shown / 2).min(View::ALL.len().saturating_sub(shown));
-    for (index, number) in (first..View::ALL.len()).take(shown).enumerate() {
+    let first = current.saturating_sub(shown / 2).min(ViewMode::ALL.len().saturating_sub(shown));
+    for (index, number) in (first..ViewMode::ALL.len()).take(shown).enumerate() {
         let (column, row) = ((index / rows) as u16, (index % rows) as u16);
         let place =
             Rect { x: area.x + column * WIDTH, y: area.y + row, width: WIDTH.min(area.width), height: 1 };
-        let is_cut = index == 0 && first > 0 || index + 1 == shown && number + 1 < View::ALL.len();
+        let is_cut = index == 0 && first > 0 || index + 1 == shown && number + 1 < ViewMode::ALL.len();
         let more = if !is_cut {
             ""
         } else if index == 0 {
@@ -60,17 +60,18 @@ fn draw_view_line(
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
     let sign = if is_current { "▸" } else { " " };
-    let name = format!(" {:<11}", View::ALL[number].name());
-    let tone = if is_current { Tone::Chosen } else { Tone::Plain };
+    let name = format!(" {:<11}", ViewMode::ALL[number].name());
+    let tone = if is_current { TextRole::Chosen } else { TextRole::Plain };
     let more = format!(" {more}");
-    let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone), (&*more, Tone::Strong)];
+    let pieces =
+        [(sign, TextRole::Strong), (&*digit, TextRole::Strong), (&*name, tone), (&*more, TextRole::Strong)];
     put_text(buffer, place, &pieces, state.display.depth);
 }
 
 /// Returns the area for the list. If the panel is not tall enough for one column, the list has as many as
 /// necessary.
 fn list_area(layout: &Layout) -> Rect {
-    let all = View::ALL.len() as u16;
+    let all = ViewMode::ALL.len() as u16;
     let panel = layout.panel;
     if panel.width >= WIDTH && panel.height >= all {
         return Rect { height: all, ..panel };

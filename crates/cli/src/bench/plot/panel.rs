@@ -7,7 +7,7 @@ use super::AXES;
 use super::axes::{LogAxis, format_decimal, format_power_of_ten};
 use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
 use crate::bench::slope::Slope;
-use crate::scene::sanitize::visible;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Okabe and Ito's color-blind-safe palette.
 const COLORS: [RGBColor; 7] = [
@@ -67,7 +67,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
 
 /// Returns the caption, without characters that are invalid in XML.
 fn caption(scene: &SceneResult) -> String {
-    format!("{}, {}×{}", visible(&scene.scene), scene.width, scene.height)
+    format!("{}, {}×{}", escape_invisible_chars(&scene.scene), scene.width, scene.height)
 }
 
 /// Fraction of the height reserved for the legend.

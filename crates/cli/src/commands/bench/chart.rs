@@ -10,8 +10,8 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
 use crate::bench::{Results, SceneResult};
 use crate::console::Console;
-use crate::progress::seconds;
-use crate::scene::sanitize::visible;
+use crate::progress::format_seconds;
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::tui::paint::as_text_lines;
 
 /// Method colors, from the terminal's palette.
@@ -84,7 +84,7 @@ impl ConvergenceChart {
         // Draw markers on top of all lines.
         let chart = Chart::new(trends.into_iter().chain(signs).collect())
             .hidden_legend_constraints((Constraint::Percentage(70), Constraint::Percentage(70)))
-            .x_axis(Axis::default().bounds(across).labels(axis_labels(across, seconds)))
+            .x_axis(Axis::default().bounds(across).labels(axis_labels(across, format_seconds)))
             .y_axis(Axis::default().bounds(up).labels(axis_labels(up, |error| format!("{error:.0e}"))));
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
@@ -102,7 +102,7 @@ fn datasets<'a>(
     let shared = Dataset::default().data(points).style(Style::new().fg(*color));
     let signs = shared.clone().marker(Marker::Custom(*sign)).graph_type(GraphType::Scatter);
     let trend = shared.marker(Marker::Braille).graph_type(GraphType::Line);
-    (trend, signs.name(format!("{sign} {}", visible(name))))
+    (trend, signs.name(format!("{sign} {}", escape_invisible_chars(name))))
 }
 
 impl MethodCurve {

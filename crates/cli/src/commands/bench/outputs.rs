@@ -53,15 +53,15 @@ impl BenchOutputs {
         let (baseline, replaces_foreign) = (args.baseline.clone(), args.force);
         let outputs = Self { files, inputs, baseline, replaces_foreign };
         for (index, (_, path, kind)) in outputs.files.iter().enumerate() {
-            outputs.check(index, path, *kind).map_err(|error| match error {
-                OutputError::Refused { reason } => console.fail(Exit::WRONG, &reason),
-                error => console.fail(Exit::FAILED, &error.to_string()),
+            outputs.check_output(index, path, *kind).map_err(|error| match error {
+                OutputError::Refused { reason } => console.print_error(Exit::WRONG, &reason),
+                error => console.print_error(Exit::FAILED, &error.to_string()),
             })?;
         }
         Ok(outputs)
     }
 
-    fn check(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
+    fn check_output(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
         self.check_replaceable(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
         if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
@@ -80,7 +80,7 @@ impl BenchOutputs {
 
     /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.
     fn check_replaceable(&self, index: usize, real: &Path) -> Result<(), OutputError> {
-        if FileIdentity::of(real).is_none() {
+        if FileIdentity::from_path(real).is_none() {
             return Ok(());
         }
         let is_it = |path: &Path| is_same_file(real, path);
@@ -123,10 +123,10 @@ impl BenchOutputs {
         let Some(path) = &self.baseline else { return Ok(None) };
         let name = path.display().to_string();
         let read = read_baseline_bytes(path)
-            .map_err(|why| console.fail(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
+            .map_err(|why| console.print_error(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
             let way_out = "pass a file written by `glimt bench --json FILE`";
-            console.fail(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
+            console.print_error(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
         })?;
         Ok(Some((name, results)))
     }
@@ -141,8 +141,8 @@ impl BenchOutputs {
     ) -> Result<(), Exit> {
         let written = (0..self.files.len()).map(|index| {
             let (_, path, _) = &self.files[index];
-            let written = self.write_one(index, results, progress, token);
-            let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
+            let written = self.write_output(index, results, progress, token);
+            let bytes = written.map_err(|why| console.print_error(Exit::FAILED, &why))?;
             progress.report_written(path, bytes);
             Ok(())
         });
@@ -150,7 +150,7 @@ impl BenchOutputs {
     }
 
     /// Writes one file and returns its size.
-    fn write_one(
+    fn write_output(
         &self,
         index: usize,
         results: &Results,
@@ -174,9 +174,9 @@ fn read_baseline_bytes(path: &Path) -> Result<Vec<u8>, String> {
     /// Enough for the results of a million images.
     const MAX_BYTES: u64 = 256 << 20;
     let words = |error: std::io::Error| describe_error(&error);
-    let (file, metadata) = file::open(path)
+    let (file, metadata) = file::open_regular_file(path)
         .map_err(words)?
-        .map_err(|kind| format!("it is {}, not a regular file", kind.words()))?;
+        .map_err(|kind| format!("it is {}, not a regular file", kind.description()))?;
     if metadata.len() > MAX_BYTES {
         return Err(format!("it has {} bytes; the limit is {} MiB", metadata.len(), MAX_BYTES >> 20));
     }
@@ -188,7 +188,9 @@ fn read_baseline_bytes(path: &Path) -> Result<Vec<u8>, String> {
 fn format_content(kind: OutputKind, results: &Results) -> Result<Vec<u8>, String> {
     match kind {
         OutputKind::Csv => Ok(csv::format_csv(results).into_bytes()),
-        OutputKind::Json => Ok(output::json::file(results).map_err(|error| error.to_string())?.into_bytes()),
+        OutputKind::Json => {
+            Ok(output::json::to_pretty_text(results).map_err(|error| error.to_string())?.into_bytes())
+        }
         OutputKind::Plot => Ok(plot::draw_svg(results)?.into_bytes()),
     }
 }

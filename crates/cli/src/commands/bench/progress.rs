@@ -7,11 +7,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde_json::json;
 
 use super::chart::ConvergenceChart;
-use crate::args::Progress;
+use crate::args::ProgressMode;
 use crate::bench::{BenchEvent, Results};
 use crate::console::Console;
-use crate::progress::{bar_style, json_line, seconds};
-use crate::scene::sanitize::visible;
+use crate::progress::{bar_style, format_seconds, json_line};
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Maximum time between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
@@ -42,17 +42,17 @@ enum ProgressFormat {
 }
 
 impl BenchProgress {
-    pub(super) fn new(progress: Progress, console: &Console) -> Self {
+    pub(super) fn new(progress: ProgressMode, console: &Console) -> Self {
         let format = match progress {
-            Progress::Auto if console.is_terminal => {
+            ProgressMode::Auto if console.is_terminal => {
                 let target = ProgressDrawTarget::stderr_with_hz(FRAMES);
                 let bar = ProgressBar::with_draw_target(Some(STEPS), target);
                 let bar = bar.with_style(bar_style("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
                 ProgressFormat::Bar(bar, ConvergenceChart::default())
             }
-            Progress::Auto | Progress::Plain => ProgressFormat::Plain,
-            Progress::Json => ProgressFormat::Json,
-            Progress::None => ProgressFormat::Silent,
+            ProgressMode::Auto | ProgressMode::Plain => ProgressFormat::Plain,
+            ProgressMode::Json => ProgressFormat::Json,
+            ProgressMode::None => ProgressFormat::Silent,
         };
         let now = Instant::now();
         let (console, what) = (console.clone(), String::new());
@@ -60,7 +60,7 @@ impl BenchProgress {
     }
 
     /// Handles a benchmark event.
-    pub(super) fn handle(&mut self, news: BenchEvent) {
+    pub(super) fn handle_event(&mut self, news: BenchEvent) {
         match news {
             BenchEvent::Begins { what, left } => {
                 self.what = what;
@@ -104,13 +104,13 @@ impl BenchProgress {
         if let Some(left) = left {
             self.fraction = self.fraction.max(elapsed / (elapsed + left).max(1e-9)).min(1.0);
         }
-        let to_go = left.map_or(String::new(), |left| format!("{} left", seconds(left)));
+        let to_go = left.map_or(String::new(), |left| format!("{} left", format_seconds(left)));
         match &self.format {
             ProgressFormat::Bar(bar, lines) => {
                 // Query the size every time, because the terminal may be resized.
                 let size = crossterm::terminal::size().unwrap_or_default();
                 let plot = lines.render_text(size, self.console.is_colored());
-                bar.set_message(plot + &visible(&self.what));
+                bar.set_message(plot + &escape_invisible_chars(&self.what));
                 bar.set_prefix(to_go);
                 bar.set_position((self.fraction * STEPS as f64) as u64);
             }

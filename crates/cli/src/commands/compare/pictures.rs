@@ -4,12 +4,12 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 use super::format_significant_digits;
-use crate::args::{CompareArgs, Pictures};
+use crate::args::{CompareArgs, ImageDisplayMode};
 use crate::compare::{self, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::film::RadianceImage;
-use crate::film::tone::{ToneMapping, develop};
-use crate::scene::sanitize::visible;
+use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
+use crate::scene::sanitize::escape_invisible_chars;
 use crate::tui::{NamedImage, images_as_text};
 
 /// FLIP below this value is hard to see in false color.
@@ -19,9 +19,9 @@ const MIN_VISIBLE_FLIP: f32 = 0.1;
 pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
-        Pictures::Auto => is_terminal,
-        Pictures::On => true,
-        Pictures::Off => false,
+        ImageDisplayMode::Auto => is_terminal,
+        ImageDisplayMode::On => true,
+        ImageDisplayMode::Off => false,
     };
     if !is_wanted {
         return String::new();
@@ -47,7 +47,10 @@ fn file_name(path: &Path) -> String {
 
 /// Tone maps an image for display.
 fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
-    NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
+    NamedImage {
+        name: escape_invisible_chars(name).into_owned(),
+        picture: tone_map_to_8_bits(image, &ToneMapping::default()),
+    }
 }
 
 /// Returns FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.

@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 
 use super::document::OpenDocument;
 use crate::math::color::{linear_to_srgb, srgb8_to_linear};
-use crate::scene::keys::color_bytes;
 use crate::scene::keys::key::ValueKind;
+use crate::scene::keys::parse_color_bytes;
 use crate::scene::outline::OutlineKey;
 
 /// Returns all colors in a document.
@@ -31,7 +31,7 @@ pub(super) fn document_colors(document: &OpenDocument) -> Value {
 /// Parses a value as a color. Numbers are clamped to 1.
 fn parse_color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
-        Some(text) => color_bytes(text)?,
+        Some(text) => parse_color_bytes(text)?,
         None => {
             let list = text.get(key.value.clone())?.strip_prefix('[')?.strip_suffix(']')?;
             let numbers: Vec<f32> =

@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 use super::document::OpenDocument;
 use super::look::{describe_key, texture_keys};
-use super::place::{CursorContext, Section, cursor_context};
+use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
-use crate::scene::keys::{color_names, tables};
+use crate::scene::keys::{all_tables, color_names};
 
 /// Returns the candidates at a byte offset. `None` if nothing can be completed there.
 pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> {
@@ -30,9 +30,10 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
         }
         CursorContext::InnerValue { key, is_quoted } => match key.as_str() {
             "texture" => table_name_items(document, "textures", is_quoted),
-            "channel" => {
-                word_items(&crate::scene::keys::key::words::<crate::scene::description::Channel>(), is_quoted)
-            }
+            "channel" => choice_items(
+                &crate::scene::keys::key::choice_values::<crate::scene::description::Channel>(),
+                is_quoted,
+            ),
             _ => Vec::new(),
         },
     };
@@ -59,9 +60,9 @@ fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let closed = rest.len() - rest.trim_start_matches(']').len();
     let [start, end] = [offset - line.len(), offset + closed].map(|at| document.position(at));
     let is_there = |table: &str| document.tables.iter().any(|one| one.info.name == table);
-    let open = tables().iter().filter(|table| table.form != TableSyntax::Single || !is_there(table.name));
+    let open = all_tables().iter().filter(|table| table.form != TableSyntax::Single || !is_there(table.name));
     open.map(|table| {
-        let head = table.head();
+        let head = table.header();
         let edit = TextEdit { range: Range { start, end }, new_text: head.clone() };
         CompletionItem {
             text_edit: Some(CompletionTextEdit::Edit(edit)),
@@ -74,7 +75,7 @@ fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
 }
 
 /// Returns candidates for a table's missing keys. They include example values unless `=` follows the cursor.
-fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
+fn missing_key_items(of: CursorTable, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
     let mut items: Vec<CompletionItem> = Vec::new();
@@ -95,17 +96,17 @@ fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<Co
             &describe_key(key),
             whole(key.name, &key.example()),
         );
-        item.detail = Some(key.kind().replace('`', ""));
+        item.detail = Some(key.kind_text().replace('`', ""));
         item
     };
     items.extend(of.keys().iter().filter(|key| !is_given(key.name)).map(key));
     items
 }
 
-fn type_items(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
+fn type_items(of: CursorTable, is_quoted: bool) -> Vec<CompletionItem> {
     let list: Vec<ChoiceValue> =
         of.info.types.iter().map(|kind| ChoiceValue { name: kind.name, meaning: kind.doc }).collect();
-    word_items(&list, is_quoted)
+    choice_items(&list, is_quoted)
 }
 
 fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
@@ -124,12 +125,12 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         color_names().map(color).collect::<Vec<_>>()
     };
     match kind {
-        ValueKind::Words(list) => word_items(&list(), is_quoted),
+        ValueKind::Words(list) => choice_items(&list(), is_quoted),
         ValueKind::Flag => ["true", "false"]
             .map(|flag| completion_item(flag, CompletionItemKind::VALUE, "", flag.to_owned()))
             .to_vec(),
         ValueKind::Material | ValueKind::Texture | ValueKind::Heights => {
-            kind.named_in().map_or_else(Vec::new, |table| table_name_items(document, table, is_quoted))
+            kind.defining_table().map_or_else(Vec::new, |table| table_name_items(document, table, is_quoted))
         }
         ValueKind::Color(_) => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) if is_quoted => colors(),
@@ -146,7 +147,7 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
     }
 }
 
-fn word_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
+fn choice_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
     let word = |word: &ChoiceValue| {
         completion_item(
             word.name,
@@ -176,5 +177,5 @@ fn table_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Ve
 }
 
 fn quote_if_needed(text: &str, is_quoted: bool) -> String {
-    if is_quoted { text.to_owned() } else { crate::scene::toml_string(text) }
+    if is_quoted { text.to_owned() } else { crate::scene::quote_toml_string(text) }
 }

@@ -6,7 +6,7 @@ use lsp_types::{Diagnostic, DiagnosticSeverity, Range};
 
 use super::document::OpenDocument;
 use crate::control::CancelToken;
-use crate::pipeline::IncrementalChecker;
+use crate::pipeline::IncrementalSceneChecker;
 use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
@@ -21,7 +21,7 @@ pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
 /// differs from the open document, if it cannot be read, or if the token is cancelled.
 pub(super) fn file_diagnostics(
     document: &OpenDocument,
-    checker: &mut IncrementalChecker,
+    checker: &mut IncrementalSceneChecker,
     token: &CancelToken,
 ) -> Option<Vec<Diagnostic>> {
     if std::fs::read_to_string(&document.path).ok()? != document.text {

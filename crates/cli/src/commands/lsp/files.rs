@@ -12,7 +12,7 @@ use lsp_types::{Diagnostic, Uri};
 use super::diagnostics;
 use super::document::OpenDocument;
 use crate::control::CancelToken;
-use crate::pipeline::IncrementalChecker;
+use crate::pipeline::IncrementalSceneChecker;
 use crate::system::threads::spawn;
 
 /// A thread that checks files until the handle is dropped.
@@ -45,8 +45,8 @@ impl FileCheckThread {
         let shared = Arc::<CheckQueue>::default();
         let work = Arc::clone(&shared);
         let read = move || {
-            let mut checker = IncrementalChecker::default();
-            while let Some((uri, document, token)) = work.next() {
+            let mut checker = IncrementalSceneChecker::default();
+            while let Some((uri, document, token)) = work.wait_for_request() {
                 if let Some(found) = diagnostics::file_diagnostics(&document, &mut checker, &token) {
                     publish(uri, &document, found);
                 }
@@ -58,14 +58,14 @@ impl FileCheckThread {
 
     /// Queues a check of a document's files.
     pub(super) fn check(&self, uri: Uri, document: OpenDocument) {
-        self.shared.lock().put(uri, document);
+        self.shared.lock().enqueue(uri, document);
         self.shared.changed.notify_one();
     }
 }
 
 impl Drop for FileCheckThread {
     fn drop(&mut self) {
-        self.shared.lock().end();
+        self.shared.lock().shut_down();
         self.shared.changed.notify_one();
         if let Some(thread) = self.thread.take() {
             // Ignore a panic in the thread.
@@ -79,18 +79,18 @@ impl CheckQueue {
         self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next request. `None` after [`CheckRequests::end`].
-    fn next(&self) -> Option<(Uri, OpenDocument, CancelToken)> {
+    /// Waits for the next request. `None` after [`CheckRequests::shut_down`].
+    fn wait_for_request(&self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let mut requests = self.lock();
         requests.running = None;
         let is_idle = |requests: &mut CheckRequests| requests.waiting.is_empty() && !requests.is_over;
         let mut requests = self.changed.wait_while(requests, is_idle).unwrap_or_else(PoisonError::into_inner);
-        requests.take()
+        requests.start_next()
     }
 }
 
 impl CheckRequests {
-    fn put(&mut self, uri: Uri, document: OpenDocument) {
+    fn enqueue(&mut self, uri: Uri, document: OpenDocument) {
         if let Some((_, token)) = self.running.as_ref().filter(|(running, _)| *running == uri) {
             token.cancel();
         }
@@ -98,14 +98,14 @@ impl CheckRequests {
         self.waiting.push_back((uri, document));
     }
 
-    fn take(&mut self) -> Option<(Uri, OpenDocument, CancelToken)> {
+    fn start_next(&mut self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let (uri, document) = self.waiting.pop_front().filter(|_| !self.is_over)?;
         let token = CancelToken::new();
         self.running = Some((uri.clone(), token.clone()));
         Some((uri, document, token))
     }
 
-    fn end(&mut self) {
+    fn shut_down(&mut self) {
         self.is_over = true;
         if let Some((_, token)) = &self.running {
             token.cancel();
@@ -122,21 +122,21 @@ mod tests {
         let uri = |name: &str| name.parse::<Uri>().expect("an address");
         let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
         let mut requests = CheckRequests::default();
-        requests.put(uri("file:///a"), document(1));
-        let (_, _, first) = requests.take().expect("a request");
+        requests.enqueue(uri("file:///a"), document(1));
+        let (_, _, first) = requests.start_next().expect("a request");
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {
-            requests.put(uri(name), document(version));
+            requests.enqueue(uri(name), document(version));
         }
         assert!(first.is_cancelled(), "a newer request replaces it");
-        let mut next = || requests.take().map(|(uri, document, _)| (uri.to_string(), document.version));
+        let mut next = || requests.start_next().map(|(uri, document, _)| (uri.to_string(), document.version));
         assert_eq!(next(), Some(("file:///b".to_owned(), 1)));
         assert_eq!(next(), Some(("file:///a".to_owned(), 3)));
         assert_eq!(next(), None);
-        requests.put(uri("file:///b"), document(2));
-        let (_, _, last) = requests.take().expect("a request");
-        requests.put(uri("file:///c"), document(1));
+        requests.enqueue(uri("file:///b"), document(2));
+        let (_, _, last) = requests.start_next().expect("a request");
+        requests.enqueue(uri("file:///c"), document(1));
         assert!(!last.is_cancelled());
-        requests.end();
-        assert!(last.is_cancelled() && requests.take().is_none());
+        requests.shut_down();
+        assert!(last.is_cancelled() && requests.start_next().is_none());
     }
 }

@@ -6,7 +6,7 @@ use lsp_types::{Hover, HoverContents, MarkupContent, MarkupKind};
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use crate::scene::keys::key::{Default, KeyInfo, ValueKind};
+use crate::scene::keys::key::{DefaultValue, KeyInfo, ValueKind};
 use crate::scene::outline::{OutlineKey, OutlineTable};
 
 /// The key under the cursor, and its table. `outer` is the inline table's key if the cursor is inside an
@@ -36,7 +36,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
     let name = key.name.text.as_str();
     let text = if std::ptr::eq(key, outer) {
         match table.known_keys().into_iter().find(|one| one.name == name) {
-            Some(info) => format!("**{name}**: {}\n\n{}", info.kind(), describe_key(info)),
+            Some(info) => format!("**{name}**: {}\n\n{}", info.kind_text(), describe_key(info)),
             None if name == "type" => {
                 let types =
                     table.info.types.iter().map(|kind| format!("- `\"{}\"`: {}", kind.name, kind.doc));
@@ -60,12 +60,12 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
         }
     };
     row("unit", key.unit.to_owned());
-    row("range", key.range());
+    row("range", key.range_text());
     row(
         "default",
         match key.default {
-            Default::Absent => String::new(),
-            Default::Required(_) | Default::Is(_) | Default::By(_) => key.default_words(),
+            DefaultValue::Absent => String::new(),
+            DefaultValue::Required(_) | DefaultValue::Is(_) | DefaultValue::By(_) => key.default_text(),
         },
     );
     if let ValueKind::Words(list) = key.kind {
@@ -87,7 +87,7 @@ pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
 pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
-        table.known_keys().into_iter().find(|one| one.name == key.name.text)?.kind.named_in()?
+        table.known_keys().into_iter().find(|one| one.name == key.name.text)?.kind.defining_table()?
     } else if key.name.text == "texture" {
         "textures"
     } else {

@@ -36,7 +36,7 @@ use serde_json::{Value, json};
 
 use self::document::OpenDocument;
 use self::files::FileCheckThread;
-use self::wire::{Client, Received};
+use self::wire::{Client, ReceivedFrame};
 use crate::console::Console;
 use crate::exit::Exit;
 
@@ -45,7 +45,7 @@ use crate::exit::Exit;
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
         Ok(exit) => exit,
-        Err(message) => console.fail(Exit::FAILED, &format!("language server: {message}")),
+        Err(message) => console.print_error(Exit::FAILED, &format!("language server: {message}")),
     }
 }
 
@@ -84,19 +84,19 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
     let mut phase = ServerPhase::New;
     while let Some(received) = wire::read_frame(from)? {
         match received {
-            Received::Invalid(answer) => client.send_error(&answer),
-            Received::Message(Message::Request(request)) => {
+            ReceivedFrame::Invalid(answer) => client.send_error(&answer),
+            ReceivedFrame::Message(Message::Request(request)) => {
                 let response = server.respond(request, &mut phase);
                 server.send(&response.into());
             }
-            Received::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
+            ReceivedFrame::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
                 (Exited::METHOD, ServerPhase::ShutDown) => return Ok(Exit::DONE),
                 (Exited::METHOD, ServerPhase::New | ServerPhase::Serving) => return Ok(Exit::FAILED),
                 (_, ServerPhase::Serving) => server.handle_notification(one),
                 (_, ServerPhase::New | ServerPhase::ShutDown) => {}
             },
             // The server sends no requests, so it expects no responses.
-            Received::Message(Message::Response(_)) => {}
+            ReceivedFrame::Message(Message::Response(_)) => {}
         }
     }
     Ok(Exit::DONE)
@@ -140,7 +140,7 @@ impl Server<'_> {
                 *phase = ServerPhase::ShutDown;
                 Response::new_ok(request.id, Value::Null)
             }
-            (_, ServerPhase::Serving) => self.answer(request),
+            (_, ServerPhase::Serving) => self.dispatch_request(request),
             (_, ServerPhase::ShutDown) => refused(
                 request.id,
                 ErrorCode::InvalidRequest,
@@ -149,7 +149,7 @@ impl Server<'_> {
         }
     }
 
-    fn answer(&self, request: Request) -> Response {
+    fn dispatch_request(&self, request: Request) -> Response {
         let Request { id, method, params } = request;
         let found = match method.as_str() {
             Completion::METHOD => self.with_document_at(params, complete::complete),

@@ -1,8 +1,8 @@
 //! Determines what can be completed at the cursor. Works line by line, because incomplete text may have
 //! syntax errors.
 
+use crate::scene::keys::find_table;
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
-use crate::scene::keys::table;
 
 /// The kind of text to complete at the cursor.
 #[derive(Debug)]
@@ -10,9 +10,9 @@ pub(super) enum CursorContext {
     /// A header, or a line where a header can start.
     Header,
     /// A key of a table. `given` contains the table's other keys, and `is_assigned` is true if `=` follows.
-    Key { of: Section, given: Vec<String>, is_assigned: bool },
+    Key { of: CursorTable, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
-    Value { of: Section, key: String, is_quoted: bool },
+    Value { of: CursorTable, key: String, is_quoted: bool },
     /// A key in an inline table.
     InnerKey { given: Vec<String> },
     /// The value of a key in an inline table.
@@ -21,19 +21,19 @@ pub(super) enum CursorContext {
 
 /// The table at the cursor and its type.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Section {
+pub(super) struct CursorTable {
     pub(super) info: &'static TableInfo,
     pub(super) kind: Option<&'static TypeInfo>,
 }
 
-impl Section {
+impl CursorTable {
     /// The keys allowed in the table.
     pub(super) fn keys(&self) -> Vec<&'static KeyInfo> {
-        self.info.keys_of(self.kind).collect()
+        self.info.keys_for_type(self.kind).collect()
     }
 
     pub(super) fn key(&self, name: &str) -> Option<&'static KeyInfo> {
-        self.info.keys_of(self.kind).find(|key| key.name == name)
+        self.info.keys_for_type(self.kind).find(|key| key.name == name)
     }
 }
 
@@ -42,8 +42,8 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
     let before = text.get(..offset)?;
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
     let trimmed = line.trim_start();
-    let around = EnclosingTable::at(text, offset);
-    if LineEndState::after(line).is_comment || around.is_in_array {
+    let around = EnclosingTable::from_offset(text, offset);
+    if LineEndState::from_line(line).is_comment || around.is_in_array {
         return None;
     }
     if trimmed.starts_with('[') && !trimmed.contains(']') {
@@ -54,7 +54,7 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
     };
     let after = text[offset..].split('\n').next().unwrap_or_default();
     let mut parts = header.split('.');
-    let info = table(parts.next().unwrap_or_default().trim())?;
+    let info = find_table(parts.next().unwrap_or_default().trim())?;
     if parts.next().is_none() && info.form == crate::scene::keys::key::TableSyntax::Named {
         // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
@@ -73,7 +73,7 @@ fn context_in_table(
     (typed, after): (&str, &str),
     is_inline: bool,
 ) -> Option<CursorContext> {
-    let of = Section { info, kind: table_type(info, body) };
+    let of = CursorTable { info, kind: table_type(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
         return Some(context_in_inline_table(typed.rsplit('{').next().unwrap_or_default()));
@@ -115,7 +115,7 @@ fn last_item(typed: &str) -> &str {
 }
 
 fn is_in_quotes(value: &str) -> bool {
-    LineEndState::after(value).quote.is_some()
+    LineEndState::from_line(value).quote.is_some()
 }
 
 /// State at the end of a line: whether a string, a comment or brackets are open.
@@ -129,7 +129,7 @@ struct LineEndState {
 }
 
 impl LineEndState {
-    fn after(line: &str) -> Self {
+    fn from_line(line: &str) -> Self {
         let mut scan = Self::default();
         let mut is_escaped = false;
         for character in line.chars() {
@@ -163,12 +163,12 @@ struct EnclosingTable<'t> {
 }
 
 impl<'t> EnclosingTable<'t> {
-    fn at(text: &'t str, offset: usize) -> Self {
+    fn from_offset(text: &'t str, offset: usize) -> Self {
         let (mut around, mut header) = (Self::default(), None);
         let (mut at, mut open) = (0, 0);
         for line in text.split_inclusive('\n') {
             // A key or a header ends an unclosed array.
-            if is_key(line) || header_name(line).is_some() {
+            if starts_with_key(line) || header_name(line).is_some() {
                 open = 0;
             }
             let (start, end) = (at, at + line.len());
@@ -178,7 +178,7 @@ impl<'t> EnclosingTable<'t> {
                 // Stop at the next table.
                 Some(_) if offset < start => break,
                 Some(name) => header = Some((name, end)),
-                None => open = (open + LineEndState::after(line).brackets).max(0),
+                None => open = (open + LineEndState::from_line(line).brackets).max(0),
             }
             at = end;
         }
@@ -190,7 +190,7 @@ impl<'t> EnclosingTable<'t> {
 }
 
 /// Whether a line starts with a key and `=`.
-fn is_key(line: &str) -> bool {
+fn starts_with_key(line: &str) -> bool {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     let rest = line.trim_start().trim_start_matches(is_bare);
     rest.trim_start().starts_with('=')
@@ -212,7 +212,7 @@ fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo>
         let (key, value) = item.split_once('=')?;
         (key.trim() == "type").then(|| first_string(value)).flatten()
     });
-    info.type_of(named).or_else(|| info.type_of(None))
+    info.find_type(named).or_else(|| info.find_type(None))
 }
 
 /// Contents of the first string in a value.

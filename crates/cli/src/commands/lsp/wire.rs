@@ -16,7 +16,7 @@ const MAX_HEADER_BYTES: u64 = 1 << 14;
 
 /// A frame from the client.
 #[derive(Debug)]
-pub(super) enum Received {
+pub(super) enum ReceivedFrame {
     /// A valid message.
     Message(Message),
     /// The response to an invalid message.
@@ -27,7 +27,7 @@ pub(super) enum Received {
 ///
 /// # Errors
 /// The stream cannot be read, or a frame is malformed or too long.
-pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<Received>, String> {
+pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<ReceivedFrame>, String> {
     let Some(length) = read_content_length(from)? else { return Ok(None) };
     if length > MAX_MESSAGE_BYTES {
         return Err(format!("a message of {length} bytes is too long; the limit is {MAX_MESSAGE_BYTES}"));
@@ -72,7 +72,7 @@ fn read_content_length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
 }
 
 /// Parses the contents of a frame.
-fn parse_message(bytes: Vec<u8>) -> Received {
+fn parse_message(bytes: Vec<u8>) -> ReceivedFrame {
     let text = String::from_utf8(bytes).map_err(|_| "the message is not UTF-8".to_owned());
     let json = text.and_then(|text| {
         serde_json::from_str::<Value>(&text)
@@ -81,12 +81,12 @@ fn parse_message(bytes: Vec<u8>) -> Received {
     });
     let json = match json {
         Ok(json) => json,
-        Err(why) => return Received::Invalid(error_response(&Value::Null, ErrorCode::ParseError, &why)),
+        Err(why) => return ReceivedFrame::Invalid(error_response(&Value::Null, ErrorCode::ParseError, &why)),
     };
     let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or_default();
     match serde_json::from_value(json) {
-        Ok(message) => Received::Message(message),
-        Err(_) => Received::Invalid(error_response(
+        Ok(message) => ReceivedFrame::Message(message),
+        Err(_) => ReceivedFrame::Invalid(error_response(
             &id,
             ErrorCode::InvalidRequest,
             "neither a request nor a notification",

@@ -8,8 +8,8 @@ use crate::control::{CancelToken, Cancelled};
 use crate::output::part::{self, PartFile};
 use crate::output::{is_same_file, scene_path};
 use crate::pipeline::companion_files;
-use crate::scene::named_files;
-use crate::scene::sanitize::visible;
+use crate::scene::referenced_files;
+use crate::scene::sanitize::escape_invisible_chars;
 
 /// Input files of the parts and their scenes.
 pub(super) struct MergeInputs<'a> {
@@ -28,7 +28,7 @@ impl<'a> MergeInputs<'a> {
         let target = out.canonicalize().ok();
         let outs = [Some(out), target.as_deref()].into_iter().flatten();
         let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| scene_paths(parts, out)).collect();
-        let named = scenes.iter().flat_map(|scene| named_files(scene)).collect::<Vec<_>>();
+        let named = scenes.iter().flat_map(|scene| referenced_files(scene)).collect::<Vec<_>>();
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
 
@@ -41,16 +41,16 @@ impl<'a> MergeInputs<'a> {
         let find = |files: &BTreeSet<PathBuf>| {
             let input = files.iter().find(|input| is_same_file(input, path))?;
             // Relative to the working directory.
-            let name = scene_path::relative(input, Path::new(""));
-            let name = visible(name.strip_prefix("./").unwrap_or(&name)).into_owned();
+            let name = scene_path::relative_to_image(input, Path::new(""));
+            let name = escape_invisible_chars(name.strip_prefix("./").unwrap_or(&name)).into_owned();
             Some(format!("the parts' scene references it ({name})"))
         };
         let by_name = || {
-            let name = part::input_with_name(self.parts, path)?;
+            let name = part::input_name_by_path(self.parts, path)?;
             Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {
-            let name = part::input_with_content(self.parts, path)?;
+            let name = part::input_name_by_content(self.parts, path)?;
             Some(format!("the parts were rendered from it ({name})"))
         };
         match by_name().or_else(|| find(&self.named)).or_else(by_content) {

@@ -9,11 +9,11 @@ mod value;
 use serde_json::{Map, Value, json};
 
 use self::value::{color_string_schema, value_schema};
-use crate::args::Draft;
+use crate::args::SchemaDraft;
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::scene::keys::key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo};
-use crate::scene::keys::tables;
+use crate::scene::keys::all_tables;
+use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo};
 
 /// The file name of the schema.
 pub const FILE: &str = "glimt.schema.json";
@@ -22,22 +22,22 @@ pub const FILE: &str = "glimt.schema.json";
 pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
-pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
+pub(crate) fn run(draft: SchemaDraft, console: &Console) -> Exit {
     console.print_trusted_text(&schema_text(draft));
     Exit::DONE
 }
 
 /// Returns the schema as formatted text.
-pub fn schema_text(draft: Draft) -> String {
+pub fn schema_text(draft: SchemaDraft) -> String {
     format!("{:#}\n", schema(draft))
 }
 
 /// Generates the schema.
-pub fn schema(draft: Draft) -> Value {
+pub fn schema(draft: SchemaDraft) -> Value {
     let properties: Map<String, Value> =
-        tables().iter().map(|info| (info.name.to_owned(), top_level_key_schema(info, draft))).collect();
+        all_tables().iter().map(|info| (info.name.to_owned(), top_level_key_schema(info, draft))).collect();
     let mut schema = json!({
-        "$schema": draft.uri(),
+        "$schema": draft.schema_uri(),
         "title": "glimt scene",
         "description": "See `glimt explain KEY`, and `glimt new FILE` for a commented scene.",
         "type": "object",
@@ -45,12 +45,12 @@ pub fn schema(draft: Draft) -> Value {
         "required": ["camera"],
         "additionalProperties": false,
     });
-    schema[draft.definitions()] = json!({ "color": color_string_schema() });
+    schema[draft.definitions_keyword()] = json!({ "color": color_string_schema() });
     schema
 }
 
 /// Returns the schema for a top-level key: a table, named tables or a list of tables.
-fn top_level_key_schema(info: &'static TableInfo, draft: Draft) -> Value {
+fn top_level_key_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
     let one = table_schema(info, draft);
     let mut all = match info.form {
         TableSyntax::Single => one,
@@ -61,13 +61,13 @@ fn top_level_key_schema(info: &'static TableInfo, draft: Draft) -> Value {
     all
 }
 
-fn table_schema(info: &'static TableInfo, draft: Draft) -> Value {
+fn table_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
     let mut table = match (info.types.is_empty(), draft) {
         (true, _) => {
             object_schema(&info.keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
         }
-        (false, Draft::Four) => all_types_schema(info),
-        (false, Draft::Latest) => schema_by_type(info),
+        (false, SchemaDraft::Four) => all_types_schema(info),
+        (false, SchemaDraft::Latest) => schema_by_type(info),
     };
     for (name, condition) in table_key_conditions(info.name, draft) {
         table[name] = condition;
@@ -76,13 +76,18 @@ fn table_schema(info: &'static TableInfo, draft: Draft) -> Value {
 }
 
 /// Returns the schema for an object that allows only these keys.
-fn object_schema(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
+fn object_schema(
+    keys: &[&'static KeyInfo],
+    draft: SchemaDraft,
+    of: impl Fn(&'static KeyInfo) -> Value,
+) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
-    let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
+    let is_required =
+        |key: &&&KeyInfo| matches!(key.default, DefaultValue::Required(_)) && !is_conditional(key);
     let required: Vec<&str> = keys.iter().filter(is_required).map(|key| key.name).collect();
     let mut object = json!({ "type": "object", "properties": properties, "additionalProperties": false });
     // Draft 4 does not allow an empty list.
-    if !required.is_empty() || draft == Draft::Latest {
+    if !required.is_empty() || draft == SchemaDraft::Latest {
         object["required"] = required.into();
     }
     object
@@ -94,10 +99,10 @@ fn is_conditional(key: &KeyInfo) -> bool {
 }
 
 /// Returns the schema for a key's value, with the key's description and default.
-fn key_schema(key: &KeyInfo, draft: Draft) -> Value {
+fn key_schema(key: &KeyInfo, draft: SchemaDraft) -> Value {
     let mut schema = value_schema(key.kind, draft);
     schema["description"] = description(key).into();
-    if let Default::Is(default) = key.default
+    if let DefaultValue::Is(default) = key.default
         && let Ok(default) = serde_json::from_str(default)
     {
         schema["default"] = default;
@@ -110,21 +115,21 @@ fn description(key: &KeyInfo) -> String {
     let named =
         |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
     let default = match key.default {
-        Default::Required(_) => "\n\nRequired.".to_owned(),
-        Default::Is(_) | Default::By(_) => named("Default", key.default_words()),
-        Default::Absent => String::new(),
+        DefaultValue::Required(_) => "\n\nRequired.".to_owned(),
+        DefaultValue::Is(_) | DefaultValue::By(_) => named("Default", key.default_text()),
+        DefaultValue::Absent => String::new(),
     };
-    format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range()))
+    format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range_text()))
 }
 
 /// Returns the schema for a table that has types. Contains one condition per type.
 fn schema_by_type(info: &'static TableInfo) -> Value {
-    let draft = Draft::Latest;
+    let draft = SchemaDraft::Latest;
     let conditions: Vec<Value> = info
         .types
         .iter()
         .map(|kind| {
-            let mut then = object_schema(&info.keys_of(Some(kind)).collect::<Vec<_>>(), draft, |key| {
+            let mut then = object_schema(&info.keys_for_type(Some(kind)).collect::<Vec<_>>(), draft, |key| {
                 key_schema(key, draft)
             });
             then["properties"]["type"] = json!(true);
@@ -154,7 +159,7 @@ fn type_key_schema(info: &TableInfo) -> Value {
 /// Returns the schema for a table that accepts the keys of all types. Dependencies restrict each key to its
 /// types.
 fn all_types_schema(info: &'static TableInfo) -> Value {
-    let draft = Draft::Four;
+    let draft = SchemaDraft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
     properties.insert("type".to_owned(), type_key_schema(info));
     for key in info.keys {
@@ -175,7 +180,7 @@ fn all_types_schema(info: &'static TableInfo) -> Value {
 
 /// Returns the schema for a key shared by several types. Accepts the values that any of these types accepts.
 fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
-    let draft = Draft::Four;
+    let draft = SchemaDraft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();
     values.dedup();
     let mut schema = match values.as_slice() {
@@ -200,14 +205,14 @@ fn type_dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInf
 }
 
 /// Returns conditions on combinations of keys in a table.
-fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
+fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
         json!({ "not": { "anyOf": each } })
     };
     let dependent = match draft {
-        Draft::Four => "dependencies",
-        Draft::Latest => "dependentSchemas",
+        SchemaDraft::Four => "dependencies",
+        SchemaDraft::Latest => "dependentSchemas",
     };
     match (table, draft) {
         ("camera", _) => vec![
@@ -215,7 +220,7 @@ fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)>
             (dependent, json!({ "orbiter": none_of(&["position", "look_at", "up"]) })),
         ],
         ("mesh", _) => vec![(dependent, json!({ "matrix": none_of(&["scale", "rotate", "translate"]) }))],
-        ("materials", Draft::Four) => {
+        ("materials", SchemaDraft::Four) => {
             let is_other =
                 json!({ "not": { "properties": { "type": { "enum": ["metal"] } }, "required": ["type"] } });
             let mut any = vec![is_other];

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::args::Draft;
+use crate::args::SchemaDraft;
 use crate::choice::Choice;
 use crate::math::limits::{LARGEST, SHORTEST};
 use crate::scene::description::Channel;
@@ -11,7 +11,7 @@ use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::limits::Limits;
 
 /// Returns the schema for a value type.
-pub(super) fn value_schema(kind: ValueKind, draft: Draft) -> Value {
+pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
     match kind {
         ValueKind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
         ValueKind::Number(limits) => number_schema(limits, draft),
@@ -21,7 +21,7 @@ pub(super) fn value_schema(kind: ValueKind, draft: Draft) -> Value {
             let names: Vec<&str> = words.iter().map(|word| word.name).collect();
             let meanings: Vec<&str> = words.iter().map(|word| word.meaning).collect();
             let mut schema = json!({ "type": "string", "enum": names });
-            if draft == Draft::Four {
+            if draft == SchemaDraft::Four {
                 schema["x-taplo"] = json!({ "docs": { "enumValues": meanings } });
             }
             schema
@@ -50,7 +50,7 @@ fn any_of(mut values: Vec<Value>, more: Value) -> Value {
     json!({ "anyOf": values })
 }
 
-fn number_schema(limits: Limits, draft: Draft) -> Value {
+fn number_schema(limits: Limits, draft: SchemaDraft) -> Value {
     let between = |least: f64, most: f64| json!({ "type": "number", "minimum": least, "maximum": most });
     match limits {
         Limits::Any => between(-LARGEST, LARGEST),
@@ -64,24 +64,26 @@ fn number_schema(limits: Limits, draft: Draft) -> Value {
         Limits::LengthOrZero => between(0.0, LARGEST),
         Limits::Between(least, most) => between(least, most),
         Limits::Inside(low, high) => match draft {
-            Draft::Four => {
+            SchemaDraft::Four => {
                 let mut schema = between(low, high);
                 schema["exclusiveMinimum"] = true.into();
                 schema["exclusiveMaximum"] = true.into();
                 schema
             }
-            Draft::Latest => json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high }),
+            SchemaDraft::Latest => {
+                json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high })
+            }
         },
     }
 }
 
-fn number_array_schema(count: usize, limits: Limits, draft: Draft) -> Value {
+fn number_array_schema(count: usize, limits: Limits, draft: SchemaDraft) -> Value {
     json!({ "type": "array", "items": number_schema(limits, draft), "minItems": count, "maxItems": count })
 }
 
 /// Returns the schemas for a color.
-fn color_schemas(limits: Limits, draft: Draft) -> Vec<Value> {
-    let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
+fn color_schemas(limits: Limits, draft: SchemaDraft) -> Vec<Value> {
+    let written = json!({ "$ref": format!("#/{}/color", draft.definitions_keyword()) });
     vec![number_schema(limits, draft), number_array_schema(3, limits, draft), written]
 }
 

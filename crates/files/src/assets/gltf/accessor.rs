@@ -54,7 +54,7 @@ impl ComponentType {
     }
 
     /// Decodes a component as an index. `None` for types that cannot be indices.
-    fn index(self, bytes: &[u8]) -> Option<u32> {
+    fn decode_as_index(self, bytes: &[u8]) -> Option<u32> {
         match self {
             Self::U8 => Some(u32::from(bytes[0])),
             Self::U16 => Some(u32::from(u16::from_le_bytes([bytes[0], bytes[1]]))),
@@ -102,8 +102,9 @@ impl<'a> AccessorReader<'a> {
     /// Opens an accessor, given its index.
     pub(super) fn open(container: &'a GltfFile, number: usize) -> Result<Self, GltfError> {
         let accessor = container.root.accessors.get(number);
-        let accessor =
-            accessor.ok_or_else(|| GltfError::index("accessors", number, container.root.accessors.len()))?;
+        let accessor = accessor.ok_or_else(|| {
+            GltfError::index_out_of_range("accessors", number, container.root.accessors.len())
+        })?;
         Self::new(container, accessor).map_err(|wrong| wrong.add_location(format!("accessors[{number}]")))
     }
 
@@ -122,7 +123,7 @@ impl<'a> AccessorReader<'a> {
             Some(view) => Some(locate_elements(container, view, accessor.byte_offset, size, count)?),
             None if accessor.count <= MAX_ZEROS => None,
             None => {
-                return Err(GltfError::new(too_many_zeros(accessor.count)));
+                return Err(GltfError::new(too_many_zeros_message(accessor.count)));
             }
         };
         let sparse = match &accessor.sparse {
@@ -136,7 +137,7 @@ impl<'a> AccessorReader<'a> {
                 let replaced = sparse.count as usize;
                 let json = &sparse.indices;
                 let index_type = ComponentType::from_number(json.component_type);
-                let index_type = index_type.filter(|component| component.index(&[0; 4]).is_some());
+                let index_type = index_type.filter(|component| component.decode_as_index(&[0; 4]).is_some());
                 let index_type =
                     index_type.ok_or_else(|| GltfError::new("sparse indices must be integers"))?;
                 let indices = locate_elements(
@@ -147,7 +148,9 @@ impl<'a> AccessorReader<'a> {
                     replaced,
                 )?;
                 let indices: Vec<u32> = (0..replaced)
-                    .filter_map(|element| index_type.index(&indices.bytes[element * indices.stride..]))
+                    .filter_map(|element| {
+                        index_type.decode_as_index(&indices.bytes[element * indices.stride..])
+                    })
                     .collect();
                 if indices.iter().any(|index| *index as usize >= count) || !indices.is_sorted() {
                     return Err(GltfError::new("sparse indices are out of range or not sorted"));
@@ -192,12 +195,14 @@ impl<'a> AccessorReader<'a> {
 
     /// Whether the elements can be used as indices.
     pub(super) fn are_indices(&self) -> bool {
-        self.width == 1 && self.component.index(&[0; 4]).is_some()
+        self.width == 1 && self.component.decode_as_index(&[0; 4]).is_some()
     }
 
     /// Reads element number `element` as an index. The element must exist.
-    pub(super) fn index(&self, element: usize) -> u32 {
-        self.element_bytes(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
+    pub(super) fn read_index(&self, element: usize) -> u32 {
+        self.element_bytes(element)
+            .and_then(|bytes| self.component.decode_as_index(bytes))
+            .unwrap_or_default()
     }
 }
 
@@ -211,7 +216,8 @@ fn locate_elements<'a>(
 ) -> Result<StridedElements<'a>, GltfError> {
     let views = &container.root.buffer_views;
     let place = format!("bufferViews[{view}]");
-    let json = views.get(view).ok_or_else(|| GltfError::index("bufferViews", view, views.len()))?;
+    let json =
+        views.get(view).ok_or_else(|| GltfError::index_out_of_range("bufferViews", view, views.len()))?;
     let bytes = view_bytes(container, json).map_err(|wrong| wrong.add_location(place.clone()))?;
     let stride = json.byte_stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 1 << 16 {
@@ -222,7 +228,7 @@ fn locate_elements<'a>(
     let needed = if count == 0 { 0 } else { (count as u64 - 1) * stride as u64 + size as u64 };
     let end = offset.checked_add(needed).filter(|end| *end <= bytes.len() as u64);
     if end.is_none() {
-        return Err(GltfError::new(view_too_short(count, offset, needed, &place, bytes.len())));
+        return Err(GltfError::new(view_too_short_message(count, offset, needed, &place, bytes.len())));
     }
     Ok(StridedElements { bytes: &bytes[offset as usize..], stride })
 }
@@ -230,24 +236,31 @@ fn locate_elements<'a>(
 /// Returns the bytes in a buffer view.
 pub(super) fn view_bytes<'a>(container: &'a GltfFile, view: &BufferView) -> Result<&'a [u8], GltfError> {
     let buffers = &container.buffers;
-    let buffer =
-        buffers.get(view.buffer).ok_or_else(|| GltfError::index("buffers", view.buffer, buffers.len()))?;
+    let buffer = buffers
+        .get(view.buffer)
+        .ok_or_else(|| GltfError::index_out_of_range("buffers", view.buffer, buffers.len()))?;
     let end = view.byte_offset.checked_add(view.byte_length).filter(|end| *end <= buffer.len() as u64);
-    let end = end.ok_or_else(|| GltfError::new(view_exceeds_buffer(view, buffer.len())))?;
+    let end = end.ok_or_else(|| GltfError::new(view_exceeds_buffer_message(view, buffer.len())))?;
     Ok(&buffer[view.byte_offset as usize..end as usize])
 }
 
-pub(super) fn too_many_zeros(count: u64) -> String {
+pub(super) fn too_many_zeros_message(count: u64) -> String {
     format!("{count} elements without a buffer view; the limit is {MAX_ZEROS}")
 }
 
 /// Error message for elements that extend past their buffer view.
-pub(super) fn view_too_short(count: usize, offset: u64, needed: u64, view: &str, has: usize) -> String {
+pub(super) fn view_too_short_message(
+    count: usize,
+    offset: u64,
+    needed: u64,
+    view: &str,
+    has: usize,
+) -> String {
     format!("{count} elements at byte {offset} need {needed} bytes, but {view} has {has}")
 }
 
 /// Error message for a view that extends past its buffer.
-fn view_exceeds_buffer(view: &BufferView, has: usize) -> String {
+fn view_exceeds_buffer_message(view: &BufferView, has: usize) -> String {
     let BufferView { buffer, byte_offset, byte_length, .. } = view;
     format!("bytes {byte_offset} + {byte_length} exceed buffers[{buffer}], which has {has} bytes")
 }

@@ -37,11 +37,11 @@ impl AffineMap {
 
     /// Composes two transforms. `inner` is applied first.
     pub(super) fn compose(self, inner: Self) -> Self {
-        Self { linear: self.linear * inner.linear, translate: self.point(inner.translate) }
+        Self { linear: self.linear * inner.linear, translate: self.transform_point(inner.translate) }
     }
 
     /// Transforms a point.
-    pub fn point(&self, at: DVec3) -> DVec3 {
+    pub fn transform_point(&self, at: DVec3) -> DVec3 {
         self.linear * at + self.translate
     }
 }
@@ -76,7 +76,7 @@ pub struct TexturedValue {
 
 impl TexturedValue {
     /// A scalar without a texture.
-    pub fn number(number: f64) -> Self {
+    pub fn from_scalar(number: f64) -> Self {
         Self { factor: DVec3::splat(number), texture: None }
     }
 }
@@ -173,19 +173,19 @@ pub struct ModelMaterial {
 
 impl ModelMaterial {
     /// A gray dielectric material.
-    pub(super) fn named(name: &str) -> Self {
+    pub(super) fn default_with_name(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            color: TexturedValue::number(0.8),
-            metallic: TexturedValue::number(0.0),
-            roughness: TexturedValue::number(0.5),
+            color: TexturedValue::from_scalar(0.8),
+            metallic: TexturedValue::from_scalar(0.0),
+            roughness: TexturedValue::from_scalar(0.5),
             ior: 1.5,
-            specular: TexturedValue::number(1.0),
-            specular_color: TexturedValue::number(1.0),
-            transmission: TexturedValue::number(0.0),
-            clearcoat: TexturedValue::number(0.0),
-            clearcoat_roughness: TexturedValue::number(0.0),
-            emission: TexturedValue::number(0.0),
+            specular: TexturedValue::from_scalar(1.0),
+            specular_color: TexturedValue::from_scalar(1.0),
+            transmission: TexturedValue::from_scalar(0.0),
+            clearcoat: TexturedValue::from_scalar(0.0),
+            clearcoat_roughness: TexturedValue::from_scalar(0.0),
+            emission: TexturedValue::from_scalar(0.0),
             normal: None,
             normal_strength: 1.0,
             alpha: Alpha::Opaque,

@@ -256,7 +256,7 @@ impl<'de> Deserialize<'de> for Uri {
                 if !kind.ends_with(";base64") {
                     return Err(E::custom("a data URI that is not base64"));
                 }
-                decoded(coded).map(Uri::Data).map_err(E::custom)
+                decode_base64(coded).map(Uri::Data).map_err(E::custom)
             }
         }
         deserializer.deserialize_str(UriVisitor)
@@ -269,15 +269,15 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-fn decoded(coded: &str) -> Result<Vec<u8>, String> {
+fn decode_base64(coded: &str) -> Result<Vec<u8>, String> {
     BASE64.decode(coded).map_err(|error| match error {
-        DecodeError::InvalidByte(at, byte) => invalid_base64(byte, at),
+        DecodeError::InvalidByte(at, byte) => invalid_base64_message(byte, at),
         DecodeError::InvalidLength(digits) => format!("invalid base64 length: {digits} digits"),
         DecodeError::InvalidLastSymbol { .. } | DecodeError::InvalidPadding => "truncated base64".to_owned(),
     })
 }
 
-pub(super) fn invalid_base64(byte: u8, at: usize) -> String {
+pub(super) fn invalid_base64_message(byte: u8, at: usize) -> String {
     format!("invalid base64 byte {byte:#04x} at {at}")
 }
 
@@ -330,15 +330,15 @@ pub(super) struct TextureInfo {
     #[serde(default)]
     pub(super) tex_coord: usize,
     /// Scale factor for a normal map's slopes.
-    #[serde(default = "one")]
+    #[serde(default = "default_one")]
     pub(super) scale: f64,
     #[serde(default)]
-    pub(super) extensions: InfoExtensions,
+    pub(super) extensions: TextureInfoExtensions,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct InfoExtensions {
+pub(super) struct TextureInfoExtensions {
     #[serde(rename = "KHR_texture_transform")]
     pub(super) transform: Option<TextureTransform>,
 }
@@ -358,7 +358,7 @@ impl Default for TextureTransform {
     }
 }
 
-fn one() -> f64 {
+fn default_one() -> f64 {
     1.0
 }
 
@@ -373,7 +373,7 @@ pub(super) struct JsonMaterial {
     pub(super) alpha_mode: String,
     pub(super) alpha_cutoff: f64,
     pub(super) double_sided: bool,
-    #[serde(deserialize_with = "material_extensions")]
+    #[serde(deserialize_with = "deserialize_material_extensions")]
     pub(super) extensions: MaterialExtensions,
 }
 
@@ -429,7 +429,9 @@ pub(super) struct MaterialExtensions {
     pub(super) others: Vec<String>,
 }
 
-fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<MaterialExtensions, D::Error> {
+fn deserialize_material_extensions<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<MaterialExtensions, D::Error> {
     struct ExtensionsVisitor;
     impl<'de> Visitor<'de> for ExtensionsVisitor {
         type Value = MaterialExtensions;
@@ -530,7 +532,7 @@ impl Default for Specular {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct EmissiveStrength {
-    #[serde(default = "one")]
+    #[serde(default = "default_one")]
     pub(super) emissive_strength: f64,
 }
 

@@ -3,7 +3,7 @@
 
 use super::description::{Alpha, Glass, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
 use super::json::{
-    CLAMP, InfoExtensions, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureTransform,
+    CLAMP, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureInfoExtensions, TextureTransform,
 };
 use super::{GltfError, GltfFile, ImageBytes};
 use crate::math::{DVec3, Vec2};
@@ -43,7 +43,7 @@ impl JsonMaterial {
 impl TextureInfo {
     /// Index of the texture coordinate set.
     fn coordinate_set(&self) -> usize {
-        let InfoExtensions { transform } = &self.extensions;
+        let TextureInfoExtensions { transform } = &self.extensions;
         transform.as_ref().and_then(|transform| transform.tex_coord).unwrap_or(self.tex_coord)
     }
 }
@@ -59,7 +59,7 @@ const UNSUPPORTED: [(&str, &str); 6] = [
 ];
 
 /// Note about an unknown extension.
-pub(super) fn extension_ignored(name: &str) -> String {
+pub(super) fn extension_ignored_note(name: &str) -> String {
     format!("extension {} is ignored", super::truncate_for_message(name))
 }
 
@@ -90,22 +90,22 @@ impl MaterialReader<'_> {
 
     fn convert_material(&mut self, json: &JsonMaterial) -> Result<ModelMaterial, GltfError> {
         let (pbr, extensions) = (&json.pbr_metallic_roughness, &json.extensions);
-        let mut material = ModelMaterial::named(&json.name);
+        let mut material = ModelMaterial::default_with_name(&json.name);
         // Convert the core parameters.
         let [red, green, blue, alpha] = pbr.base_color_factor;
         let mut base = (DVec3::new(red, green, blue), alpha, &pbr.base_color_texture);
-        material.metallic = self.number(pbr.metallic_factor, &pbr.metallic_roughness_texture)?;
-        material.roughness = self.number(pbr.roughness_factor, &pbr.metallic_roughness_texture)?;
+        material.metallic = self.convert_scalar(pbr.metallic_factor, &pbr.metallic_roughness_texture)?;
+        material.roughness = self.convert_scalar(pbr.roughness_factor, &pbr.metallic_roughness_texture)?;
         if let Some(old) = &extensions.glossiness {
             self.note("the obsolete specular-glossiness model is converted to roughness");
             let [red, green, blue, alpha] = old.diffuse_factor;
             base = (DVec3::new(red, green, blue), alpha, &old.diffuse_texture);
-            material.metallic = TexturedValue::number(0.0);
-            material.roughness = TexturedValue::number(1.0 - clamp_to_unit(old.glossiness_factor));
+            material.metallic = TexturedValue::from_scalar(0.0);
+            material.roughness = TexturedValue::from_scalar(1.0 - clamp_to_unit(old.glossiness_factor));
         }
         let (color, alpha, texture) = base;
-        material.color = self.slot(color, texture)?;
-        material.alpha = self.alpha(json, alpha, &material.color)?;
+        material.color = self.convert_color(color, texture)?;
+        material.alpha = self.convert_alpha_mode(json, alpha, &material.color)?;
         material.is_two_sided = json.double_sided;
         if let Some(map) = &json.normal_texture {
             material.normal_strength = map.scale.max(0.0);
@@ -115,7 +115,7 @@ impl MaterialReader<'_> {
             extensions.emissive_strength.as_ref().map_or(1.0, |extension| extension.emissive_strength);
         let emission = DVec3::from(json.emissive_factor) * strength;
         if emission.max_element() > 0.0 {
-            material.emission = self.slot(emission, &json.emissive_texture)?;
+            material.emission = self.convert_color(emission, &json.emissive_texture)?;
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
@@ -127,21 +127,21 @@ impl MaterialReader<'_> {
             material.ior = if ior.ior == 0.0 { 10.0 } else { ior.ior.clamp(1.0, 10.0) };
         }
         if let Some(specular) = &extensions.specular {
-            material.specular = self.number(specular.specular_factor, &specular.specular_texture)?;
+            material.specular = self.convert_scalar(specular.specular_factor, &specular.specular_texture)?;
             let factor = DVec3::from(specular.specular_color_factor);
-            material.specular_color = self.slot(factor, &specular.specular_color_texture)?;
+            material.specular_color = self.convert_color(factor, &specular.specular_color_texture)?;
         }
         if let Some(coat) = &extensions.clearcoat {
-            material.clearcoat = self.number(coat.clearcoat_factor, &coat.clearcoat_texture)?;
+            material.clearcoat = self.convert_scalar(coat.clearcoat_factor, &coat.clearcoat_texture)?;
             let texture = &coat.clearcoat_roughness_texture;
-            material.clearcoat_roughness = self.number(coat.clearcoat_roughness_factor, texture)?;
+            material.clearcoat_roughness = self.convert_scalar(coat.clearcoat_roughness_factor, texture)?;
             if coat.clearcoat_normal_texture.is_some() {
                 self.note("the clear coat's normal map is ignored; the material's normal map is used");
             }
         }
         if let Some(transmission) = &extensions.transmission {
             let texture = &transmission.transmission_texture;
-            material.transmission = self.number(transmission.transmission_factor, texture)?;
+            material.transmission = self.convert_scalar(transmission.transmission_factor, texture)?;
         }
         if let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0)
             && material.transmission.factor.x > 0.0
@@ -151,16 +151,16 @@ impl MaterialReader<'_> {
         }
         if extensions.unlit {
             self.note("the material is unlit, so its color is emitted and also lights other surfaces");
-            material.emission = std::mem::replace(&mut material.color, TexturedValue::number(0.0));
+            material.emission = std::mem::replace(&mut material.color, TexturedValue::from_scalar(0.0));
             // Remove all reflection and transmission.
-            let black = || TexturedValue::number(0.0);
+            let black = || TexturedValue::from_scalar(0.0);
             (material.metallic, material.specular) = (black(), black());
             (material.clearcoat, material.transmission, material.glass) = (black(), black(), None);
         }
         for name in &extensions.others {
             match UNSUPPORTED.iter().find(|(known, _)| known == name) {
                 Some((_, what)) => self.note(what),
-                None => self.note(&extension_ignored(name)),
+                None => self.note(&extension_ignored_note(name)),
             }
         }
         Ok(material)
@@ -187,7 +187,12 @@ impl MaterialReader<'_> {
         Some(Glass { tint: DVec3::from(color.map(transmittance)) })
     }
 
-    fn alpha(&mut self, json: &JsonMaterial, alpha: f64, color: &TexturedValue) -> Result<Alpha, GltfError> {
+    fn convert_alpha_mode(
+        &mut self,
+        json: &JsonMaterial,
+        alpha: f64,
+        color: &TexturedValue,
+    ) -> Result<Alpha, GltfError> {
         let texture = match &color.texture {
             Some(texture) if self.may_have_alpha(texture.image) => color.texture.clone(),
             Some(_) | None => None,
@@ -197,7 +202,7 @@ impl MaterialReader<'_> {
             "OPAQUE" => Ok(Alpha::Opaque),
             "MASK" if json.alpha_cutoff > 1.0 => {
                 self.note("an alpha cutoff above 1 makes the surface invisible");
-                Ok(Alpha::Blend(TexturedValue::number(0.0)))
+                Ok(Alpha::Blend(TexturedValue::from_scalar(0.0)))
             }
             "MASK" => Ok(Alpha::Mask { value, cutoff: clamp_to_unit(json.alpha_cutoff) }),
             "BLEND" => Ok(Alpha::Blend(value)),
@@ -211,7 +216,7 @@ impl MaterialReader<'_> {
     /// image files.
     fn may_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
-        match self.container.image(image) {
+        match self.container.locate_image(image) {
             Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,
             Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\x89PNG") => {
                 // Gray and RGB images may define a transparent color.
@@ -227,11 +232,19 @@ impl MaterialReader<'_> {
         }
     }
 
-    fn number(&mut self, factor: f64, texture: &Option<TextureInfo>) -> Result<TexturedValue, GltfError> {
-        self.slot(DVec3::splat(clamp_to_unit(factor)), texture)
+    fn convert_scalar(
+        &mut self,
+        factor: f64,
+        texture: &Option<TextureInfo>,
+    ) -> Result<TexturedValue, GltfError> {
+        self.convert_color(DVec3::splat(clamp_to_unit(factor)), texture)
     }
 
-    fn slot(&mut self, factor: DVec3, texture: &Option<TextureInfo>) -> Result<TexturedValue, GltfError> {
+    fn convert_color(
+        &mut self,
+        factor: DVec3,
+        texture: &Option<TextureInfo>,
+    ) -> Result<TexturedValue, GltfError> {
         let finite = |part: f64| if part.is_finite() { part.clamp(0.0, 1e18) } else { 0.0 };
         let factor = DVec3::from(factor.to_array().map(finite));
         let texture = match texture {
@@ -245,7 +258,8 @@ impl MaterialReader<'_> {
     fn convert_texture(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
-        let texture = texture.ok_or_else(|| GltfError::index("textures", info.index, root.textures.len()))?;
+        let texture = texture
+            .ok_or_else(|| GltfError::index_out_of_range("textures", info.index, root.textures.len()))?;
         let source = texture.extensions.webp.as_ref().map(|webp| webp.source).or(texture.source);
         let Some(image) = source else {
             self.note(match texture.extensions.basis {
@@ -255,7 +269,7 @@ impl MaterialReader<'_> {
             return Ok(None);
         };
         if image >= root.images.len() {
-            return Err(GltfError::index("images", image, root.images.len())
+            return Err(GltfError::index_out_of_range("images", image, root.images.len())
                 .add_location(format!("textures[{}]", info.index)));
         }
         let set = self.sets.iter().position(|used| *used == info.coordinate_set());

@@ -18,20 +18,20 @@ impl GltfFile {
     /// Merges the file's scene into one mesh.
     ///
     /// # Errors
-    /// Same as [`GltfFile::scene`] and [`GltfFile::part`]. Also fails if the scene has no faces or too
+    /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part`]. Also fails if the scene has no faces or too
     /// many triangles.
     pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
-        let scene = self.scene(token)?;
+        let scene = self.convert_scene(token)?;
         let Some([min, max]) = scene.bounds else {
-            return Err(self.wrong(GltfError::new("its scene has no visible faces")));
+            return Err(self.malformed_error(GltfError::new("its scene has no visible faces")));
         };
         let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
-        let (companions, pictures) = (self.companions.clone(), self.pictures());
+        let (companions, pictures) = (self.companions.clone(), self.image_file_paths());
         let mut merged = LoadedMesh { hash: self.hash, companions, pictures, ..LoadedMesh::default() };
         merged.mesh.origin = origin;
         merged.material_warnings = self.material_warnings(&scene);
         merged.warnings = scene.notes;
-        merged.materials = scene.materials.iter().map(file_material).collect();
+        merged.materials = scene.materials.iter().map(to_file_material).collect();
         // Add all instances. In the merged mesh, either all vertices have an attribute or none do.
         let mut parts: HashMap<usize, TriangleMesh> = HashMap::new();
         for instance in &scene.instances {
@@ -39,14 +39,14 @@ impl GltfFile {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
                     let LoadedMesh { mesh, dropped, .. } =
-                        self.part(instance.part, &ignore_progress, token)?;
+                        self.build_part(instance.part, &ignore_progress, token)?;
                     merged.dropped.degenerate += dropped.degenerate;
                     merged.dropped.non_finite += dropped.non_finite;
                     new.insert(mesh)
                 }
             };
             if merged.mesh.triangles.len() + part.triangles.len() > MAX_TRIANGLES {
-                return Err(self.wrong(GltfError::new(format!(
+                return Err(self.malformed_error(GltfError::new(format!(
                     "more than {MAX_TRIANGLES} triangles including instances; use `glimt import` to keep the instances"
                 ))));
             }
@@ -71,7 +71,7 @@ impl GltfFile {
 fn append_part(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, material: u32) {
     let first = merged.positions.len() as u32;
     let positions = part.positions.iter().map(|at| at.as_dvec3() + part.origin);
-    merged.positions.extend(positions.map(|at| (placed.point(at) - merged.origin).as_vec3()));
+    merged.positions.extend(positions.map(|at| (placed.transform_point(at) - merged.origin).as_vec3()));
     // Fill in attributes that this part or earlier parts lack.
     append_attribute(&mut merged.normals, first, &part.normals, part.positions.len(), Vec3::ZERO, |normal| {
         let transformed = placed.linear.inverse().transpose() * normal.as_dvec3();
@@ -122,7 +122,7 @@ fn append_attribute<T: Copy>(
 }
 
 /// Converts the material properties that mesh files support.
-fn file_material(material: &ModelMaterial) -> FileMaterial {
+fn to_file_material(material: &ModelMaterial) -> FileMaterial {
     let number = |slot: &super::TexturedValue| slot.factor.x as f32;
     FileMaterial {
         name: material.name.clone(),

@@ -58,7 +58,7 @@ impl GltfError {
     }
 
     /// Error for an out-of-range index into `list`.
-    fn index(list: &str, index: usize, length: usize) -> Self {
+    fn index_out_of_range(list: &str, index: usize, length: usize) -> Self {
         Self(format!("{list}[{index}] does not exist; {list} has length {length}"))
     }
 
@@ -102,7 +102,7 @@ impl GltfFile {
     /// [`AssetError`], with the location in the JSON.
     pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
         let monitor = Monitor { progress, token };
-        let bytes = read::not_all_zero(path, FILE_LIMIT, monitor)?;
+        let bytes = read::read_unless_all_zero(path, FILE_LIMIT, monitor)?;
         read::refuse_utf16(path, &bytes)?;
         let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
@@ -129,10 +129,10 @@ impl GltfFile {
         }
         let mut root: Root = serde_json::from_slice(text).map_err(|error| {
             if let Some(version) = pre_2_0_version(text) {
-                return wrong(GltfError::new(unsupported_version(&version)));
+                return wrong(GltfError::new(unsupported_version_message(&version)));
             }
             let what = error.to_string();
-            let what = with_json_terms(what.split(" at line ").next().unwrap_or_default());
+            let what = replace_rust_terms(what.split(" at line ").next().unwrap_or_default());
             AssetError::malformed(
                 path,
                 Some(error.line()),
@@ -158,7 +158,7 @@ impl GltfFile {
             first_part_with_same_mesh: Vec::new(),
         };
         container.first_part_with_same_mesh = container.deduplicate_parts().map_err(wrong)?;
-        monitor.tick(2 * length, 2 * length)?;
+        monitor.report_progress(2 * length, 2 * length)?;
         Ok(container)
     }
 
@@ -178,7 +178,7 @@ impl GltfFile {
     }
 
     /// Image files referenced by the glTF file, including unused ones.
-    pub fn pictures(&self) -> Vec<PathBuf> {
+    pub fn image_file_paths(&self) -> Vec<PathBuf> {
         let file = |image: &JsonImage| match &image.uri {
             Some(Uri::File(uri)) => resolve_uri(&self.path, uri).ok(),
             Some(Uri::Data(_)) | None => None,
@@ -190,40 +190,44 @@ impl GltfFile {
     ///
     /// # Errors
     /// The image does not exist, or its bytes are out of range.
-    pub fn image(&self, number: usize) -> Result<ImageBytes<'_>, AssetError> {
-        self.image_bytes(number).map_err(|wrong| self.wrong(wrong.add_location(format!("images[{number}]"))))
+    pub fn locate_image(&self, number: usize) -> Result<ImageBytes<'_>, AssetError> {
+        self.image_bytes(number)
+            .map_err(|wrong| self.malformed_error(wrong.add_location(format!("images[{number}]"))))
     }
 
     /// Returns an image's bytes, reading them from a separate file if necessary.
     ///
     /// # Errors
-    /// Same as [`GltfFile::image`]. Also fails if the image file cannot be read.
+    /// Same as [`GltfFile::locate_image`]. Also fails if the image file cannot be read.
     pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
-        match self.image(number)? {
+        match self.locate_image(number)? {
             ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
             ImageBytes::File(file) => {
-                read::bytes(&file, FILE_LIMIT, Monitor { progress: &ignore_progress, token })
+                read::read_bytes(&file, FILE_LIMIT, Monitor { progress: &ignore_progress, token })
             }
         }
     }
 
     fn image_bytes(&self, number: usize) -> Result<ImageBytes<'_>, GltfError> {
         let images = &self.root.images;
-        let image = images.get(number).ok_or_else(|| GltfError::index("images", number, images.len()))?;
+        let image = images
+            .get(number)
+            .ok_or_else(|| GltfError::index_out_of_range("images", number, images.len()))?;
         match (&image.uri, image.buffer_view) {
             (Some(Uri::Data(bytes)), _) => Ok(ImageBytes::Inside(bytes)),
             (Some(Uri::File(uri)), _) => Ok(ImageBytes::File(resolve_uri(&self.path, uri)?)),
             (None, Some(view)) => {
                 let views = &self.root.buffer_views;
-                let json =
-                    views.get(view).ok_or_else(|| GltfError::index("bufferViews", view, views.len()))?;
+                let json = views
+                    .get(view)
+                    .ok_or_else(|| GltfError::index_out_of_range("bufferViews", view, views.len()))?;
                 accessor::view_bytes(self, json).map(ImageBytes::Inside)
             }
             (None, None) => Err(GltfError::new("it has neither a URI nor a buffer view")),
         }
     }
 
-    fn wrong(&self, wrong: GltfError) -> AssetError {
+    fn malformed_error(&self, wrong: GltfError) -> AssetError {
         AssetError::malformed(&self.path, None, wrong.0)
     }
 
@@ -256,7 +260,7 @@ impl GltfFile {
         let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();
         let limit = bytes + FREE;
         if corners > limit {
-            return Err(GltfError::new(too_many_corners(corners, bytes, limit)));
+            return Err(GltfError::new(too_many_corners_message(corners, bytes, limit)));
         }
         Ok(first_part_with_same_mesh)
     }
@@ -266,10 +270,10 @@ impl GltfFile {
         let place = format!("images[{number}]");
         match error {
             AssetError::Malformed { path, reason, .. } if path == self.path => {
-                self.wrong(GltfError::new(reason).add_location(place))
+                self.malformed_error(GltfError::new(reason).add_location(place))
             }
             error @ (AssetError::Malformed { .. } | AssetError::Unreadable { .. }) => {
-                self.wrong(GltfError::new(error.to_string()).add_location(place))
+                self.malformed_error(GltfError::new(error.to_string()).add_location(place))
             }
             other @ (AssetError::OutOfMemory { .. } | AssetError::Cancelled(_)) => other,
         }
@@ -281,7 +285,7 @@ impl GltfFile {
     /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Cancelled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
-        let size = match self.image(number)? {
+        let size = match self.locate_image(number)? {
             ImageBytes::File(file) => image::size(&file, encoding, limits, token),
             ImageBytes::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
@@ -297,7 +301,7 @@ impl GltfFile {
     /// Same as [`GltfFile::check_image_header`].
     pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
-        let texels = match self.image(number)? {
+        let texels = match self.locate_image(number)? {
             ImageBytes::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),
             ImageBytes::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
@@ -308,7 +312,7 @@ impl GltfFile {
     }
 }
 
-fn too_many_corners(corners: u64, bytes: u64, limit: u64) -> String {
+fn too_many_corners_message(corners: u64, bytes: u64, limit: u64) -> String {
     format!("its primitives have {corners} triangle corners; the limit for {bytes} buffer bytes is {limit}")
 }
 
@@ -316,43 +320,43 @@ fn too_many_corners(corners: u64, bytes: u64, limit: u64) -> String {
 const EMPTY_FILE: &str = "the file is empty";
 const NEITHER_GLB_NOR_JSON: &str = "not a glTF file: neither GLB nor a JSON object";
 
-fn unsupported_version(version: &str) -> String {
+fn unsupported_version_message(version: &str) -> String {
     format!("glTF {} is not supported; version 2 is required", truncate_for_message(version))
 }
 
-fn unsupported_glb(version: u32) -> String {
+fn unsupported_glb_message(version: u32) -> String {
     format!("GLB version {version} is not supported; version 2 is required")
 }
 
-fn newer_version(required: &str) -> String {
+fn newer_version_required_message(required: &str) -> String {
     format!("it requires glTF {required}; only 2.0 is supported")
 }
 
-fn invalid_version(text: &str) -> String {
+fn invalid_min_version_message(text: &str) -> String {
     format!("asset.minVersion is not a version: {:?}", truncate_for_message(text))
 }
 
 /// Error message for an unsupported extension that a file's meshes or images need.
-fn unsupported_extension(extension: &str, help: &str) -> String {
+fn unsupported_extension_message(extension: &str, help: &str) -> String {
     format!("{extension} is not supported; {help}")
 }
 
-fn unknown_required(extension: &str) -> String {
+fn unknown_extension_message(extension: &str) -> String {
     format!(
         "the required extension {} is not supported (extensionsRequired)",
         truncate_for_message(extension)
     )
 }
 
-fn short_buffer(claimed: u64, has: usize) -> String {
+fn short_buffer_message(claimed: u64, has: usize) -> String {
     format!("it claims {claimed} bytes but has {has}")
 }
 
-fn missing_buffer(reason: &str, number: usize, name: &str) -> String {
+fn missing_buffer_message(reason: &str, number: usize, name: &str) -> String {
     format!("{reason}; {name} stores buffers[{number}] there")
 }
 
-fn not_relative(uri: &str) -> String {
+fn not_relative_uri_message(uri: &str) -> String {
     format!("{:?} is not a relative URI", truncate_for_message(uri))
 }
 
@@ -363,16 +367,16 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 /// objects where glTF 2.0 uses arrays.
 fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
-    struct Old {
+    struct OldGltfVersion {
         asset: json::JsonAsset,
     }
-    let Old { asset } = serde_json::from_slice(text).ok()?;
+    let OldGltfVersion { asset } = serde_json::from_slice(text).ok()?;
     let is_old = asset.version.starts_with("1.") || asset.version.starts_with("0.");
     is_old.then_some(asset.version)
 }
 
 /// Replaces Rust terms with JSON terms in a JSON parser message.
-fn with_json_terms(message: &str) -> String {
+fn replace_rust_terms(message: &str) -> String {
     let Some((before, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
     let before = match before.strip_prefix("invalid type: ") {
         Some("map") => "invalid type: object".to_owned(),
@@ -405,7 +409,7 @@ fn glb_chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     match word(4) {
         Some(2) => {}
         Some(version) => {
-            return Err(GltfError::new(unsupported_glb(version)));
+            return Err(GltfError::new(unsupported_glb_message(version)));
         }
         None => return Err(GltfError::new("the file ends inside the header")),
     }
@@ -448,14 +452,14 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
         _ if required.is_empty() => {}
         Some(version) if version <= (2, 0) => {}
         Some(_) => {
-            return Err(GltfError::new(newer_version(required)));
+            return Err(GltfError::new(newer_version_required_message(required)));
         }
-        None => return Err(GltfError::new(invalid_version(required))),
+        None => return Err(GltfError::new(invalid_min_version_message(required))),
     }
     match root.asset.version.as_str() {
         version if version.starts_with("2.") => Ok(()),
         "" => Err(GltfError::new("not a glTF file: asset.version is missing")),
-        version => Err(GltfError::new(unsupported_version(version))),
+        version => Err(GltfError::new(unsupported_version_message(version))),
     }
 }
 
@@ -499,10 +503,10 @@ const KNOWN: [&str; 21] = [
 fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     for name in &root.extensions_required {
         if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
-            return Err(GltfError::new(unsupported_extension(name, help)));
+            return Err(GltfError::new(unsupported_extension_message(name, help)));
         }
         if !KNOWN.contains(&name.as_str()) {
-            return Err(GltfError::new(unknown_required(name)));
+            return Err(GltfError::new(unknown_extension_message(name)));
         }
     }
     Ok(())
@@ -525,14 +529,15 @@ fn read_buffers(
             Some(Uri::File(uri)) => {
                 let file = resolve_uri(path, &uri).map_err(wrong)?;
                 let silent = Monitor { progress: &ignore_progress, token: monitor.token };
-                let stamp = FileStamp::of(&file);
-                let bytes = read::bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
-                    AssetError::Unreadable { path: missing, reason } => {
-                        let name = path.file_name().unwrap_or_default().to_string_lossy();
-                        AssetError::unreadable(&missing, missing_buffer(&reason, number, &name))
-                    }
-                    other => other,
-                })?;
+                let stamp = FileStamp::from_path(&file);
+                let bytes =
+                    read::read_bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
+                        AssetError::Unreadable { path: missing, reason } => {
+                            let name = path.file_name().unwrap_or_default().to_string_lossy();
+                            AssetError::unreadable(&missing, missing_buffer_message(&reason, number, &name))
+                        }
+                        other => other,
+                    })?;
                 files.push(Companion { path: file, hash: Some(read::hash(&bytes)), stamp });
                 bytes
             }
@@ -543,7 +548,7 @@ fn read_buffers(
         };
         if (bytes.len() as u64) < buffer.byte_length {
             let (has, claimed) = (bytes.len(), buffer.byte_length);
-            return Err(wrong(GltfError::new(short_buffer(claimed, has))));
+            return Err(wrong(GltfError::new(short_buffer_message(claimed, has))));
         }
         total += bytes.len() as u64;
         if total > FILE_LIMIT {
@@ -558,7 +563,7 @@ fn read_buffers(
 fn resolve_uri(path: &Path, uri: &str) -> Result<PathBuf, GltfError> {
     let has_scheme = uri.split(['/', '?', '#']).next().is_some_and(|first| first.contains(':'));
     if has_scheme || uri.starts_with('/') || uri.is_empty() {
-        return Err(GltfError::new(not_relative(uri)));
+        return Err(GltfError::new(not_relative_uri_message(uri)));
     }
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

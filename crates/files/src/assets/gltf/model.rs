@@ -29,14 +29,14 @@ impl GltfFile {
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the location in the JSON.
-    pub fn scene(&self, token: &CancelToken) -> Result<ModelScene, AssetError> {
+    pub fn convert_scene(&self, token: &CancelToken) -> Result<ModelScene, AssetError> {
         let mut walk = SceneWalk {
             container: self,
             scene: ModelScene::default(),
             notes: ImportNotes::default(),
             materials: HashMap::new(),
         };
-        walk.run().map_err(|wrong| self.wrong(wrong))?;
+        walk.run().map_err(|wrong| self.malformed_error(wrong))?;
         let SceneWalk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
@@ -52,27 +52,27 @@ impl GltfFile {
         for instance in &scene.instances {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
-                Entry::Vacant(new) => match self.part(instance.part, &ignore_progress, token) {
+                Entry::Vacant(new) => match self.build_part(instance.part, &ignore_progress, token) {
                     Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
                     loaded => {
                         let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {
                             first_wrong.get_or_insert(wrong);
                             TriangleMesh::default()
                         });
-                        let extremes = mesh.extremes();
+                        let extremes = mesh.extreme_vertices();
                         new.insert((mesh, extremes))
                     }
                 },
             };
             let placed = &instance.placed;
-            scene.outline.extend(extremes.iter().map(|at| placed.point(*at)));
+            scene.outline.extend(extremes.iter().map(|at| placed.transform_point(*at)));
             // Measure every vertex until the limit is reached, then only extreme points.
             vertices += mesh.positions.len();
             let all = mesh.positions.iter().map(|at| at.as_dvec3() + mesh.origin);
             let few = extremes.iter().copied();
             let places: &mut dyn Iterator<Item = DVec3> =
                 if vertices <= MAX_MEASURED { &mut { all } } else { &mut { few } };
-            for at in places.map(|at| placed.point(at)) {
+            for at in places.map(|at| placed.transform_point(at)) {
                 let [min, max] = scene.bounds.unwrap_or([at; 2]);
                 scene.bounds = Some([min.min(at), max.max(at)]);
             }
@@ -83,7 +83,7 @@ impl GltfFile {
                 let wrong = GltfError::new(format!(
                     "its mesh extends to {farthest:e}, but must stay below {LIMIT:e}"
                 ));
-                return Err(self.wrong(wrong.add_location(format!("nodes[{}]", instance.node))));
+                return Err(self.malformed_error(wrong.add_location(format!("nodes[{}]", instance.node))));
             }
             token.check()?;
         }
@@ -116,7 +116,7 @@ impl SceneWalk<'_> {
                     root.nodes.iter().flat_map(|node| node.children.iter().copied()).collect();
                 (0..root.nodes.len()).filter(|node| !children.contains(node)).collect()
             }
-            None => return Err(GltfError::index("scenes", number, root.scenes.len())),
+            None => return Err(GltfError::index_out_of_range("scenes", number, root.scenes.len())),
         };
         if roots.is_empty() && !root.nodes.is_empty() && root.scenes.is_empty() {
             return Err(GltfError::new("nodes: there is no root because every node is a child"));
@@ -144,9 +144,11 @@ impl SceneWalk<'_> {
         let mut pending: Vec<(usize, AffineMap, bool)> =
             roots.iter().rev().map(|node| (*node, AffineMap::IDENTITY, true)).collect();
         while let Some((number, parent, is_parent_visible)) = pending.pop() {
-            let node = nodes.get(number).ok_or_else(|| GltfError::index("nodes", number, nodes.len()))?;
+            let node = nodes
+                .get(number)
+                .ok_or_else(|| GltfError::index_out_of_range("nodes", number, nodes.len()))?;
             if worlds.of_node[number].is_some() {
-                return Err(GltfError::new(node_visited_twice(number)));
+                return Err(GltfError::new(node_visited_twice_message(number)));
             }
             let placed = parent.compose(local_transform(node));
             worlds.of_node[number] = Some(placed);
@@ -178,8 +180,8 @@ impl SceneWalk<'_> {
             let json = root
                 .cameras
                 .get(camera)
-                .ok_or_else(|| GltfError::index("cameras", camera, root.cameras.len()))?;
-            self.camera(json, &node.name, placed, &place);
+                .ok_or_else(|| GltfError::index_out_of_range("cameras", camera, root.cameras.len()))?;
+            self.add_camera(json, &node.name, placed, &place);
         }
         if !is_visible {
             return Ok(());
@@ -188,16 +190,18 @@ impl SceneWalk<'_> {
             let lights = &root.extensions.lights.lights;
             let json = lights
                 .get(light.light)
-                .ok_or_else(|| GltfError::index("lights", light.light, lights.len()))?;
+                .ok_or_else(|| GltfError::index_out_of_range("lights", light.light, lights.len()))?;
             check_intensity(json, light.light)?;
-            self.light(json, &node.name, placed, &place);
+            self.add_light(json, &node.name, placed, &place);
         }
         if node.extensions.instancing.is_some() {
             self.notes.add(&place, "instances are skipped: EXT_mesh_gpu_instancing is not supported");
         }
         let Some(mesh) = node.mesh else { return Ok(()) };
-        let json =
-            root.meshes.get(mesh).ok_or_else(|| GltfError::index("meshes", mesh, root.meshes.len()))?;
+        let json = root
+            .meshes
+            .get(mesh)
+            .ok_or_else(|| GltfError::index_out_of_range("meshes", mesh, root.meshes.len()))?;
         if json.weights.iter().chain(&node.weights).any(|weight| *weight != 0.0) {
             self.notes.add(&place, "morph targets are ignored; the base shape is shown");
         }
@@ -223,7 +227,7 @@ impl SceneWalk<'_> {
             }
             let material = self.material_index(primitive.material, container.coordinate_sets(primitive))?;
             let colors = container.attribute(primitive, "COLOR_0")?;
-            self.note_attributes(
+            self.note_ignored_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
                 primitive,
                 material,
@@ -243,7 +247,7 @@ impl SceneWalk<'_> {
     }
 
     /// Adds notes about ignored vertex attributes that would affect the primitive's material.
-    fn note_attributes(
+    fn note_ignored_attributes(
         &mut self,
         place: &str,
         primitive: &Primitive,
@@ -273,8 +277,8 @@ impl SceneWalk<'_> {
             Some(number) if number < materials.len() => {
                 convert_material(self.container, number, sets, &mut self.notes)?
             }
-            Some(number) => return Err(GltfError::index("materials", number, materials.len())),
-            None => ModelMaterial::named("default"),
+            Some(number) => return Err(GltfError::index_out_of_range("materials", number, materials.len())),
+            None => ModelMaterial::default_with_name("default"),
         };
         self.scene.materials.push(read);
         let index = self.scene.materials.len() - 1;
@@ -291,8 +295,10 @@ impl SceneWalk<'_> {
         place: &str,
     ) -> Result<Option<AffineMap>, GltfError> {
         let root = &self.container.root;
-        let skin =
-            root.skins.get(number).ok_or_else(|| GltfError::index("skins", number, root.skins.len()))?;
+        let skin = root
+            .skins
+            .get(number)
+            .ok_or_else(|| GltfError::index_out_of_range("skins", number, root.skins.len()))?;
         self.notes.add(place, "the skin is shown in its bind pose");
         let joint = skin.joints.first().and_then(|joint| *worlds.of_node.get(*joint)?);
         let Some(joint) = joint else { return Ok(None) };
@@ -311,7 +317,7 @@ impl SceneWalk<'_> {
         Ok(Some(joint.compose(bind)))
     }
 
-    fn light(&mut self, json: &JsonLight, node: &str, placed: AffineMap, place: &str) {
+    fn add_light(&mut self, json: &JsonLight, node: &str, placed: AffineMap, place: &str) {
         let kind = match json.kind.as_str() {
             "point" => ModelLightKind::Point,
             "directional" => ModelLightKind::Directional,
@@ -352,7 +358,7 @@ impl SceneWalk<'_> {
         });
     }
 
-    fn camera(&mut self, json: &JsonCamera, node: &str, placed: AffineMap, place: &str) {
+    fn add_camera(&mut self, json: &JsonCamera, node: &str, placed: AffineMap, place: &str) {
         let direction = (placed.linear * DVec3::NEG_Z).try_normalize();
         let up = (placed.linear * DVec3::Y).try_normalize();
         let (Some(direction), Some(up)) = (direction, up) else { return };
@@ -389,7 +395,7 @@ impl SceneWalk<'_> {
 }
 
 /// Error message for a node that is visited twice.
-pub(super) fn node_visited_twice(node: usize) -> String {
+pub(super) fn node_visited_twice_message(node: usize) -> String {
     format!("nodes[{node}] is its own ancestor or has two parents")
 }
 

@@ -5,7 +5,7 @@ use super::json::{Primitive, TRIANGLES};
 use super::{GltfError, GltfFile};
 use crate::assets::mesh::assemble::assemble;
 use crate::assets::mesh::parsed::{Faces, ParsedMesh};
-use crate::assets::mesh::{MeshSource, vertex_out_of_range};
+use crate::assets::mesh::{MeshSource, vertex_out_of_range_message};
 use crate::assets::read::Monitor;
 use crate::assets::{AssetError, LoadedMesh};
 use crate::control::{CancelToken, Progress};
@@ -46,7 +46,7 @@ impl GltfFile {
     }
 
     /// Number of parts in the file.
-    pub fn parts(&self) -> usize {
+    pub fn part_count(&self) -> usize {
         self.root.meshes.iter().map(|mesh| mesh.primitives.len()).sum()
     }
 
@@ -54,16 +54,18 @@ impl GltfFile {
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the location in the JSON, or [`AssetError::Cancelled`].
-    pub fn part(
+    pub fn build_part(
         &self,
         part: usize,
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
         let Some((place, primitive)) = self.primitive(part) else {
-            return Err(self.wrong(GltfError::index("part", part, self.parts())));
+            return Err(self.malformed_error(GltfError::index_out_of_range("part", part, self.part_count())));
         };
-        let parsed = self.parsed(primitive).map_err(|wrong| self.wrong(wrong.add_location(place.clone())))?;
+        let parsed = self
+            .parse_primitive(primitive)
+            .map_err(|wrong| self.malformed_error(wrong.add_location(place.clone())))?;
         let source = MeshSource { path: &self.path, bytes: &[], monitor: Monitor { progress, token } };
         let mut loaded = assemble(&source, parsed).map_err(|error| match error {
             AssetError::Malformed { path, line, reason } => {
@@ -72,11 +74,11 @@ impl GltfFile {
             other => other,
         })?;
         loaded.hash = self.hash;
-        (loaded.companions, loaded.pictures) = (self.companions.clone(), self.pictures());
+        (loaded.companions, loaded.pictures) = (self.companions.clone(), self.image_file_paths());
         Ok(loaded)
     }
 
-    fn parsed(&self, primitive: &Primitive) -> Result<ParsedMesh, GltfError> {
+    fn parse_primitive(&self, primitive: &Primitive) -> Result<ParsedMesh, GltfError> {
         if primitive.extensions.contains_key(super::DRACO) {
             return Err(GltfError::new("Draco compression is not supported"));
         }
@@ -88,7 +90,7 @@ impl GltfFile {
         let positions = positions.ok_or_else(|| GltfError::new("it has no positions"))?;
         if positions.width != 3 {
             let width = positions.width;
-            let reason = wrong_width(width);
+            let reason = wrong_component_count_message(width);
             return Err(GltfError::new(reason).add_location("POSITION"));
         }
         let (corners, vertices) = self.corner_indices(primitive, positions.count)?;
@@ -159,9 +161,9 @@ impl GltfFile {
         if !indices.are_indices() {
             return Err(GltfError::new("indices must be integers").add_location("indices"));
         }
-        let mut corners: Vec<u32> = (0..indices.count).map(|place| indices.index(place)).collect();
+        let mut corners: Vec<u32> = (0..indices.count).map(|place| indices.read_index(place)).collect();
         if let Some(vertex) = corners.iter().find(|corner| **corner as usize >= vertices) {
-            return Err(GltfError::new(vertex_out_of_range(i64::from(*vertex), vertices as u64)));
+            return Err(GltfError::new(vertex_out_of_range_message(i64::from(*vertex), vertices as u64)));
         }
         if corners.len() >= vertices / 2 {
             return Ok((corners, all()));
@@ -176,7 +178,7 @@ impl GltfFile {
     }
 }
 
-pub(super) fn wrong_width(width: usize) -> String {
+pub(super) fn wrong_component_count_message(width: usize) -> String {
     format!("expected VEC3, found {width} components")
 }
 
@@ -184,7 +186,7 @@ pub(super) fn wrong_width(width: usize) -> String {
 fn triangulate(mode: u32, corners: &[u32]) -> Faces {
     let mut faces = Faces::default();
     let mut add = |triangle: [u32; 3]| {
-        triangle.iter().for_each(|corner| faces.corner(*corner));
+        triangle.iter().for_each(|corner| faces.push_corner(*corner));
         faces.end_face(3);
     };
     match mode {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use super::accessor::{too_many_zeros, view_too_short};
+use super::accessor::{too_many_zeros_message, view_too_short_message};
 use super::model::UNKNOWN_CAMERA;
 use super::*;
 use crate::assets::{LoadedMesh, rejection};
@@ -35,11 +35,11 @@ fn open_json(json: &Value) -> Result<GltfFile, AssetError> {
 }
 
 fn part(container: &GltfFile, number: usize) -> Result<LoadedMesh, AssetError> {
-    container.part(number, &ignore_progress, &CancelToken::new())
+    container.build_part(number, &ignore_progress, &CancelToken::new())
 }
 
 fn scene(container: &GltfFile) -> Result<ModelScene, AssetError> {
-    container.scene(&CancelToken::new())
+    container.convert_scene(&CancelToken::new())
 }
 
 /// Returns the error from opening a file, converting its scene or building its first part.
@@ -138,7 +138,7 @@ fn parts_do_not_depend_on_buffer_storage() {
     let container = folder.open("c.gltf", external.to_string().as_bytes()).expect("read");
     let loaded = part(&container, 0).expect("a mesh");
     let hash = Some(*blake3::hash(&bytes()).as_bytes());
-    let stamp = FileStamp::of(&file);
+    let stamp = FileStamp::from_path(&file);
     assert_eq!(
         (loaded.mesh, loaded.companions),
         (embedded.mesh, vec![Companion { path: file, hash, stamp }])
@@ -236,8 +236,8 @@ fn nodes_transform_parts_cameras_and_lights() {
     // A quarter turn about y maps x to −z and z to x.
     let near = |a: DVec3, b: DVec3| (a - b).length() < 1e-12;
     let plate = &scene.instances[0];
-    assert!(near(plate.placed.point(DVec3::ZERO), DVec3::new(0.0, 0.0, -2.0)));
-    assert!(near(plate.placed.point(DVec3::new(2.0, 1.0, 0.0)), DVec3::new(0.0, 2.0, -6.0)));
+    assert!(near(plate.placed.transform_point(DVec3::ZERO), DVec3::new(0.0, 0.0, -2.0)));
+    assert!(near(plate.placed.transform_point(DVec3::new(2.0, 1.0, 0.0)), DVec3::new(0.0, 2.0, -6.0)));
     assert_eq!((plate.name.as_str(), plate.has_normals, plate.has_colors), ("plate", false, false));
     let camera = &scene.cameras[0];
     assert!(near(camera.position, DVec3::new(10.0, 0.0, 0.0)) && near(camera.direction, DVec3::NEG_X));
@@ -283,7 +283,7 @@ fn material_extensions_are_converted() {
     );
     let Alpha::Mask { value, cutoff } = &material.alpha else { panic!("a mask") };
     assert_eq!((value.factor.x, *cutoff, value.texture.is_some()), (0.5, 0.25, true));
-    let notes = ["sheen is ignored".to_owned(), materials::extension_ignored("MY_own")];
+    let notes = ["sheen is ignored".to_owned(), materials::extension_ignored_note("MY_own")];
     assert_eq!(scene.notes, notes.map(|note| format!("materials[0]: {note}")));
     assert_eq!(scene.images, ["paint"]);
 }
@@ -357,28 +357,28 @@ fn errors_include_their_location() {
         error(&json)
     };
     let vertex_view = |count, needed| {
-        let view = view_too_short(count, 0, needed, "bufferViews[0]", 48);
+        let view = view_too_short_message(count, 0, needed, "bufferViews[0]", 48);
         format!("meshes[0].primitives[0]: POSITION: accessors[0]: {view}")
     };
     for (pointer, value, reason) in [
-        ("/asset/version", json!("1.0"), unsupported_version("1.0")),
-        ("/scenes/0/nodes/0", json!(7), GltfError::index("nodes", 7, 1).0),
-        ("/nodes/0/mesh", json!(3), GltfError::index("meshes", 3, 1).add_location("nodes[0]").0),
+        ("/asset/version", json!("1.0"), unsupported_version_message("1.0")),
+        ("/scenes/0/nodes/0", json!(7), GltfError::index_out_of_range("nodes", 7, 1).0),
+        ("/nodes/0/mesh", json!(3), GltfError::index_out_of_range("meshes", 3, 1).add_location("nodes[0]").0),
         (
             "/meshes/0/primitives/0/indices",
             json!(9),
-            GltfError::index("accessors", 9, 3)
+            GltfError::index_out_of_range("accessors", 9, 3)
                 .add_location("indices")
                 .add_location("meshes[0].primitives[0]")
                 .0,
         ),
         ("/accessors/0/count", json!(5), vertex_view(5, 60)),
         ("/accessors/0/count", json!(4_000_000_000_u32), vertex_view(4_000_000_000, 48_000_000_000)),
-        ("/buffers/0/byteLength", json!(93), format!("buffers[0]: {}", short_buffer(93, 92))),
+        ("/buffers/0/byteLength", json!(93), format!("buffers[0]: {}", short_buffer_message(93, 92))),
         (
             "/buffers/0/uri",
             json!("https://a/b.bin"),
-            format!("buffers[0]: {}", not_relative("https://a/b.bin")),
+            format!("buffers[0]: {}", not_relative_uri_message("https://a/b.bin")),
         ),
     ] {
         let found = with(&|json| *json.pointer_mut(pointer).expect("a place") = value.clone());
@@ -390,26 +390,26 @@ fn errors_include_their_location() {
         ("/accessors/0/bufferView", json!(8), "bufferViews[8]"),
         ("/bufferViews/0/byteLength", json!(u64::MAX), "18446744073709551615"),
         ("/bufferViews/1/byteOffset", json!(90), "90 + 12"),
-        ("/buffers/0/uri", json!("data:;base64,Z?=="), &json::invalid_base64(b'?', 1)),
+        ("/buffers/0/uri", json!("data:;base64,Z?=="), &json::invalid_base64_message(b'?', 1)),
         ("/accessors/1/count", json!(-1), "-1"),
     ] {
         let found = with(&|json| *json.pointer_mut(pointer).expect("a place") = value.clone());
         assert!(found.contains(part), "{pointer}: {found}");
     }
     let nodes = |nodes: Value| with(&|json| json["nodes"] = nodes.clone());
-    assert_eq!(nodes(json!([{"children": [0]}])), model::node_visited_twice(0));
-    assert_eq!(nodes(json!([{"children": [1, 1]}, {"mesh": 0}])), model::node_visited_twice(1));
+    assert_eq!(nodes(json!([{"children": [0]}])), model::node_visited_twice_message(0));
+    assert_eq!(nodes(json!([{"children": [1, 1]}, {"mesh": 0}])), model::node_visited_twice_message(1));
     for (name, help) in &MISSING[..4] {
         let found = with(&|json| json["extensionsRequired"] = json!([name]));
-        assert_eq!(found, unsupported_extension(name, help));
+        assert_eq!(found, unsupported_extension_message(name, help));
     }
     let mut external = square();
     external["buffers"][0]["uri"] = json!("none.bin");
     let missing = crate::system::describe_error(&std::io::Error::from_raw_os_error(nix::libc::ENOENT));
-    assert_eq!(rejection(open_json(&external)).1, missing_buffer(&missing, 0, "a.gltf"));
+    assert_eq!(rejection(open_json(&external)).1, missing_buffer_message(&missing, 0, "a.gltf"));
     let zeros = json!({"componentType": 5126, "count": 4_000_000_000_u32, "type": "VEC3"});
     let found = with(&|json| json["accessors"][0] = zeros.clone());
-    assert!(found.ends_with(&too_many_zeros(4_000_000_000)), "{found}");
+    assert!(found.ends_with(&too_many_zeros_message(4_000_000_000)), "{found}");
 }
 
 /// Primitives that reuse the same buffer bytes could need far more memory than the file size suggests.
@@ -422,7 +422,7 @@ fn buffer_byte_reuse_is_limited() {
     json["accessors"] = json!(accessors);
     let primitives: Vec<Value> = (0..400).map(|number| json!({"attributes": {"POSITION": number}})).collect();
     json["meshes"][0]["primitives"] = json!(primitives);
-    assert_eq!(error(&json), too_many_corners(400 << 20, 92, 92 + (1 << 20)));
+    assert_eq!(error(&json), too_many_corners_message(400 << 20, 92, 92 + (1 << 20)));
 }
 
 /// Primitives with the same mesh share one part, with the texture coordinates used by their materials.
@@ -460,7 +460,7 @@ fn corner_limit_counts_all_built_primitives() {
     json["meshes"][0]["primitives"] = json!(primitives(4));
     assert!(open_json(&json).is_ok());
     json["meshes"][0]["primitives"] = json!(primitives(5));
-    assert_eq!(error(&json), too_many_corners(40 * 3 * 9_998, 92, 92 + (1 << 20)));
+    assert_eq!(error(&json), too_many_corners_message(40 * 3 * 9_998, 92, 92 + (1 << 20)));
 }
 
 #[test]
@@ -470,13 +470,13 @@ fn unknown_required_extensions_are_rejected() {
         json!(["KHR_texture_transform", "KHR_materials_sheen", "KHR_mesh_quantization"]);
     assert!(open_json(&json).is_ok());
     json["extensionsRequired"] = json!(["KHR_texture_transform", "FOO_bar"]);
-    assert_eq!(error(&json), unknown_required("FOO_bar"));
+    assert_eq!(error(&json), unknown_extension_message("FOO_bar"));
 }
 
 #[test]
 fn old_versions_and_wrong_types_are_rejected() {
     let old = json!({"asset": {"version": "1.0"}, "nodes": {"a": {}}, "meshes": {}});
-    assert_eq!(error(&old), unsupported_version("1.0"));
+    assert_eq!(error(&old), unsupported_version_message("1.0"));
     for (pointer, value, rust, json_terms) in [
         (
             "/nodes/0/mesh",
@@ -493,14 +493,17 @@ fn old_versions_and_wrong_types_are_rejected() {
         ("/nodes", json!({}), "map, expected a sequence", "object, expected an array"),
         ("/nodes/0", json!(7), "integer `7`, expected struct JsonNode", "integer `7`, expected an object"),
     ] {
-        assert_eq!(with_json_terms(&format!("invalid type: {rust}")), format!("invalid type: {json_terms}"));
+        assert_eq!(
+            replace_rust_terms(&format!("invalid type: {rust}")),
+            format!("invalid type: {json_terms}")
+        );
         let mut json = square();
         *json.pointer_mut(pointer).expect("a place") = value;
         assert!(error(&json).ends_with(json_terms), "{pointer}: {}", error(&json));
     }
     let mut flat = square();
     flat["accessors"][0]["type"] = json!("VEC2");
-    assert!(error(&flat).ends_with(&part::wrong_width(2)), "{}", error(&flat));
+    assert!(error(&flat).ends_with(&part::wrong_component_count_message(2)), "{}", error(&flat));
 }
 
 /// Some programs write unpadded chunks, or extra bytes past the length declared in the header.
@@ -553,7 +556,7 @@ fn image_errors_include_the_image_index() {
     check(0, "none.png");
     check(1, "damaged.png");
     check(2, "8 × 8");
-    check(4, &image::unknown_format());
+    check(4, &image::unknown_format_message());
     assert!(container.check_image(3, &token).is_ok());
     assert!(
         container.check_image_header(1, &token).is_ok() && container.check_image_header(0, &token).is_err()
@@ -572,7 +575,7 @@ fn truncated_and_invalid_glbs_are_rejected() {
     }
     let mut old = complete;
     old[4] = 1;
-    assert_eq!(rejection(folder.open("a.glb", &old)).1, unsupported_glb(1));
+    assert_eq!(rejection(folder.open("a.glb", &old)).1, unsupported_glb_message(1));
     assert_eq!(rejection(folder.open("a.glb", b"PK\x03\x04")).1, NEITHER_GLB_NOR_JSON);
 }
 
@@ -595,7 +598,7 @@ proptest! {
         if let Ok(container) = GltfDir::new().open("a.glb", &file) {
             let _ = scene(&container);
             let _ = container.merged_scene(&CancelToken::new());
-            for number in 0..container.parts() {
+            for number in 0..container.part_count() {
                 let _ = part(&container, number);
             }
         }
@@ -656,12 +659,12 @@ fn newer_versions_are_rejected() {
             Err(error) => {
                 assert!(!is_read, "{asset}: {error}");
                 let required = asset["minVersion"].as_str().expect("text");
-                assert_eq!(rejection(Err::<(), _>(error)).1, newer_version(required));
+                assert_eq!(rejection(Err::<(), _>(error)).1, newer_version_required_message(required));
             }
         }
     }
     json["asset"] = json!({"version": "2.0", "minVersion": "x"});
-    assert_eq!(error(&json), invalid_version("x"));
+    assert_eq!(error(&json), invalid_min_version_message("x"));
 }
 
 #[test]

@@ -40,12 +40,12 @@ impl ProgressReporter {
 /// or cancellation.
 ///
 /// Abandoned work still uses memory, so new work starts only after all abandoned work has finished.
-pub(super) fn run<T: Send + 'static>(
+pub(super) fn run_on_thread<T: Send + 'static>(
     monitor: Monitor<'_>,
     total: u64,
     work: impl FnOnce(ProgressReporter) -> T + Send + 'static,
 ) -> Result<Option<T>, Cancelled> {
-    wait_for_abandoned(monitor.token)?;
+    wait_for_abandoned_threads(monitor.token)?;
     let (report, reports) = mpsc::sync_channel(QUEUE_LENGTH);
     let (send, result) = mpsc::channel();
     // Keep a handle to the work in case the thread does not start.
@@ -60,14 +60,14 @@ pub(super) fn run<T: Send + 'static>(
     let Ok(thread) = spawn("glimt-image", run) else {
         return Ok(take(&work).map(|work| work(ProgressReporter(None))));
     };
-    let waited = wait(&reports, &result, monitor, total);
+    let waited = wait_for_result(&reports, &result, monitor, total);
     if waited.is_err() {
-        abandoned().push(thread);
+        lock_abandoned_threads().push(thread);
     }
     waited
 }
 
-fn wait<T>(
+fn wait_for_result<T>(
     reports: &Receiver<u64>,
     result: &Receiver<T>,
     monitor: Monitor<'_>,
@@ -75,7 +75,7 @@ fn wait<T>(
 ) -> Result<Option<T>, Cancelled> {
     loop {
         match reports.recv_timeout(POLL) {
-            Ok(done) => monitor.tick(done as usize, total as usize)?,
+            Ok(done) => monitor.report_progress(done as usize, total as usize)?,
             Err(RecvTimeoutError::Timeout) => monitor.token.check()?,
             // The decoder has dropped its reporter, so it has read everything.
             Err(RecvTimeoutError::Disconnected) => break,
@@ -90,10 +90,10 @@ fn wait<T>(
     }
 }
 
-fn wait_for_abandoned(token: &CancelToken) -> Result<(), Cancelled> {
+fn wait_for_abandoned_threads(token: &CancelToken) -> Result<(), Cancelled> {
     loop {
         token.check()?;
-        let mut threads = abandoned();
+        let mut threads = lock_abandoned_threads();
         threads.retain(|thread| !thread.is_finished());
         if threads.is_empty() {
             return Ok(());
@@ -103,7 +103,7 @@ fn wait_for_abandoned(token: &CancelToken) -> Result<(), Cancelled> {
     }
 }
 
-fn abandoned() -> std::sync::MutexGuard<'static, Vec<JoinHandle<()>>> {
+fn lock_abandoned_threads() -> std::sync::MutexGuard<'static, Vec<JoinHandle<()>>> {
     ABANDONED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -126,12 +126,12 @@ mod tests {
             let _ = send.send((in_time, report.report_bytes_read(1).is_err()));
         };
         let monitor = Monitor { progress: &ignore_progress, token: &token };
-        assert_eq!(run(monitor, 1, stuck).err(), Some(Cancelled));
+        assert_eq!(run_on_thread(monitor, 1, stuck).err(), Some(Cancelled));
         release.send(()).expect("the work is still waiting");
         let fresh = CancelToken::new();
         let next = move |_| ended.try_recv();
-        let ended =
-            run(Monitor { progress: &ignore_progress, token: &fresh }, 1, next).expect("not cancelled");
+        let ended = run_on_thread(Monitor { progress: &ignore_progress, token: &fresh }, 1, next)
+            .expect("not cancelled");
         assert_eq!(ended, Some(Ok((true, true))));
     }
 
@@ -144,9 +144,12 @@ mod tests {
         let work = |report: ProgressReporter| {
             (1..=3).map(|i| report.report_bytes_read(i).is_ok()).collect::<Vec<_>>()
         };
-        assert_eq!(run(monitor, 3, work), Ok(Some(vec![true; 3])));
+        assert_eq!(run_on_thread(monitor, 3, work), Ok(Some(vec![true; 3])));
         assert_eq!(*seen.lock().expect("no panic"), [(1, 3), (2, 3), (3, 3)]);
         let panics = |_| crate::assets::catch_panic::catch_panic(|| panic!("broken"));
-        assert_eq!(run::<Result<(), String>>(monitor, 3, panics), Ok(Some(Err("broken".to_owned()))));
+        assert_eq!(
+            run_on_thread::<Result<(), String>>(monitor, 3, panics),
+            Ok(Some(Err("broken".to_owned())))
+        );
     }
 }

@@ -15,7 +15,7 @@ use super::hdr::HdrDecoder;
 use super::metadata::{AlphaUsage, ImageMetadata};
 use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
-use super::{empty_image, exceeds_memory, implausible_size, side_too_long};
+use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
 
 /// A decoder, with metadata that the decoder itself does not apply.
 pub(super) struct OpenedImage {
@@ -53,12 +53,14 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
         }
         Some(ImageFormat::Jpeg) => {
-            with_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
+            decoder_with_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
         }
-        Some(ImageFormat::Pnm) => with_profile(PnmDecoder::new(reader.into_inner())?, encoding, memory_bytes),
+        Some(ImageFormat::Pnm) => {
+            decoder_with_profile(PnmDecoder::new(reader.into_inner())?, encoding, memory_bytes)
+        }
         Some(ImageFormat::Bmp) => {
             let (decoder, mut metadata) =
-                with_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
+                decoder_with_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
             metadata.alpha = AlphaUsage::UnusedIfZero;
             Ok((decoder, metadata))
         }
@@ -67,8 +69,9 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             // Errors are reported by the decoder below.
             let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
             file.seek(SeekFrom::Start(0))?;
-            let (decoder, mut metadata) = with_profile(WebPDecoder::new(file)?, encoding, memory_bytes)?;
-            metadata.warn_of_frames(frames);
+            let (decoder, mut metadata) =
+                decoder_with_profile(WebPDecoder::new(file)?, encoding, memory_bytes)?;
+            metadata.warn_about_extra_frames(frames);
             Ok((decoder, metadata))
         }
         format => {
@@ -79,7 +82,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
 }
 
 /// Sets a decoder's memory limit, and reads the color profile if the encoding uses it.
-fn with_profile(
+fn decoder_with_profile(
     mut decoder: impl ImageDecoder + 'static,
     encoding: ImageEncoding,
     memory_bytes: u64,
@@ -107,9 +110,9 @@ pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation,
 }
 
 /// Size of a texel produced by [`texels`](super::convert::texels).
-pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &ImageMetadata) -> u64 {
+pub(super) fn bytes_per_texel(color: ColorType, encoding: ImageEncoding, metadata: &ImageMetadata) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
-    let is_packed = sample_bytes == 1 && encoding.space(metadata).is_default();
+    let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
     match encoding {
         ImageEncoding::CutOut(_) if color.has_alpha() => {
             if is_packed && metadata.alpha != AlphaUsage::Premultiplied { 4 } else { 16 }
@@ -122,7 +125,7 @@ pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &
 /// Memory allowed for any image, regardless of its file size.
 const SMALL_BYTES: u64 = 256 << 20;
 /// Maximum ratio of memory size to file size for a format. The memory holds the decoded image and its texels.
-pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
+pub(super) fn max_decompression_ratio(format: Option<ImageFormat>) -> u64 {
     match format {
         // Worst case: eight pixels per byte in a bitmap.
         Some(ImageFormat::Pnm) => 64,
@@ -147,19 +150,19 @@ pub(super) fn check_size(
 ) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
-        return Err(empty_image(width, height));
+        return Err(empty_image_message(width, height));
     }
     if width.max(height) > limits.side {
-        return Err(side_too_long(width, height, limits.side));
+        return Err(side_too_long_message(width, height, limits.side));
     }
     let texels = u64::from(width) * u64::from(height) * texel_bytes;
     let needed = decoder.total_bytes().saturating_add(texels.max(in_memory)).saturating_add(held_bytes);
     if needed > limits.memory_bytes {
-        return Err(exceeds_memory(width, height, needed, limits.memory_bytes));
+        return Err(memory_limit_message(width, height, needed, limits.memory_bytes));
     }
     // A few run-length encoded bytes can expand to a large image.
     if needed > SMALL_BYTES.saturating_add(length.saturating_mul(max_expansion)) {
-        return Err(implausible_size(width, height, needed, length));
+        return Err(implausible_size_message(width, height, needed, length));
     }
     Ok(texels)
 }

@@ -28,7 +28,7 @@ impl<R: BufRead> HdrDecoder<R> {
         let mut limited = (&mut file).take(HEADER_BYTES);
         let header = HdrHeader::read(&mut limited);
         if limited.limit() == 0 {
-            return Err(error(header_too_long()));
+            return Err(decoding_error(header_too_long_message()));
         }
         Ok(Self { header: header?, file })
     }
@@ -60,7 +60,7 @@ impl<R: BufRead> ImageDecoder for HdrDecoder<R> {
         for line in 0..scan.slow.count {
             read_scanline(&mut file, scan.fast.count as usize, &mut pixels)?;
             for (along, pixel) in pixels.iter().enumerate() {
-                let start = PIXEL_BYTES * scan.index(line as usize, along);
+                let start = PIXEL_BYTES * scan.pixel_index(line as usize, along);
                 let values = decode_rgbe(*pixel, scales).map(f32::to_ne_bytes);
                 samples[start..start + PIXEL_BYTES].copy_from_slice(values.as_flattened());
             }
@@ -86,7 +86,7 @@ impl HdrHeader {
         let mut lines = HeaderLines { file, number: 0, line: Vec::new() };
         let first = lines.next()?;
         if !first.as_bytes().starts_with(MAGIC) {
-            return Err(error("expected #? at the start".to_owned()));
+            return Err(decoding_error("expected #? at the start".to_owned()));
         }
         let mut variables = HeaderVariables::default();
         let scan = loop {
@@ -97,10 +97,10 @@ impl HdrHeader {
                 break scan;
             }
             if !line.trim().is_empty() {
-                variables.add(&line, number).map_err(error)?;
+                variables.add(&line, number).map_err(decoding_error)?;
             }
         };
-        Ok(variables.header(scan))
+        Ok(variables.into_header(scan))
     }
 }
 
@@ -150,7 +150,7 @@ impl HeaderVariables {
                     true
                 }
                 other => {
-                    return Err(unsupported_encoding(other));
+                    return Err(unsupported_format_message(other));
                 }
             },
             "EXPOSURE" => parse_numbers(value).filter(are_positive).is_some_and(|[factor]: [f64; 1]| {
@@ -172,12 +172,12 @@ impl HeaderVariables {
         };
         if !is_known {
             let line: String = line.chars().take(60).collect();
-            self.warnings.push(ImageWarning { line: Some(number), words: line_ignored(&line) });
+            self.warnings.push(ImageWarning { line: Some(number), words: line_ignored_warning(&line) });
         }
         Ok(())
     }
 
-    fn header(self, scan: ScanOrder) -> HdrHeader {
+    fn into_header(self, scan: ScanOrder) -> HdrHeader {
         let correction = self.correction.unwrap_or([1.0; 3]);
         let unit = if self.is_xyz { WHITE_EFFICACY } else { 1.0 };
         let exposure = self.exposure.unwrap_or(1.0) * unit;
@@ -192,16 +192,16 @@ impl HeaderVariables {
     }
 }
 
-pub(super) fn header_too_long() -> String {
+pub(super) fn header_too_long_message() -> String {
     format!("the header is longer than {} MiB", HEADER_BYTES >> 20)
 }
 
-pub(super) fn unsupported_encoding(found: &str) -> String {
+pub(super) fn unsupported_format_message(found: &str) -> String {
     format!("format {found:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze")
 }
 
 /// Warning about an ignored header line.
-pub(super) fn line_ignored(line: &str) -> String {
+pub(super) fn line_ignored_warning(line: &str) -> String {
     format!("`{line}` is ignored")
 }
 
@@ -267,7 +267,7 @@ impl ScanOrder {
     }
 
     /// Index of a pixel in row-major order from the top left.
-    fn index(&self, line: usize, along: usize) -> usize {
+    fn pixel_index(&self, line: usize, along: usize) -> usize {
         let (slow, fast) = (self.slow.coordinate(line), self.fast.coordinate(along));
         let (column, row) = if self.slow.is_vertical { (fast, slow) } else { (slow, fast) };
         row * self.size().0 as usize + column
@@ -295,7 +295,7 @@ fn read_scanline(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) 
         return read_flat_scanline(file, first, count, pixels);
     }
     if usize::from(u16::from_be_bytes([high, low])) != count {
-        return Err(error(WRONG_LENGTH.to_owned()));
+        return Err(decoding_error(WRONG_LENGTH.to_owned()));
     }
     pixels.resize(count, [0; 4]);
     (0..4).try_for_each(|channel| read_run_length_channel(file, channel, pixels))
@@ -308,7 +308,7 @@ fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[
         let [code] = read_bytes(file)?;
         let length = usize::from(if code > 128 { code - 128 } else { code });
         let run = pixels.get_mut(done..done + length).filter(|run| !run.is_empty());
-        let Some(run) = run else { return Err(error(RUN_TOO_LONG.to_owned())) };
+        let Some(run) = run else { return Err(decoding_error(RUN_TOO_LONG.to_owned())) };
         if code > 128 {
             let [value] = read_bytes(file)?;
             run.iter_mut().for_each(|pixel| pixel[channel] = value);
@@ -343,7 +343,7 @@ fn read_flat_scanline(
         let length = usize::from(times).checked_shl(shift).unwrap_or(usize::MAX);
         let previous = pixels.last().copied().filter(|_| length <= count - pixels.len());
         let Some(previous) = previous else {
-            return Err(error(RUN_TOO_LONG.to_owned()));
+            return Err(decoding_error(RUN_TOO_LONG.to_owned()));
         };
         pixels.resize(pixels.len() + length, previous);
         shift += 8;
@@ -361,6 +361,6 @@ fn read_bytes<const N: usize>(file: &mut impl Read) -> ImageResult<[u8; N]> {
     Ok(bytes)
 }
 
-fn error(reason: String) -> ImageError {
+fn decoding_error(reason: String) -> ImageError {
     ImageError::Decoding(DecodingError::new(ImageFormatHint::Exact(ImageFormat::Hdr), reason))
 }

@@ -2,7 +2,7 @@
 //! tables are not supported.
 
 use super::primaries::colorants_to_rec_709;
-use super::space::{ColorSpace, Curve};
+use super::space::{ColorSpace, TransferFunction};
 use crate::math::{DMat3, DVec3};
 
 /// Maximum length of a curve's table.
@@ -11,8 +11,8 @@ const MAX_VALUES: usize = 1 << 16;
 /// Returns the color space from a profile for a gray or RGB image, or the reason for ignoring the profile.
 pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
     let profile = IccProfile::parse(profile).ok_or(MALFORMED)?;
-    match (profile.field(16), profile.field(20)) {
-        (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb(),
+    match (profile.read_four_bytes(16), profile.read_four_bytes(20)) {
+        (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb_color_space(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
             let curve = profile.curve(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
             Ok(ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), DMat3::IDENTITY))
@@ -20,7 +20,7 @@ pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<Color
         (Some(b"RGB "), Some(b"Lab ")) if !is_gray => Err(LOOKUP_TABLES.to_owned()),
         (Some(space), _) => {
             let space = String::from_utf8_lossy(space).trim().to_owned();
-            Err(wrong_space(&space, is_gray))
+            Err(wrong_color_space_message(&space, is_gray))
         }
         (None, _) => Err(MALFORMED.to_owned()),
     }
@@ -32,7 +32,7 @@ pub(super) const UNSUPPORTED_CURVES: &str = "missing or unsupported curves";
 pub(super) const DEGENERATE_PRIMARIES: &str = "degenerate primaries";
 
 /// Warning about a profile that is ignored because of its color space.
-pub(super) fn wrong_space(found: &str, is_gray: bool) -> String {
+pub(super) fn wrong_color_space_message(found: &str, is_gray: bool) -> String {
     format!("its color space is {found:?}, not {}", if is_gray { "gray" } else { "RGB" })
 }
 
@@ -41,28 +41,30 @@ struct IccProfile<'a>(&'a [u8]);
 impl<'a> IccProfile<'a> {
     fn parse(bytes: &'a [u8]) -> Option<Self> {
         let profile = Self(bytes);
-        (profile.field(36)? == b"acsp").then_some(profile)
+        (profile.read_four_bytes(36)? == b"acsp").then_some(profile)
     }
 
-    fn field(&self, at: usize) -> Option<&'a [u8; 4]> {
+    fn read_four_bytes(&self, at: usize) -> Option<&'a [u8; 4]> {
         self.0.get(at..)?.first_chunk()
     }
 
-    fn word(&self, at: usize) -> Option<usize> {
-        self.field(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
+    fn read_u32(&self, at: usize) -> Option<usize> {
+        self.read_four_bytes(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
     }
 
     /// Returns a tag's data.
     fn tag(&self, name: &[u8; 4]) -> Option<&'a [u8]> {
         const TABLE: usize = 128;
-        let count = self.word(TABLE)?.min(self.0.len() / 12);
-        let entry = (0..count).map(|i| TABLE + 4 + 12 * i).find(|&entry| self.field(entry) == Some(name))?;
-        let start = self.word(entry + 4)?;
-        self.0.get(start..start.checked_add(self.word(entry + 8)?)?)
+        let count = self.read_u32(TABLE)?.min(self.0.len() / 12);
+        let entry = (0..count)
+            .map(|i| TABLE + 4 + 12 * i)
+            .find(|&entry| self.read_four_bytes(entry) == Some(name))?;
+        let start = self.read_u32(entry + 4)?;
+        self.0.get(start..start.checked_add(self.read_u32(entry + 8)?)?)
     }
 
-    fn rgb(&self) -> Result<ColorSpace, String> {
-        let [red, green, blue] = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| self.xyz(name));
+    fn rgb_color_space(&self) -> Result<ColorSpace, String> {
+        let [red, green, blue] = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| self.read_xyz_tag(name));
         let (Some(red), Some(green), Some(blue)) = (red, green, blue) else {
             return Err(LOOKUP_TABLES.to_owned());
         };
@@ -78,40 +80,40 @@ impl<'a> IccProfile<'a> {
         Ok(ColorSpace::new(Some([r, g, b]), matrix))
     }
 
-    fn xyz(&self, name: &[u8; 4]) -> Option<DVec3> {
+    fn read_xyz_tag(&self, name: &[u8; 4]) -> Option<DVec3> {
         let data = Self(self.tag(name)?);
-        (data.field(0)? == b"XYZ ").then_some(())?;
+        (data.read_four_bytes(0)? == b"XYZ ").then_some(())?;
         let [x, y, z] = [8, 12, 16].map(|at| data.s15_fixed_16(at));
         Some(DVec3::new(x?, y?, z?))
     }
 
     /// Reads an s15Fixed16 number.
     fn s15_fixed_16(&self, at: usize) -> Option<f64> {
-        self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
+        self.read_four_bytes(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }
 
-    fn curve(&self, name: &[u8; 4]) -> Option<Curve> {
+    fn curve(&self, name: &[u8; 4]) -> Option<TransferFunction> {
         let data = Self(self.tag(name)?);
-        match data.field(0)? {
-            b"curv" => data.sampled(),
-            b"para" => data.parametric(),
+        match data.read_four_bytes(0)? {
+            b"curv" => data.parse_sampled_curve(),
+            b"para" => data.parse_parametric_curve(),
             _ => None,
         }
     }
 
-    fn sampled(&self) -> Option<Curve> {
+    fn parse_sampled_curve(&self) -> Option<TransferFunction> {
         const START: usize = 12;
-        let count = self.word(8)?;
+        let count = self.read_u32(8)?;
         let values = self.0.get(START..START + 2 * count.min(MAX_VALUES))?;
         let values: Vec<u16> = values.as_chunks().0.iter().map(|word| u16::from_be_bytes(*word)).collect();
         match *values.as_slice() {
-            [] => Some(Curve::LINEAR),
-            [gamma] => Some(Curve::Power(f64::from(gamma) / 256.0)),
-            _ => Some(Curve::Table(values)),
+            [] => Some(TransferFunction::LINEAR),
+            [gamma] => Some(TransferFunction::Power(f64::from(gamma) / 256.0)),
+            _ => Some(TransferFunction::Table(values)),
         }
     }
 
-    fn parametric(&self) -> Option<Curve> {
+    fn parse_parametric_curve(&self) -> Option<TransferFunction> {
         let kind = u16::from_be_bytes(*self.0.get(8..)?.first_chunk()?);
         let number = |index: usize| self.s15_fixed_16(12 + 4 * index);
         let g = number(0)?;
@@ -131,6 +133,6 @@ impl<'a> IccProfile<'a> {
             _ => return None,
         }
         [g, a, b, c, d, e, f].iter().all(|number| number.is_finite()).then_some(())?;
-        Some(Curve::Parametric { g, a, b, c, d, e, f })
+        Some(TransferFunction::Parametric { g, a, b, c, d, e, f })
     }
 }

@@ -9,13 +9,13 @@ use crate::control::{CancelToken, ignore_progress};
 /// Checks that a JPEG's type is supported and that its end-of-image marker follows the last start-of-scan
 /// marker. Neither marker can occur within a scan (ITU-T T.81, B.1.1.5).
 pub(super) fn check_complete(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
-    let bytes = read::bytes(path, limit, Monitor { progress: &ignore_progress, token });
-    check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
+    let bytes = read::read_bytes(path, limit, Monitor { progress: &ignore_progress, token });
+    check_complete_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 
 /// Like [`check_complete`], but for a file in memory.
-pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
-    check_kind(bytes)?;
+pub(super) fn check_complete_bytes(bytes: &[u8]) -> Result<(), String> {
+    check_supported_type(bytes)?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     match (last([0xff, 0xda]), last([0xff, 0xd9])) {
         (Some(scan), Some(end)) if scan < end => Ok(()),
@@ -28,7 +28,7 @@ pub(super) const TRUNCATED: &str = "the image data is truncated";
 
 /// Rejects JPEG types that the decoder does not support (ITU-T T.81, table B.1). The decoder's own message
 /// does not name the type.
-fn check_kind(bytes: &[u8]) -> Result<(), String> {
+fn check_supported_type(bytes: &[u8]) -> Result<(), String> {
     // A frame header starts with the bits per sample.
     let mut frames = segments(bytes)
         .filter(|(marker, _)| matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc));
@@ -45,7 +45,7 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
 
 /// Returns the offset of the transform byte in a misleading Adobe segment: one that specifies RGB in a file
 /// with a JFIF segment. JFIF implies YCbCr, and other readers give it precedence.
-pub(super) fn misleading_transform_offset(bytes: &[u8]) -> Option<usize> {
+pub(super) fn wrong_adobe_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
     let find = |marker: u8, name: &[u8]| {
@@ -59,8 +59,8 @@ pub(super) fn misleading_transform_offset(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Changes a misleading Adobe segment to YCbCr.
-pub(super) fn fix_misleading_transform(bytes: &mut [u8]) {
-    if let Some(transform) = misleading_transform_offset(bytes) {
+pub(super) fn fix_adobe_color_transform(bytes: &mut [u8]) {
+    if let Some(transform) = wrong_adobe_transform_offset(bytes) {
         bytes[transform] = 1;
     }
 }
@@ -83,16 +83,16 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
 
 /// Checks the image size in the header against the file size. Each block of 8 × 8 pixels takes at least one
 /// bit for its mean.
-pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
+pub(super) fn check_plausible_size(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {
-        return Err(too_many_pixels(width, height, file_bytes));
+        return Err(too_many_pixels_message(width, height, file_bytes));
     }
     Ok(())
 }
 
 /// Error message for an image with more pixels than its file can contain.
-pub(super) fn too_many_pixels(width: u32, height: u32, file_bytes: u64) -> String {
+pub(super) fn too_many_pixels_message(width: u32, height: u32, file_bytes: u64) -> String {
     format!("the header claims {width} × {height} pixels, too many for a file of {file_bytes} bytes")
 }
 
@@ -109,17 +109,17 @@ mod tests {
             ]
         };
         for (marker, bits) in [(0xc0, 8), (0xc1, 8), (0xc2, 8)] {
-            assert_eq!(check_bytes(&file(marker, bits)), Ok(()), "{marker:x}");
+            assert_eq!(check_complete_bytes(&file(marker, bits)), Ok(()), "{marker:x}");
         }
         // A Huffman table is not a frame header.
-        assert_eq!(check_bytes(&file(0xc4, 1)), Ok(()));
-        let error = |marker, bits| check_bytes(&file(marker, bits)).expect_err("an error");
+        assert_eq!(check_complete_bytes(&file(0xc4, 1)), Ok(()));
+        let error = |marker, bits| check_complete_bytes(&file(marker, bits)).expect_err("an error");
         let kinds = [0xc3, 0xc6, 0xc9, 0xca].map(|marker| error(marker, 8));
         assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[2] == kinds[3], "{kinds:?}");
         assert!(error(0xc1, 12).contains("12"));
         let whole = file(0xc0, 8);
         for length in 0..whole.len() {
-            assert!(check_bytes(&whole[..length]).is_err(), "{length}");
+            assert!(check_complete_bytes(&whole[..length]).is_err(), "{length}");
         }
     }
 
@@ -138,11 +138,11 @@ mod tests {
             (b"\xe0JFIF\0\x01\x02", b"\xeeAdobe\0d\0\0\0\0\0", b"\xeeAdobe\0d\0\0\0\0\x01");
         for segments in [&[jfif.as_slice(), rgb][..], &[rgb, jfif]] {
             let file = file(segments);
-            let at = misleading_transform_offset(&file).expect("both");
+            let at = wrong_adobe_transform_offset(&file).expect("both");
             assert_eq!(file[at - 11..=at], rgb[1..]);
         }
         for segments in [&[jfif.as_slice(), ycc][..], &[rgb], &[jfif], &[]] {
-            assert_eq!(misleading_transform_offset(&file(segments)), None);
+            assert_eq!(wrong_adobe_transform_offset(&file(segments)), None);
         }
     }
 }

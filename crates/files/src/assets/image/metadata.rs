@@ -45,7 +45,7 @@ impl ImageMetadata {
     }
 
     /// Adds a warning that only the first frame of an animation is used.
-    pub(super) fn warn_of_frames(&mut self, frames: u32) {
+    pub(super) fn warn_about_extra_frames(&mut self, frames: u32) {
         if frames > 1 {
             self.warn(format!("it has {frames} frames; only the first is used"));
         }
@@ -57,12 +57,12 @@ impl ImageMetadata {
             .map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::profile_color_space(profile, is_gray))
         {
             Ok(space) => self.space = space,
-            Err(reason) => self.warn(profile_ignored(&reason)),
+            Err(reason) => self.warn(profile_ignored_warning(&reason)),
         }
     }
 }
 
 /// Warning about an ignored ICC profile.
-pub(super) fn profile_ignored(reason: &str) -> String {
+pub(super) fn profile_ignored_warning(reason: &str) -> String {
     format!("the color profile is ignored ({reason}); colors are read as sRGB")
 }

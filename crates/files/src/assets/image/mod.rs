@@ -29,10 +29,12 @@ use super::{AssetError, FileHash, read::describe_error};
 use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
 use crate::materials::mipmaps::ImageHalver;
 use crate::materials::texels::Texels;
-use crate::materials::{Mipmaps, PixelValue};
+use crate::materials::{ChannelSelector, Mipmaps};
 use counting_reader::CountingReader;
 use decode_thread::ProgressReporter;
-use decoder::{OpenedImage, check_size, create_decoder, max_expansion, orientation, texel_bytes};
+use decoder::{
+    OpenedImage, bytes_per_texel, check_size, create_decoder, max_decompression_ratio, orientation,
+};
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
 use space::ColorSpace;
@@ -56,7 +58,7 @@ pub enum ImageEncoding {
     /// One scalar per pixel, stored in all channels. Alpha is always linear.
     Number {
         /// Source of the scalar.
-        of: PixelValue,
+        of: ChannelSelector,
         /// Whether the color channels are sRGB.
         is_srgb: bool,
     },
@@ -97,10 +99,10 @@ impl ImageEncoding {
             Self::Raw => 3,
             Self::Number { of: value, is_srgb } => {
                 let index = match value {
-                    PixelValue::Luminance => 0,
-                    PixelValue::Opacity => 1,
-                    PixelValue::Channel(channel) => 2 + channel as usize,
-                    PixelValue::Mask { of_any_color } => 6 + usize::from(of_any_color),
+                    ChannelSelector::Luminance => 0,
+                    ChannelSelector::Opacity => 1,
+                    ChannelSelector::Channel(channel) => 2 + channel as usize,
+                    ChannelSelector::Mask { of_any_color } => 6 + usize::from(of_any_color),
                 };
                 4 + 2 * index + usize::from(is_srgb)
             }
@@ -109,7 +111,7 @@ impl ImageEncoding {
     }
 
     /// Color space of a file's samples.
-    fn space(self, metadata: &ImageMetadata) -> ColorSpace {
+    fn color_space(self, metadata: &ImageMetadata) -> ColorSpace {
         if self.uses_file_color_space() { metadata.space.clone() } else { ColorSpace::default() }
     }
 
@@ -188,7 +190,7 @@ fn load_source(
     monitor: Monitor<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
-    monitor.tick(0, length)?;
+    monitor.report_progress(0, length)?;
     let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
         if let Some(words) = convert::alpha_warning(&image, encoding, &metadata) {
@@ -196,7 +198,7 @@ fn load_source(
         }
         Ok((convert::texels(image, encoding, &metadata), metadata.warnings))
     })?;
-    monitor.tick(length, length)?;
+    monitor.report_progress(length, length)?;
     let warning = |ImageWarning { line, words }| {
         let line = line.map_or(String::new(), |line| format!(":{line}"));
         format!("{}{line}: {words}", path.display())
@@ -253,7 +255,7 @@ pub fn load_embedded(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<LoadedImage, AssetError> {
-    load_source(ImageSource::embedded(image, limits, token)?, encoding, Monitor { progress, token })
+    load_source(ImageSource::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
 /// Like [`size`], but for an embedded image.
@@ -267,7 +269,7 @@ pub fn size_embedded(
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
     size_of_source(
-        ImageSource::embedded(image, limits, token)?,
+        ImageSource::from_embedded(image, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
     )
@@ -278,14 +280,14 @@ pub fn size_embedded(
 /// # Errors
 /// [`Cancelled`].
 pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
-    Mipmaps::of(texels, |level| {
+    Mipmaps::build(texels, |level| {
         let halving = ImageHalver::new(level);
-        let mut rows = halving.start();
+        let mut rows = halving.empty_rows();
         for y in 0..halving.rows() {
             token.check()?;
             halving.append_row(y, &mut rows);
         }
-        Ok(halving.texels(rows))
+        Ok(halving.assemble_image(rows))
     })
 }
 
@@ -293,18 +295,22 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn coverage(texels: &Texels, cutoff: f32, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
+pub fn build_coverage_mipmaps(
+    texels: &Texels,
+    cutoff: f32,
+    token: &CancelToken,
+) -> Result<Mipmaps, Cancelled> {
     mipmaps(&texels.threshold(cutoff), token)
 }
 
 /// Bytes of an image: an open file, a file in memory, or an embedded image.
-enum ImageBytes {
+enum ImageStream {
     File(File),
     InMemory(Cursor<Vec<u8>>),
     Embedded(Cursor<Arc<[u8]>>),
 }
 
-impl Read for ImageBytes {
+impl Read for ImageStream {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::File(file) => file.read(buffer),
@@ -314,7 +320,7 @@ impl Read for ImageBytes {
     }
 }
 
-impl Seek for ImageBytes {
+impl Seek for ImageStream {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match self {
             Self::File(file) => file.seek(to),
@@ -327,7 +333,7 @@ impl Seek for ImageBytes {
 /// An open image and its load settings.
 struct ImageSource {
     path: PathBuf,
-    file: ImageBytes,
+    file: ImageStream,
     length: u64,
     limits: ImageLimits,
     token: CancelToken,
@@ -339,7 +345,13 @@ impl ImageSource {
         if length == 0 {
             return Err(AssetError::malformed(path, None, EMPTY_FILE));
         }
-        Ok(Self { path: path.to_owned(), file: ImageBytes::File(file), length, limits, token: token.clone() })
+        Ok(Self {
+            path: path.to_owned(),
+            file: ImageStream::File(file),
+            length,
+            limits,
+            token: token.clone(),
+        })
     }
 
     /// Reads a file into memory and hashes it. The hash matches the decoded bytes even if the file is
@@ -374,11 +386,11 @@ impl ImageSource {
         if length == 0 {
             return Err(AssetError::malformed(path, None, EMPTY_FILE));
         }
-        let file = ImageBytes::InMemory(Cursor::new(bytes));
+        let file = ImageStream::InMemory(Cursor::new(bytes));
         Ok((Self { path: path.to_owned(), file, length, limits, token: token.clone() }, hash))
     }
 
-    fn embedded(
+    fn from_embedded(
         image: EmbeddedImage<'_>,
         limits: ImageLimits,
         token: &CancelToken,
@@ -387,7 +399,7 @@ impl ImageSource {
         if length == 0 {
             return Err(AssetError::malformed(&path, None, EMPTY_EMBEDDED));
         }
-        let file = ImageBytes::Embedded(Cursor::new(image.bytes));
+        let file = ImageStream::Embedded(Cursor::new(image.bytes));
         Ok(Self { path, file, length, limits, token: token.clone() })
     }
 
@@ -398,7 +410,8 @@ impl ImageSource {
         work: impl FnOnce(Self, ProgressReporter) -> Result<T, String> + Send + 'static,
     ) -> Result<T, AssetError> {
         let (path, length) = (self.path.clone(), self.length);
-        let done = decode_thread::run(monitor, length, move |report| catch_panic(|| work(self, report)))?;
+        let done =
+            decode_thread::run_on_thread(monitor, length, move |report| catch_panic(|| work(self, report)))?;
         monitor.token.check()?;
         let done = done.unwrap_or_else(|| Err("cannot start a decoder thread".to_owned()));
         done.unwrap_or_else(|panic| Err(format!("the decoder failed: {panic}")))
@@ -414,7 +427,8 @@ impl ImageSource {
         let (width, height) = decoder.dimensions();
         let orientation = orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
         let image = DynamicImage::from_decoder(decoder);
-        let mut image = image.map_err(|error| claimed_size(width, height, &shorten_decoder_error(&error)))?;
+        let mut image = image
+            .map_err(|error| undecodable_image_message(width, height, &shorten_decoder_error(&error)))?;
         image.apply_orientation(orientation);
         Ok((image, metadata))
     }
@@ -428,23 +442,23 @@ impl ImageSource {
         let start = |bytes: &[u8]| ::image::guess_format(bytes).ok();
         let (mut in_memory, mut is_checked) = (0, true);
         match &mut self.file {
-            ImageBytes::File(_) => is_checked = false,
-            ImageBytes::InMemory(bytes) => {
+            ImageStream::File(_) => is_checked = false,
+            ImageStream::InMemory(bytes) => {
                 in_memory = self.length;
                 if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) {
-                    jpeg::check_bytes(bytes.get_ref())?;
-                    jpeg::fix_misleading_transform(bytes.get_mut());
+                    jpeg::check_complete_bytes(bytes.get_ref())?;
+                    jpeg::fix_adobe_color_transform(bytes.get_mut());
                 }
             }
-            ImageBytes::Embedded(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
-                jpeg::check_bytes(bytes.get_ref())?;
-                if jpeg::misleading_transform_offset(bytes.get_ref()).is_some() {
+            ImageStream::Embedded(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
+                jpeg::check_complete_bytes(bytes.get_ref())?;
+                if jpeg::wrong_adobe_transform_offset(bytes.get_ref()).is_some() {
                     let mut copy = bytes.get_ref().to_vec();
-                    jpeg::fix_misleading_transform(&mut copy);
-                    self.file = ImageBytes::InMemory(Cursor::new(copy));
+                    jpeg::fix_adobe_color_transform(&mut copy);
+                    self.file = ImageStream::InMemory(Cursor::new(copy));
                 }
             }
-            ImageBytes::Embedded(_) => {}
+            ImageStream::Embedded(_) => {}
         }
         let mut bytes = BufReader::new(CountingReader::new(self.file, self.length, report));
         let first = bytes.fill_buf().map_err(|error| describe_error(&error))?;
@@ -460,13 +474,13 @@ impl ImageSource {
         if reader.format().is_none() {
             // TGA is the only format without a signature.
             let format = ImageFormat::from_path(&self.path).ok().filter(|format| *format == ImageFormat::Tga);
-            reader.set_format(format.ok_or_else(unknown_format)?);
+            reader.set_format(format.ok_or_else(unknown_format_message)?);
         }
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
         if is_jpeg && !is_checked {
             jpeg::check_complete(&self.path, self.limits.memory_bytes, &self.token)?;
         }
-        let expansion = max_expansion(reader.format());
+        let expansion = max_decompression_ratio(reader.format());
         let chosen = if is_pfm {
             PfmDecoder::new(reader.into_inner())
                 .map(|decoder| (Box::new(decoder) as _, ImageMetadata::default()))
@@ -475,12 +489,12 @@ impl ImageSource {
         };
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel = texel_bytes(decoder.color_type(), encoding, &metadata);
+        let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
         let texel_bytes =
             check_size(&*decoder, texel, [self.length, held_bytes, in_memory], self.limits, expansion)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
-            jpeg::check_plausible(width, height, self.length)?;
+            jpeg::check_plausible_size(width, height, self.length)?;
         }
         Ok(OpenedImage { decoder, metadata, texel_bytes })
     }
@@ -491,20 +505,20 @@ const EMPTY_FILE: &str = "the file is empty";
 /// Error message for an empty embedded image.
 const EMPTY_EMBEDDED: &str = "an embedded image is empty";
 
-fn empty_image(width: u32, height: u32) -> String {
+fn empty_image_message(width: u32, height: u32) -> String {
     format!("it has {width} × {height} pixels")
 }
 
-fn side_too_long(width: u32, height: u32, limit: u32) -> String {
+fn side_too_long_message(width: u32, height: u32, limit: u32) -> String {
     format!("it has {width} × {height} pixels; the limit is {limit} per side")
 }
 
-fn exceeds_memory(width: u32, height: u32, needed: u64, limit: u64) -> String {
+fn memory_limit_message(width: u32, height: u32, needed: u64, limit: u64) -> String {
     let (needed, limit) = (needed.div_ceil(1 << 20), limit >> 20);
     format!("it has {width} × {height} pixels, which need {needed} MiB of memory; the limit is {limit} MiB")
 }
 
-fn implausible_size(width: u32, height: u32, needed: u64, length: u64) -> String {
+fn implausible_size_message(width: u32, height: u32, needed: u64, length: u64) -> String {
     let needed = needed.div_ceil(1 << 20);
     format!(
         "the header claims {width} × {height} pixels ({needed} MiB), too many for a file of {length} bytes"
@@ -512,11 +526,11 @@ fn implausible_size(width: u32, height: u32, needed: u64, length: u64) -> String
 }
 
 /// Error message for an image that cannot be decoded.
-fn claimed_size(width: u32, height: u32, reason: &str) -> String {
+fn undecodable_image_message(width: u32, height: u32, reason: &str) -> String {
     format!("the header claims {width} × {height} pixels: {reason}")
 }
 
-pub(crate) fn unknown_format() -> String {
+pub(crate) fn unknown_format_message() -> String {
     "unsupported image format; expected png, jpg, ppm, pfm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
@@ -524,7 +538,7 @@ pub(crate) fn unknown_format() -> String {
 fn shorten_decoder_error(error: &ImageError) -> String {
     const MAX_LENGTH: usize = 200;
     let words = match error {
-        ImageError::Unsupported(_) => format!("{}: {error}", unknown_format()),
+        ImageError::Unsupported(_) => format!("{}: {error}", unknown_format_message()),
         ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
             jpeg::TRUNCATED.to_owned()
         }
@@ -532,7 +546,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it needs more memory than the limit for images".to_owned()
         }
-        _ => name_png_chunks(&error.to_string()),
+        _ => replace_png_chunk_types(&error.to_string()),
     };
     if words.chars().count() <= MAX_LENGTH {
         words
@@ -543,7 +557,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
 
 /// Replaces PNG chunk types in a decoder message with the chunk names. The decoder prints them in debug
 /// format.
-fn name_png_chunks(words: &str) -> String {
+fn replace_png_chunk_types(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };
     let Some((chunk, after)) = rest.split_once(" }") else { return words.to_owned() };

@@ -25,17 +25,17 @@ pub(super) struct PfmDecoder<R> {
 impl<R: BufRead> PfmDecoder<R> {
     pub(super) fn new(mut file: R) -> ImageResult<Self> {
         let mut header = (&mut file).take(HEADER_BYTES);
-        let kind = word(&mut header)?;
+        let kind = read_word(&mut header)?;
         let mut side = |name: &str| {
-            let word = word(&mut header)?;
-            word.parse().map_err(|_| error(format!("invalid {name} {word:?}")))
+            let word = read_word(&mut header)?;
+            word.parse().map_err(|_| decoding_error(format!("invalid {name} {word:?}")))
         };
         let size = [side("width")?, side("height")?];
-        let scale = word(&mut header)?;
+        let scale = read_word(&mut header)?;
         let number: Option<f32> = fast_float2::parse(&scale).ok();
         match number.filter(|number| number.is_finite() && *number != 0.0) {
             Some(scale) => Ok(Self { file, size, is_gray: kind == "Pf", scale }),
-            None => Err(error(format!("invalid scale {scale:?}; expected a nonzero number"))),
+            None => Err(decoding_error(format!("invalid scale {scale:?}; expected a nonzero number"))),
         }
     }
 }
@@ -72,7 +72,7 @@ impl<R: BufRead> ImageDecoder for PfmDecoder<R> {
 }
 
 /// Reads a word and the whitespace character after it.
-fn word(file: &mut impl Read) -> ImageResult<String> {
+fn read_word(file: &mut impl Read) -> ImageResult<String> {
     let mut word = String::new();
     loop {
         let mut byte = [0];
@@ -85,6 +85,6 @@ fn word(file: &mut impl Read) -> ImageResult<String> {
     }
 }
 
-fn error(reason: String) -> ImageError {
+fn decoding_error(reason: String) -> ImageError {
     ImageError::Decoding(DecodingError::new(ImageFormatHint::Exact(ImageFormat::Pnm), reason))
 }

@@ -7,7 +7,7 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
 use super::metadata::ImageMetadata;
 use super::primaries::Primaries;
-use super::space::{ColorSpace, Curve};
+use super::space::{ColorSpace, TransferFunction};
 use crate::assets::FileHash;
 use crate::control::CancelToken;
 use crate::math::DMat3;
@@ -105,26 +105,26 @@ impl<R: BufRead + Seek> PngDecoder<R> {
     /// `gAMA` with `cHRM`.
     pub(super) fn metadata(&self) -> ImageMetadata {
         let (info, mut metadata) = (self.reader.info(), ImageMetadata::default());
-        metadata.warn_of_frames(info.animation_control().map_or(0, |control| control.num_frames));
+        metadata.warn_about_extra_frames(info.animation_control().map_or(0, |control| control.num_frames));
         let is_gray = !self.color_type.has_color();
         if let Some(points) = info.coding_independent_code_points {
-            match space_of_code_points(points) {
+            match color_space_from_cicp(points) {
                 Some(space) => metadata.space = space,
-                None => metadata.warn(unsupported_code_points(points)),
+                None => metadata.warn(unsupported_cicp_warning(points)),
             }
         } else if info.srgb.is_some() {
         } else if let Some(profile) = &self.profile {
             metadata.add_profile(profile.as_deref(), is_gray);
         } else {
-            metadata.space = self.space_of_gama_and_chrm(&mut metadata, is_gray);
+            metadata.space = self.color_space_from_gama_and_chrm(&mut metadata, is_gray);
         }
         metadata
     }
 
     /// Color space defined by the `gAMA` and `cHRM` chunks.
-    fn space_of_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
+    fn color_space_from_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
         let info = self.reader.info();
-        let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| gamma_curve(gamma.into_scaled()));
+        let curve = info.gama_chunk.map_or(TransferFunction::Srgb, |gamma| gamma_curve(gamma.into_scaled()));
         let number = |number: png::ScaledFloat| f64::from(number.into_scaled()) / 100_000.0;
         let matrix = info.chrm_chunk.filter(|_| !is_gray).map_or(Some(DMat3::IDENTITY), |chunk| {
             let [red, green, blue, white] =
@@ -168,19 +168,19 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
 
 /// Returns the transfer function for a `gAMA` value in units of 1/100000. A gamma of 1/2.2 usually means sRGB
 /// (PNG, 11.3.2.5).
-fn gamma_curve(gamma: u32) -> Curve {
+fn gamma_curve(gamma: u32) -> TransferFunction {
     const SRGB: u32 = 45_455;
     const TOLERANCE: u32 = 500;
     match gamma {
-        0 => Curve::Srgb,
-        _ if gamma.abs_diff(SRGB) <= TOLERANCE => Curve::Srgb,
-        _ => Curve::Power(100_000.0 / f64::from(gamma)),
+        0 => TransferFunction::Srgb,
+        _ if gamma.abs_diff(SRGB) <= TOLERANCE => TransferFunction::Srgb,
+        _ => TransferFunction::Power(100_000.0 / f64::from(gamma)),
     }
 }
 
 /// Returns the color space for video signal code points (ITU-T H.273, tables 2 and 3). `None` for undefined
 /// codes, logarithmic curves, and anything other than full-range RGB.
-fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
+fn color_space_from_cicp(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
         1 => Primaries::REC_709,
         4 => Primaries::from_numbers([0.67, 0.33, 0.21, 0.71, 0.14, 0.08, 0.310, 0.316]),
@@ -195,14 +195,14 @@ fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<Colo
         _ => return None,
     };
     let curve = match points.transfer_function {
-        1 | 6 | 11 | 12 | 14 | 15 => Curve::REC_709,
-        4 => Curve::Power(2.2),
-        5 => Curve::Power(2.8),
-        7 => Curve::SMPTE_240M,
-        8 => Curve::LINEAR,
-        13 => Curve::Srgb,
-        16 => Curve::Pq,
-        18 => Curve::Hlg,
+        1 | 6 | 11 | 12 | 14 | 15 => TransferFunction::REC_709,
+        4 => TransferFunction::Power(2.2),
+        5 => TransferFunction::Power(2.8),
+        7 => TransferFunction::SMPTE_240M,
+        8 => TransferFunction::LINEAR,
+        13 => TransferFunction::Srgb,
+        16 => TransferFunction::Pq,
+        18 => TransferFunction::Hlg,
         _ => return None,
     };
     let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
@@ -211,7 +211,7 @@ fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<Colo
 }
 
 /// Warning about unsupported code points.
-fn unsupported_code_points(points: png::CodingIndependentCodePoints) -> String {
+fn unsupported_cicp_warning(points: png::CodingIndependentCodePoints) -> String {
     let png::CodingIndependentCodePoints {
         color_primaries,
         transfer_function,

@@ -39,12 +39,16 @@ impl Primaries {
 
     /// XYZ of the white point, with Y = 1.
     fn white_xyz(&self) -> DVec3 {
-        xyz(self.white) / self.white[1]
+        chromaticity_to_xyz(self.white) / self.white[1]
     }
 
     /// Matrix to XYZ, scaled to map (1, 1, 1) to white. `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
-        let primaries = DMat3::from_cols(xyz(self.red), xyz(self.green), xyz(self.blue));
+        let primaries = DMat3::from_cols(
+            chromaticity_to_xyz(self.red),
+            chromaticity_to_xyz(self.green),
+            chromaticity_to_xyz(self.blue),
+        );
         let scales = inverse(primaries)? * self.white_xyz();
         let matrix = primaries * DMat3::from_diagonal(scales);
         inverse(matrix).is_some().then_some(matrix)
@@ -85,7 +89,7 @@ fn bradford_matrix() -> DMat3 {
     DMat3::from_cols_array(&[0.8951, -0.7502, 0.0389, 0.2664, 1.7135, -0.0685, -0.1614, 0.0367, 1.0296])
 }
 
-fn xyz([x, y]: [f64; 2]) -> DVec3 {
+fn chromaticity_to_xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 

@@ -9,7 +9,7 @@ use crate::math::{DMat3, DVec3};
 
 /// A transfer function from samples in [0, 1] to linear light.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Curve {
+pub(super) enum TransferFunction {
     Srgb,
     /// A power function with this exponent.
     Power(f64),
@@ -31,7 +31,7 @@ pub(super) enum Curve {
     Hlg,
 }
 
-impl Curve {
+impl TransferFunction {
     pub(super) const LINEAR: Self = Self::Power(1.0);
     /// Inverse of the ITU-R BT.709 camera curve.
     pub(super) const REC_709: Self = Self::Parametric {
@@ -67,7 +67,7 @@ impl Curve {
                     c * x + f
                 }
             }
-            Self::Table(values) => interpolated(values, x),
+            Self::Table(values) => interpolate_table(values, x),
             Self::Pq => decode_pq(x),
             Self::Hlg => decode_hlg(x) / decode_hlg(0.75),
         }
@@ -114,7 +114,7 @@ fn decode_hlg(x: f64) -> f64 {
     if x <= 0.5 { x * x / 3.0 } else { (pow_f64(E, (x - C) / A) + B) / 12.0 }
 }
 
-fn interpolated(values: &[u16], x: f64) -> f64 {
+fn interpolate_table(values: &[u16], x: f64) -> f64 {
     let at = x.clamp(0.0, 1.0) * values.len().saturating_sub(1) as f64;
     let first = at as usize;
     let value = |index: usize| values.get(index).or(values.last()).map_or(0.0, |word| f64::from(*word));
@@ -125,15 +125,15 @@ fn interpolated(values: &[u16], x: f64) -> f64 {
 /// A color space, stored as its difference from the default: sRGB for integers, linear Rec. 709 for floats.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ColorSpace {
-    curves: Option<[Curve; 3]>,
+    curves: Option<[TransferFunction; 3]>,
     matrix: Option<DMat3>,
 }
 
 impl ColorSpace {
     /// Creates a color space from its curves (`None` for the default) and its matrix to linear Rec. 709.
-    pub(super) fn new(curves: Option<[Curve; 3]>, matrix: DMat3) -> Self {
+    pub(super) fn new(curves: Option<[TransferFunction; 3]>, matrix: DMat3) -> Self {
         Self {
-            curves: curves.filter(|curves| !curves.iter().all(Curve::is_srgb)),
+            curves: curves.filter(|curves| !curves.iter().all(TransferFunction::is_srgb)),
             matrix: (!is_identity(&matrix)).then_some(matrix),
         }
     }
@@ -148,10 +148,11 @@ impl ColorSpace {
     }
 
     /// Tables that map integers from 0 to `max` to linear light, for red, green and blue.
-    pub(super) fn tables(&self, max: u16) -> [Vec<f32>; 3] {
-        const SRGB: [Curve; 3] = [Curve::Srgb, Curve::Srgb, Curve::Srgb];
+    pub(super) fn linearization_tables(&self, max: u16) -> [Vec<f32>; 3] {
+        const SRGB: [TransferFunction; 3] =
+            [TransferFunction::Srgb, TransferFunction::Srgb, TransferFunction::Srgb];
         let curves = self.curves.as_ref().unwrap_or(&SRGB);
-        let table = |curve: &Curve| {
+        let table = |curve: &TransferFunction| {
             let samples = (0..=max).map(|sample| f64::from(sample) / f64::from(max));
             samples.map(|x| curve.decode(x) as f32).collect()
         };
@@ -171,7 +172,7 @@ mod tests {
 
     #[test]
     fn curves_match_known_values() {
-        let parametric = Curve::Parametric {
+        let parametric = TransferFunction::Parametric {
             g: 2.4,
             a: 1.0 / 1.055,
             b: 0.055 / 1.055,
@@ -180,13 +181,23 @@ mod tests {
             e: 0.0,
             f: 0.0,
         };
-        assert!(parametric.is_srgb() && Curve::Srgb.is_srgb());
-        assert!(!Curve::Power(2.2).is_srgb() && !Curve::LINEAR.is_srgb() && !Curve::REC_709.is_srgb());
-        assert!((Curve::Power(2.0).decode(0.5) - 0.25).abs() < 1e-9);
-        assert_eq!([Curve::LINEAR.decode(0.3), Curve::Power(2.2).decode(0.0)], [0.3, 0.0]);
-        let table = Curve::Table(vec![0, 65535, 0]);
+        assert!(parametric.is_srgb() && TransferFunction::Srgb.is_srgb());
+        assert!(
+            !TransferFunction::Power(2.2).is_srgb()
+                && !TransferFunction::LINEAR.is_srgb()
+                && !TransferFunction::REC_709.is_srgb()
+        );
+        assert!((TransferFunction::Power(2.0).decode(0.5) - 0.25).abs() < 1e-9);
+        assert_eq!(
+            [TransferFunction::LINEAR.decode(0.3), TransferFunction::Power(2.2).decode(0.0)],
+            [0.3, 0.0]
+        );
+        let table = TransferFunction::Table(vec![0, 65535, 0]);
         assert_eq!([0.0, 0.25, 0.5, 1.0].map(|x| table.decode(x)), [0.0, 0.5, 1.0, 0.0]);
-        assert!((Curve::REC_709.decode(0.5) - ((0.5_f64 + 0.099) / 1.099).powf(1.0 / 0.45)).abs() < 1e-9);
+        assert!(
+            (TransferFunction::REC_709.decode(0.5) - ((0.5_f64 + 0.099) / 1.099).powf(1.0 / 0.45)).abs()
+                < 1e-9
+        );
     }
 
     #[test]
@@ -194,10 +205,10 @@ mod tests {
         let is_near = |found: f64, exact: f64| (found - exact).abs() <= 1e-4 * exact;
         // ITU-R BT.2408, table 1: signals for the reference white, 1000 cd/m² and 18 % gray.
         for (signal, nits) in [(1.0, 10_000.0), (0.580_69, 203.0), (0.751_83, 1000.0), (0.0, 0.0)] {
-            assert!(is_near(Curve::Pq.decode(signal), nits / 203.0), "{signal}");
+            assert!(is_near(TransferFunction::Pq.decode(signal), nits / 203.0), "{signal}");
         }
         for (signal, light) in [(1.0, 1.0), (0.5, 1.0 / 12.0), (0.75, 0.264_963), (0.0, 0.0)] {
-            assert!(is_near(Curve::Hlg.decode(signal), light / 0.264_963), "{signal}");
+            assert!(is_near(TransferFunction::Hlg.decode(signal), light / 0.264_963), "{signal}");
         }
         // HLG is continuous.
         assert!(is_near(decode_hlg(0.5), decode_hlg(0.5 + 1e-9)));
@@ -205,11 +216,15 @@ mod tests {
 
     #[test]
     fn the_default_space_is_recognized() {
-        let srgb = || Some([Curve::Srgb, Curve::Srgb, Curve::Srgb]);
+        let srgb = || Some([TransferFunction::Srgb, TransferFunction::Srgb, TransferFunction::Srgb]);
         assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_default());
         assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_default());
         assert!(
-            !ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_default()
+            !ColorSpace::new(
+                Some([TransferFunction::Srgb, TransferFunction::LINEAR, TransferFunction::Srgb]),
+                DMat3::IDENTITY
+            )
+            .is_default()
         );
     }
 }

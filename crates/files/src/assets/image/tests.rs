@@ -3,10 +3,10 @@ use std::sync::Mutex;
 
 use ::image::{ExtendedColorType, save_buffer};
 
-use super::metadata::profile_ignored;
+use super::metadata::profile_ignored_warning;
 use super::*;
 use crate::assets::rejection;
-use crate::materials::scalar::PixelValue;
+use crate::materials::scalar::ChannelSelector;
 use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
@@ -76,8 +76,8 @@ fn lossless_formats_decode_to_the_same_texels() {
 fn content_takes_precedence_over_extension() {
     assert!(load_bytes("a.jpg", &small_png(), ImageEncoding::Color).is_ok());
     assert!(load_bytes("none", &small_png(), ImageEncoding::Color).is_ok());
-    assert_eq!(error("a.txt", b"some words"), unknown_format());
-    assert!(error("a.gif", b"GIF89a\x01\0\x01\0\0\0\0;").starts_with(&unknown_format()));
+    assert_eq!(error("a.txt", b"some words"), unknown_format_message());
+    assert!(error("a.gif", b"GIF89a\x01\0\x01\0\0\0\0;").starts_with(&unknown_format_message()));
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn exr_alpha_is_read() {
     save_buffer(&path, &raw, 2, 1, ExtendedColorType::Rgba32F).expect("written");
     let color = load_with(&path, ImageEncoding::Color).expect("an EXR").data;
     assert_eq!(color, TexelData::Float(vec![Vec3::new(1.0, 0.5, 0.25), Vec3::new(0.0, 3.0, 2.0)]));
-    let alpha = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
+    let alpha = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     let opacity = load_with(&path, alpha).expect("an EXR");
     assert_eq!([opacity.get(0, 0).x, opacity.get(1, 0).x], [0.125, 0.75]);
 }
@@ -214,7 +214,7 @@ fn short_files_take_little_memory() {
         let length = empty_bmp(16_000, 16_000).len() as u64;
         let reason = error(name, &empty_bmp(16_000, 16_000));
         let decoded = 16_000_u64 * 16_000 * 3;
-        assert_eq!(reason, implausible_size(16_000, 16_000, 2 * decoded, length));
+        assert_eq!(reason, implausible_size_message(16_000, 16_000, 2 * decoded, length));
     }
 }
 
@@ -224,7 +224,7 @@ fn false_sizes_are_rejected() {
     assert!(error("a.png", &png_claiming(16000, 16000)).contains("16000 × 16000"));
     assert!(error("a.png", &png_claiming(20000, 2)).contains("20000 × 2"));
     let truncated = error("a.ppm", b"P6 5000 5000 255\n123");
-    assert_eq!(truncated, claimed_size(5000, 5000, jpeg::TRUNCATED));
+    assert_eq!(truncated, undecodable_image_message(5000, 5000, jpeg::TRUNCATED));
     assert!(load_bytes("a.ppm", b"P6 4000000000 4000000000 255\n123", ImageEncoding::Color).is_err());
     assert!(load_bytes("a.ppm", b"P6 0 0 255\n", ImageEncoding::Color).is_err());
     assert_eq!(error("a.png", b""), EMPTY_FILE);
@@ -244,12 +244,15 @@ fn sides_are_limited_to_65536_pixels() {
         ("a.ppm", b"P6 65537 1 255\n123".to_vec()),
         ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 65537\nabc".to_vec()),
     ] {
-        assert_eq!(error(name, &bytes), side_too_long(65537, 1, 65536));
+        assert_eq!(error(name, &bytes), side_too_long_message(65537, 1, 65536));
     }
     // The decoder's own limit is checked first.
     assert!(error("a.bmp", &bmp).contains("65537"));
     let needed = 60_000 * 60_000 * 6;
-    assert_eq!(error("a.ppm", b"P6 60000 60000 255\n123"), exceeds_memory(60_000, 60_000, needed, 2 << 30));
+    assert_eq!(
+        error("a.ppm", b"P6 60000 60000 255\n123"),
+        memory_limit_message(60_000, 60_000, needed, 2 << 30)
+    );
 }
 
 #[test]
@@ -343,7 +346,7 @@ proptest::proptest! {
 
 #[test]
 fn hdr_header_size_is_limited() {
-    let is_too_long = |bytes: &[u8]| error("a.hdr", bytes).ends_with(&super::hdr::header_too_long());
+    let is_too_long = |bytes: &[u8]| error("a.hdr", bytes).ends_with(&super::hdr::header_too_long_message());
     let lines = |count: usize| ["#?RADIANCE\n", &"x=1\n".repeat(count), "\n-Y 1 +X 1\n"].concat();
     let pixel = [128, 128, 128, 129];
     assert!(is_too_long(lines(1 << 18).as_bytes()));

@@ -22,11 +22,11 @@ const SIGNATURE: &[u8] = b"TRUEVISION-XFILE.\0";
 const ATTRIBUTES: u64 = 494;
 
 /// A TGA file with a corrected header.
-type Patched<R> = Chain<Cursor<[u8; HEADER]>, R>;
+type PatchedTga<R> = Chain<Cursor<[u8; HEADER]>, R>;
 
 /// Creates a decoder and determines the meaning of alpha. `image` requires the header to declare exactly as
 /// many alpha bits as the pixel format can store, but many files declare too many or none at all.
-pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patched<R>>, AlphaUsage)> {
+pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<PatchedTga<R>>, AlphaUsage)> {
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
     let alpha_bits = header[DESCRIPTOR] & ALPHA_BITS;

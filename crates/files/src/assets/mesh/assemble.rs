@@ -8,7 +8,7 @@ use super::normals::fill_missing_normals;
 use super::parsed::{Faces, ParsedMesh};
 use super::polygon::triangulate;
 use super::{MeshSource, corners};
-use crate::assets::{AssetError, Dropped, FileHash, LoadedMesh};
+use crate::assets::{AssetError, DroppedFaces, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::origin_near;
@@ -20,11 +20,11 @@ const BATCH: usize = 1 << 14;
 /// Assembles a mesh: triangulates polygons, drops unusable faces, removes unused vertices and completes the
 /// normals.
 pub(crate) fn assemble(source: &MeshSource<'_>, parsed: ParsedMesh) -> Result<LoadedMesh, AssetError> {
-    assemble_text(source, parsed, |_| None)
+    assemble_text_mesh(source, parsed, |_| None)
 }
 
 /// Like [`assemble`], but for text files. `start_of` maps a face index to the byte offset of the face.
-pub(super) fn assemble_text(
+pub(super) fn assemble_text_mesh(
     source: &MeshSource<'_>,
     mut parsed: ParsedMesh,
     start_of: impl Fn(usize) -> Option<usize>,
@@ -50,16 +50,16 @@ pub(super) fn assemble_text(
     } = parsed;
     let (origin, positions) = relative_to_origin(positions, &faces);
     if has_separate_corners {
-        faces.join(&positions, source.monitor.token)?;
+        faces.merge_coincident_vertices(&positions, source.monitor.token)?;
     }
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = FaceTriangulator::new(&positions, &face_materials, most_triangles);
     cutter.add_all_faces(source, &faces)?;
     let FaceTriangulator { triangles, triangle_materials, dropped, crossing, .. } = cutter;
-    let line_of = |face: usize| start_of(face).map(|start| source.line(start));
+    let line_of = |face: usize| start_of(face).map(|start| source.line_number(start));
     warnings.extend(self_intersection_warning(crossing, line_of));
     if triangles.is_empty() {
-        return Err(source.wrong(no_usable_face(faces.len(), dropped)));
+        return Err(source.malformed_error(no_usable_face_message(faces.len(), dropped)));
     }
     let bad_uvs = [&uvs, &second_uvs].map(|uvs| non_finite_vertices(uvs, |uv| uv.is_finite()));
     let bad_normals = non_finite_vertices(&normals, |normal| normal.is_finite());
@@ -103,19 +103,19 @@ fn relative_to_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>
 
 pub(super) const NO_FACES: &str = "no usable face: the file has no faces";
 
-fn too_many_triangles(limit: usize) -> String {
+fn too_many_triangles_message(limit: usize) -> String {
     format!("more than {limit} triangles; split the mesh")
 }
 
-fn index_out_of_range(face: usize) -> String {
+fn index_out_of_range_message(face: usize) -> String {
     format!("face {face}: vertex index out of range")
 }
 
-fn no_usable_face(faces: usize, dropped: Dropped) -> String {
+fn no_usable_face_message(faces: usize, dropped: DroppedFaces) -> String {
     if faces == 0 {
         return NO_FACES.to_owned();
     }
-    let Dropped { non_finite, degenerate } = dropped;
+    let DroppedFaces { non_finite, degenerate } = dropped;
     format!("no usable face: {non_finite} of {faces} have a non-finite corner, {degenerate} have zero area")
 }
 
@@ -174,7 +174,7 @@ struct FaceTriangulator<'a> {
     most_triangles: usize,
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
-    dropped: Dropped,
+    dropped: DroppedFaces,
     /// Number of self-intersecting polygons, and the index of the first one.
     crossing: (u64, usize),
 }
@@ -188,7 +188,7 @@ impl<'a> FaceTriangulator<'a> {
             most_triangles,
             triangles,
             triangle_materials,
-            dropped: Dropped::default(),
+            dropped: DroppedFaces::default(),
             crossing: (0, 0),
         }
     }
@@ -207,11 +207,11 @@ impl<'a> FaceTriangulator<'a> {
             let corners = &faces.corners[from..from + arity];
             from += arity;
             if corners.iter().any(|&corner| corner as usize >= self.positions.len()) {
-                return Err(source.wrong(index_out_of_range(face + 1)));
+                return Err(source.malformed_error(index_out_of_range_message(face + 1)));
             }
             self.add_face(corners, face);
             if self.triangles.len() > self.most_triangles {
-                return Err(source.wrong(too_many_triangles(self.most_triangles)));
+                return Err(source.malformed_error(too_many_triangles_message(self.most_triangles)));
             }
             if let Some(&material) = self.materials.get(face) {
                 self.triangle_materials.resize(self.triangles.len(), material);
@@ -249,7 +249,7 @@ impl<'a> FaceTriangulator<'a> {
             return;
         }
         match *corners {
-            [a, b, c] => self.keep([a, b, c]),
+            [a, b, c] => self.push_unless_degenerate([a, b, c]),
             _ => self.triangulate_polygon(corners, face),
         }
         if self.triangles.len() == before {
@@ -268,7 +268,9 @@ impl<'a> FaceTriangulator<'a> {
         if distinct.len() >= 3 {
             let points: Vec<Vec3> = distinct.iter().map(|&corner| place(corner)).collect();
             let before = self.triangles.len();
-            let is_simple = triangulate(&points, |triangle| self.keep(triangle.map(|index| distinct[index])));
+            let is_simple = triangulate(&points, |triangle| {
+                self.push_unless_degenerate(triangle.map(|index| distinct[index]));
+            });
             if !is_simple && self.triangles.len() > before {
                 self.crossing.1 = if self.crossing.0 == 0 { face } else { self.crossing.1 };
                 self.crossing.0 += 1;
@@ -276,7 +278,7 @@ impl<'a> FaceTriangulator<'a> {
         }
     }
 
-    fn keep(&mut self, triangle: [u32; 3]) {
+    fn push_unless_degenerate(&mut self, triangle: [u32; 3]) {
         if has_area(triangle.map(|corner| self.positions[corner as usize])) {
             self.triangles.push(triangle);
         }
@@ -347,7 +349,7 @@ mod tests {
     fn faces(list: &[&[u32]]) -> Faces {
         let mut faces = Faces::default();
         for face in list {
-            face.iter().for_each(|&corner| faces.corner(corner));
+            face.iter().for_each(|&corner| faces.push_corner(corner));
             faces.end_face(face.len());
         }
         faces
@@ -375,7 +377,7 @@ mod tests {
         let positions = exact(&positions);
         let parsed = ParsedMesh { positions, faces: faces(&list), face_materials, ..ParsedMesh::default() };
         let loaded = assembled(parsed).expect("valid faces");
-        assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 4 });
+        assert_eq!(loaded.dropped, DroppedFaces { non_finite: 1, degenerate: 4 });
         assert_eq!(loaded.mesh.materials, [3, 3, 5]);
         assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [1, 2, 3]]);
         assert_eq!(loaded.mesh.positions, SQUARE);
@@ -402,7 +404,7 @@ mod tests {
             ..ParsedMesh::default()
         };
         let loaded = assembled(parsed).expect("two valid faces");
-        assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 0 });
+        assert_eq!(loaded.dropped, DroppedFaces { non_finite: 1, degenerate: 0 });
         let mesh = loaded.mesh;
         let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() + mesh.origin).collect();
         assert_eq!(places, exact(&SQUARE).into_iter().map(|corner| corner + far).collect::<Vec<_>>());
@@ -416,7 +418,7 @@ mod tests {
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
             assert!(FaceTriangulator::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
             let result = FaceTriangulator::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));
-            assert_eq!(rejection(result), (None, super::too_many_triangles(1)));
+            assert_eq!(rejection(result), (None, super::too_many_triangles_message(1)));
         }
     }
 
@@ -444,8 +446,8 @@ mod tests {
         let positions = exact(&[Vec3::ZERO, Vec3::X, Vec3::X, Vec3::splat(f32::INFINITY)]);
         let parsed =
             ParsedMesh { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..ParsedMesh::default() };
-        let dropped = Dropped { non_finite: 1, degenerate: 1 };
-        assert_eq!(rejection(assembled(parsed)).1, no_usable_face(2, dropped));
+        let dropped = DroppedFaces { non_finite: 1, degenerate: 1 };
+        assert_eq!(rejection(assembled(parsed)).1, no_usable_face_message(2, dropped));
         assert_eq!(rejection(assembled(ParsedMesh::default())).1, NO_FACES);
     }
 
@@ -475,6 +477,6 @@ mod tests {
             faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),
             ..ParsedMesh::default()
         };
-        assert_eq!(rejection(assembled(parsed)), (None, index_out_of_range(2)));
+        assert_eq!(rejection(assembled(parsed)), (None, index_out_of_range_message(2)));
     }
 }

@@ -44,20 +44,20 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (parse, read): (ParseFn, ReadFn) = match extension.as_str() {
-        "obj" => (obj::parse, read::text),
-        "off" => (off::parse, read::text_or_binary),
-        "ply" => (ply::parse, read::text_or_binary),
-        "stl" => (stl::parse, read::not_all_zero),
+        "obj" => (obj::parse, read::read_text),
+        "off" => (off::parse, read::read_text_or_binary),
+        "ply" => (ply::parse, read::read_text_or_binary),
+        "stl" => (stl::parse, read::read_unless_all_zero),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
     let monitor = Monitor { progress, token };
     let bytes = read(path, FILE_LIMIT, monitor)?;
     let source = MeshSource { path, bytes: text::strip_byte_order_mark(&bytes), monitor };
     if source.bytes.is_empty() {
-        return Err(source.wrong(EMPTY_FILE));
+        return Err(source.malformed_error(EMPTY_FILE));
     }
     let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
-    monitor.tick(2 * bytes.len(), 2 * bytes.len())?;
+    monitor.report_progress(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }
 
@@ -78,7 +78,7 @@ const UNKNOWN_FORMAT: &str = "unknown mesh format; the extension must be .obj, .
 const EMPTY_FILE: &str = "the file is empty";
 
 /// Error message for an out-of-range vertex index in a file with `count` vertices. Indices start at 0.
-pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
+pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
     format!("vertex {vertex} is out of range: there are {count}, numbered from 0")
 }
 
@@ -95,22 +95,22 @@ pub(crate) struct MeshSource<'a> {
 
 impl MeshSource<'_> {
     /// Reports that the parser has reached byte `at`.
-    fn tick(&self, at: usize) -> Result<(), AssetError> {
-        Ok(self.monitor.tick(self.bytes.len() + at, 2 * self.bytes.len())?)
+    fn report_progress(&self, at: usize) -> Result<(), AssetError> {
+        Ok(self.monitor.report_progress(self.bytes.len() + at, 2 * self.bytes.len())?)
     }
 
     /// Creates an error without a line number.
-    fn wrong(&self, reason: impl Into<String>) -> AssetError {
+    fn malformed_error(&self, reason: impl Into<String>) -> AssetError {
         AssetError::malformed(self.path, None, reason)
     }
 
     /// Creates an error with the line number of byte `at` in a text file.
-    fn wrong_at(&self, at: usize, reason: impl Into<String>) -> AssetError {
-        AssetError::malformed(self.path, Some(self.line(at)), reason)
+    fn malformed_error_with_line(&self, at: usize, reason: impl Into<String>) -> AssetError {
+        AssetError::malformed(self.path, Some(self.line_number(at)), reason)
     }
 
     /// Returns the number of the line that contains byte `at`. The first line is 1.
-    fn line(&self, at: usize) -> usize {
+    fn line_number(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
         1 + memchr::memchr_iter(b'\n', before).count()
     }

@@ -31,7 +31,7 @@ const BATCH: usize = 1 << 16;
 /// # Errors
 /// [`Cancelled`].
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
-    let mut sums = weighted_sums(mesh, token)?;
+    let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
     let firsts = first_vertex_with_same_normal(groups);
     for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
@@ -43,7 +43,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     for place in &places {
         token.check()?;
         if groups.is_empty() {
-            join(place, &sums, &mut joined);
+            sum_coincident_normals(place, &sums, &mut joined);
         } else {
             let group = |vertex: &u32| groups[*vertex as usize].group;
             let is_joined = |vertex: &&u32| {
@@ -51,7 +51,9 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
             };
             let mut place: Vec<u32> = place.iter().filter(is_joined).copied().collect();
             place.sort_by_key(group);
-            place.chunk_by(|a, b| group(a) == group(b)).for_each(|place| join(place, &sums, &mut joined));
+            place
+                .chunk_by(|a, b| group(a) == group(b))
+                .for_each(|place| sum_coincident_normals(place, &sums, &mut joined));
         }
     }
     for (vertex, first) in firsts.into_iter().enumerate() {
@@ -122,7 +124,7 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
 
 /// Sums the unit face normals around each vertex in face order, weighted by the faces' angles at the vertex.
 /// Each thread owns a range of vertices, so the order does not depend on the number of threads.
-fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
+fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     let mut weighted = Vec::with_capacity(BATCH.min(mesh.triangles.len()));
@@ -178,7 +180,7 @@ fn fast_atan2(x: f64, y: f64) -> f64 {
     STARTS[octant] + SIGNS[octant] * t * (low + t8 * (high + t8 * 0.002_866_225_7))
 }
 
-fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
+fn sum_coincident_normals(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     let own = |vertex: u32| sums[vertex as usize];
     if group.len() > COMPARED {
         let sum: DVec3 = group.iter().map(|&vertex| own(vertex)).sum();

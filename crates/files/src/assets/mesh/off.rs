@@ -3,10 +3,10 @@
 //! count may be missing, coordinates and faces may be followed by undeclared columns, and comments and blank
 //! lines may be anywhere.
 
-use super::assemble::assemble_text;
-use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored};
-use super::text::{Cursor, expected, expected_at_line_end, shown};
-use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range};
+use super::assemble::assemble_text_mesh;
+use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored_warning};
+use super::text::{Cursor, expected_message, quote_word, unexpected_line_end_message};
+use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// Number of vertices or faces between polls of the cancel token.
@@ -49,12 +49,12 @@ impl IgnoredLines {
 
     fn warning(self, source: &MeshSource<'_>, ignored: &str) -> Option<String> {
         let Self(count, first) = self;
-        (count > 0).then(|| ignored_lines(source.line(first), count, ignored))
+        (count > 0).then(|| ignored_lines_warning(source.line_number(first), count, ignored))
     }
 }
 
 /// Warning about ignored values on `count` lines.
-fn ignored_lines(first: usize, count: u64, ignored: &str) -> String {
+fn ignored_lines_warning(first: usize, count: u64, ignored: &str) -> String {
     match count {
         1 => format!("line {first}: ignored {ignored}"),
         _ => format!("line {first} and {} more: ignored {ignored}", count - 1),
@@ -66,30 +66,30 @@ const COLOR_INDEX: &str = "a color index without a colormap";
 const BINARY_OFF: &str = "binary OFF is not supported; convert it to text or PLY";
 const NOT_OFF: &str = "OFF";
 
-fn unsupported_variant(keyword: &[u8]) -> String {
-    format!("{} is not a supported OFF variant", shown(keyword))
+fn unsupported_variant_message(keyword: &[u8]) -> String {
+    format!("{} is not a supported OFF variant", quote_word(keyword))
 }
 
-fn missing_count(of: &str) -> String {
+fn missing_count_message(of: &str) -> String {
     format!("the file ends before the number of {of}")
 }
 
-fn negative_count(of: &str, number: i64) -> String {
+fn negative_count_message(of: &str, number: i64) -> String {
     format!("the number of {of} is {number}")
 }
 
-fn number_of(of: &str) -> String {
+fn count_label(of: &str) -> String {
     format!("the number of {of}")
 }
 
-fn counts_not_alone(found: &[u8]) -> String {
-    let found = shown(found);
+fn words_after_counts_message(found: &[u8]) -> String {
+    let found = quote_word(found);
     format!(
         "expected the end of the line after the three counts, found {found}; put each vertex and each face on its own line"
     )
 }
 
-fn implausible(vertices: u64, faces: u64, remaining: u64) -> String {
+fn implausible_counts_message(vertices: u64, faces: u64, remaining: u64) -> String {
     let count =
         |number: u64, one: &str, many: &str| format!("{number} {}", if number == 1 { one } else { many });
     let claim = format!(
@@ -103,15 +103,15 @@ fn implausible(vertices: u64, faces: u64, remaining: u64) -> String {
     }
 }
 
-fn truncated(index: u64, count: u64, items: &str) -> String {
+fn truncated_message(index: u64, count: u64, items: &str) -> String {
     format!("the file ends after {index} of {count} {items}")
 }
 
-fn too_many_corners(arity: usize) -> String {
+fn too_many_corners_message(arity: usize) -> String {
     format!("a face claims {arity} corners, more than the file can hold")
 }
 
-fn short_face(corner: usize, arity: usize) -> String {
+fn incomplete_face_message(corner: usize, arity: usize) -> String {
     format!("a face with {arity} corners ends after {corner}")
 }
 
@@ -143,12 +143,13 @@ impl OffColors {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
-        if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.one()) {
-            warnings.push(alpha_ignored(source.line(at)));
+        if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()) {
+            warnings.push(alpha_ignored_warning(source.line_number(at)));
         }
-        let outside = self.range.outside();
-        warnings.extend(outside.map(|(at, words)| format!("line {}: {words}", source.line(at))));
-        let bytes = |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.bytes(color));
+        let outside = self.range.out_of_range_warning();
+        warnings.extend(outside.map(|(at, words)| format!("line {}: {words}", source.line_number(at))));
+        let bytes =
+            |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.color_to_bytes(color));
         self.all.into_iter().map(bytes).collect()
     }
 }
@@ -156,8 +157,8 @@ impl OffColors {
 impl OffReader<'_> {
     fn read(mut self) -> Result<LoadedMesh, AssetError> {
         let header = self.header()?;
-        let vertices = self.count("vertices")?;
-        let faces = self.count("faces")?;
+        let vertices = self.read_count("vertices")?;
+        let faces = self.read_count("faces")?;
         self.skip_edge_count()?;
         self.check_plausible_counts(vertices, faces)?;
         let mut parsed = ParsedMesh::default();
@@ -172,7 +173,7 @@ impl OffReader<'_> {
         }
         parsed.warnings.extend(self.excess.warning(&self.source, UNDECLARED));
         parsed.warnings.extend(self.indices.warning(&self.source, COLOR_INDEX));
-        assemble_text(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
+        assemble_text_mesh(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
     }
 
     /// Returns the byte offset of a face, given its index. The reader must be at the first face.
@@ -180,22 +181,22 @@ impl OffReader<'_> {
         let mut ahead = *self;
         ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
         ahead.cursor.skip_to_word();
-        Some(ahead.cursor.at())
+        Some(ahead.cursor.offset())
     }
 
-    fn wrong<T>(&self, reason: impl Into<String>) -> Result<T, AssetError> {
-        Err(self.source.wrong_at(self.cursor.at(), reason))
+    fn fail<T>(&self, reason: impl Into<String>) -> Result<T, AssetError> {
+        Err(self.source.malformed_error_with_line(self.cursor.offset(), reason))
     }
 
-    fn unexpected<T>(&self, wanted: &str) -> Result<T, AssetError> {
+    fn fail_with_unexpected_word<T>(&self, wanted: &str) -> Result<T, AssetError> {
         let mut ahead = self.cursor;
-        self.wrong(expected(wanted, ahead.word()))
+        self.fail(expected_message(wanted, ahead.word()))
     }
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
     fn header(&mut self) -> Result<OffHeader, AssetError> {
         if !self.cursor.skip_to_word() {
-            return self.wrong(EMPTY_FILE);
+            return self.fail(EMPTY_FILE);
         }
         let start = self.cursor;
         let word = self.cursor.word();
@@ -205,14 +206,14 @@ impl OffReader<'_> {
         }
         let Some(end) = word.windows(3).position(|part| part == b"OFF") else {
             self.cursor = start;
-            return self.wrong(expected(NOT_OFF, word));
+            return self.fail(expected_message(NOT_OFF, word));
         };
         let (flags, digits) = (&word[..end], &word[end + 3..]);
         let known = flags.iter().all(|letter| b"STCN4".contains(letter));
         if !known || !digits.iter().all(u8::is_ascii_digit) {
-            return self.wrong(unsupported_variant(word));
+            return self.fail(unsupported_variant_message(word));
         }
-        self.cursor = Cursor::new(self.source.bytes, self.cursor.at() - digits.len());
+        self.cursor = Cursor::new(self.source.bytes, self.cursor.offset() - digits.len());
         self.refuse_binary()?;
         let has = |letter| flags.contains(&letter);
         Ok(OffHeader { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
@@ -221,38 +222,38 @@ impl OffReader<'_> {
     fn refuse_binary(&mut self) -> Result<(), AssetError> {
         let mut ahead = self.cursor;
         if ahead.skip_to_word_in_line() && ahead.word() == b"BINARY" {
-            return self.wrong(BINARY_OFF);
+            return self.fail(BINARY_OFF);
         }
         Ok(())
     }
 
-    fn count(&mut self, of: &str) -> Result<u64, AssetError> {
+    fn read_count(&mut self, of: &str) -> Result<u64, AssetError> {
         if !self.cursor.skip_to_word() {
             let end = self.source.bytes.trim_ascii_end().len();
-            return Err(self.source.wrong_at(end, missing_count(of)));
+            return Err(self.source.malformed_error_with_line(end, missing_count_message(of)));
         }
-        self.number(of)
+        self.read_nonnegative_integer(of)
     }
 
     /// Reads a nonnegative integer at the cursor.
-    fn number(&mut self, of: &str) -> Result<u64, AssetError> {
+    fn read_nonnegative_integer(&mut self, of: &str) -> Result<u64, AssetError> {
         match self.cursor.integer() {
             Some(number) => match u64::try_from(number) {
                 Ok(number) => Ok(number),
-                Err(_) => self.wrong(negative_count(of, number)),
+                Err(_) => self.fail(negative_count_message(of, number)),
             },
-            None => self.unexpected(&number_of(of)),
+            None => self.fail_with_unexpected_word(&count_label(of)),
         }
     }
 
     /// Skips the optional number of edges and the end of the line.
     fn skip_edge_count(&mut self) -> Result<(), AssetError> {
         if self.cursor.skip_to_word_in_line() {
-            self.number("edges")?;
+            self.read_nonnegative_integer("edges")?;
         }
         if self.cursor.skip_to_word_in_line() {
             let mut ahead = self.cursor;
-            return self.wrong(counts_not_alone(ahead.word()));
+            return self.fail(words_after_counts_message(ahead.word()));
         }
         self.cursor.end_line();
         Ok(())
@@ -263,8 +264,10 @@ impl OffReader<'_> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
         if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
-            let reason = implausible(vertices, faces, remaining);
-            return Err(self.source.wrong_at(self.cursor.at().saturating_sub(1), reason));
+            let reason = implausible_counts_message(vertices, faces, remaining);
+            return Err(self
+                .source
+                .malformed_error_with_line(self.cursor.offset().saturating_sub(1), reason));
         }
         Ok(())
     }
@@ -274,10 +277,10 @@ impl OffReader<'_> {
         let mut colors = OffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
-                self.source.tick(self.cursor.at())?;
+                self.source.report_progress(self.cursor.offset())?;
             }
             if !self.cursor.skip_to_word() {
-                return self.wrong(truncated(index, count, "vertices"));
+                return self.fail(truncated_message(index, count, "vertices"));
             }
             let position = self.read_vec3("a coordinate")?;
             let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
@@ -290,15 +293,15 @@ impl OffReader<'_> {
                 let (color, uv) = rest.split_at(rest.len().saturating_sub(if header.uvs { 2 } else { 0 }));
                 if header.uvs {
                     let [u, v] = *uv else {
-                        return self.wrong(expected_at_line_end("texture coordinates"));
+                        return self.fail(unexpected_line_end_message("texture coordinates"));
                     };
                     parsed.uvs.push(DVec2::new(u, v).as_vec2());
                 }
-                self.color(color, 1, &mut colors);
+                self.add_color(color, 1, &mut colors);
             } else if header.uvs {
                 parsed.uvs.push(self.read_uv()?);
             } else if self.cursor.skip_to_word_in_line() {
-                self.excess.add(self.cursor.at());
+                self.excess.add(self.cursor.offset());
             }
             self.cursor.end_line();
         }
@@ -307,13 +310,13 @@ impl OffReader<'_> {
     }
 
     /// Adds a color from the end of a line to `times` vertices or corners.
-    fn color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
-        colors.push(color, times, self.cursor.at());
+    fn add_color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
+        colors.push(color, times, self.cursor.offset());
         match color {
-            [_, _, _, alpha] => colors.add_alpha(*alpha, self.cursor.at()),
-            [_] => self.indices.add(self.cursor.at()),
+            [_, _, _, alpha] => colors.add_alpha(*alpha, self.cursor.offset()),
+            [_] => self.indices.add(self.cursor.offset()),
             [] | [_, _, _] => {}
-            [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.at()),
+            [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.offset()),
         }
     }
 
@@ -323,11 +326,11 @@ impl OffReader<'_> {
 
     fn float(&mut self, what: &str) -> Result<f64, AssetError> {
         if !self.cursor.skip_to_word_in_line() {
-            return self.wrong(expected_at_line_end(what));
+            return self.fail(unexpected_line_end_message(what));
         }
         match self.cursor.float() {
             Some(value) => Ok(value),
-            None => self.unexpected(what),
+            None => self.fail_with_unexpected_word(what),
         }
     }
 
@@ -356,10 +359,10 @@ impl OffReader<'_> {
         let mut colors = OffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
-                self.source.tick(self.cursor.at())?;
+                self.source.report_progress(self.cursor.offset())?;
             }
             if !self.cursor.skip_to_word() {
-                return self.wrong(truncated(index, count, "faces"));
+                return self.fail(truncated_message(index, count, "faces"));
             }
             self.face(vertices, parsed, &mut colors)?;
         }
@@ -372,31 +375,33 @@ impl OffReader<'_> {
         parsed: &mut ParsedMesh,
         colors: &mut OffColors,
     ) -> Result<(), AssetError> {
-        let arity = usize::try_from(self.number("corners")?).unwrap_or(usize::MAX);
+        let arity = usize::try_from(self.read_nonnegative_integer("corners")?).unwrap_or(usize::MAX);
         if arity.saturating_mul(2) > self.cursor.remaining() {
-            return self.wrong(too_many_corners(arity));
+            return self.fail(too_many_corners_message(arity));
         }
         for corner in 0..arity {
             if !self.cursor.skip_to_word_in_line() && (corner == 0 || !self.cursor.skip_to_word()) {
-                return self.wrong(short_face(corner, arity));
+                return self.fail(incomplete_face_message(corner, arity));
             }
             match self.cursor.integer() {
-                Some(vertex) if (0..vertices as i64).contains(&vertex) => parsed.faces.corner(vertex as u32),
-                Some(vertex) => return self.wrong(vertex_out_of_range(vertex, vertices)),
-                None => return self.unexpected("a vertex"),
+                Some(vertex) if (0..vertices as i64).contains(&vertex) => {
+                    parsed.faces.push_corner(vertex as u32);
+                }
+                Some(vertex) => return self.fail(vertex_out_of_range_message(vertex, vertices)),
+                None => return self.fail_with_unexpected_word("a vertex"),
             }
         }
         parsed.faces.end_face(arity);
         let (mut color, mut count) = ([0.0; 5], 0);
         while count < color.len() && self.cursor.skip_to_word_in_line() {
             let Some(number) = self.cursor.float() else {
-                self.excess.add(self.cursor.at());
+                self.excess.add(self.cursor.offset());
                 break;
             };
             color[count] = number;
             count += 1;
         }
-        self.color(&color[..count], arity, colors);
+        self.add_color(&color[..count], arity, colors);
         self.cursor.end_line();
         Ok(())
     }
@@ -404,7 +409,7 @@ impl OffReader<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::parsed::color_clamped;
+    use super::super::parsed::clamped_color_warning;
     use super::*;
     use crate::assets::read::Monitor;
     use crate::assets::rejection;
@@ -498,13 +503,13 @@ mod tests {
         }
         assert_eq!(off(["255 0 0", ""]), ([[red; 3], [white; 3]].concat(), vec![]));
         assert_eq!(off(["", ""]), (vec![], vec![]));
-        let index = ignored_lines(7, 1, COLOR_INDEX);
+        let index = ignored_lines_warning(7, 1, COLOR_INDEX);
         assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index]));
-        let clamped = vec![format!("line 8: {}", color_clamped(-1.0, 255.0))];
+        let clamped = vec![format!("line 8: {}", clamped_color_warning(-1.0, 255.0))];
         assert_eq!(off(["255 0 0", "-1 255 0"]), (both.0, clamped));
-        let transparent = vec![alpha_ignored(8)];
+        let transparent = vec![alpha_ignored_warning(8)];
         assert_eq!(off(["1 0 0", "0 1 0 0.5"]), ([[red; 3], [green; 3]].concat(), transparent));
-        let more = ignored_lines(7, 2, UNDECLARED);
+        let more = ignored_lines_warning(7, 2, UNDECLARED);
         assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more]));
         assert_eq!(
             corner_colors("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
@@ -522,7 +527,7 @@ mod tests {
 
     #[test]
     fn undeclared_numbers_are_reported_with_line() {
-        let more = ignored_lines(3, 4, UNDECLARED);
+        let more = ignored_lines_warning(3, 4, UNDECLARED);
         assert_eq!(corner_colors("OFF", " 0 0 1", ["", ""]), (vec![], vec![more.clone()]));
         assert_eq!(corner_colors("NOFF", " 0 0 1 7", ["", ""]).1, [more]);
         assert!(corner_colors("NOFF", " 0 0 1", ["", ""]).1.is_empty());
@@ -543,33 +548,33 @@ mod tests {
         let start = "OFF\n# comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
         let first_face = |face: &str| error(&format!("{start}{face}\n"));
         for (face, reason) in [
-            ("3 0 1 3", vertex_out_of_range(3, 3)),
-            ("3 0 -1 2", vertex_out_of_range(-1, 3)),
-            ("3 0 1 x", expected("a vertex", b"x")),
-            ("-3 0 1 2", negative_count("corners", -3)),
-            ("x 0 1 2", expected(&number_of("corners"), b"x")),
+            ("3 0 1 3", vertex_out_of_range_message(3, 3)),
+            ("3 0 -1 2", vertex_out_of_range_message(-1, 3)),
+            ("3 0 1 x", expected_message("a vertex", b"x")),
+            ("-3 0 1 2", negative_count_message("corners", -3)),
+            ("x 0 1 2", expected_message(&count_label("corners"), b"x")),
         ] {
             assert_eq!(first_face(face), (Some(7), reason));
         }
-        assert_eq!(first_face("3 0 1  \n").1, short_face(2, 3));
+        assert_eq!(first_face("3 0 1  \n").1, incomplete_face_message(2, 3));
         for (text, line, reason) in [
-            ("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n", 4, expected("a coordinate", b"zero")),
-            ("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n", 4, expected_at_line_end("a coordinate")),
-            ("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n", 6, truncated(1, 2, "faces")),
+            ("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n", 4, expected_message("a coordinate", b"zero")),
+            ("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n", 4, unexpected_line_end_message("a coordinate")),
+            ("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n", 6, truncated_message(1, 2, "faces")),
             ("", 1, EMPTY_FILE.to_owned()),
-            ("solid\n", 1, expected(NOT_OFF, b"solid")),
-            ("nOFF 3\n", 1, unsupported_variant(b"nOFF")),
+            ("solid\n", 1, expected_message(NOT_OFF, b"solid")),
+            ("nOFF 3\n", 1, unsupported_variant_message(b"nOFF")),
             ("OFF BINARY\n", 1, BINARY_OFF.to_owned()),
-            ("OFF\n-1 2 0\n", 2, negative_count("vertices", -1)),
-            ("OFF -3 1 0\n", 1, negative_count("vertices", -3)),
-            ("OFF\n3 -1 0\n", 2, negative_count("faces", -1)),
-            ("OFF\n1.5 2 0\n", 2, expected(&number_of("vertices"), b"1.5")),
-            ("OFF\n3 x 0\n", 2, expected(&number_of("faces"), b"x")),
-            ("OFF 3\n", 1, missing_count("faces")),
-            ("OFF", 1, missing_count("vertices")),
-            ("OFF 3 1 0", 1, implausible(3, 1, 0)),
-            ("OFF 3 1 x\n", 1, expected(&number_of("edges"), b"x")),
-            ("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n", 1, counts_not_alone(b"0")),
+            ("OFF\n-1 2 0\n", 2, negative_count_message("vertices", -1)),
+            ("OFF -3 1 0\n", 1, negative_count_message("vertices", -3)),
+            ("OFF\n3 -1 0\n", 2, negative_count_message("faces", -1)),
+            ("OFF\n1.5 2 0\n", 2, expected_message(&count_label("vertices"), b"1.5")),
+            ("OFF\n3 x 0\n", 2, expected_message(&count_label("faces"), b"x")),
+            ("OFF 3\n", 1, missing_count_message("faces")),
+            ("OFF", 1, missing_count_message("vertices")),
+            ("OFF 3 1 0", 1, implausible_counts_message(3, 1, 0)),
+            ("OFF 3 1 x\n", 1, expected_message(&count_label("edges"), b"x")),
+            ("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n", 1, words_after_counts_message(b"0")),
         ] {
             assert_eq!(error(text), (Some(line), reason), "{text}");
         }
@@ -578,10 +583,13 @@ mod tests {
     #[test]
     fn false_counts_cause_no_allocation() {
         let huge = 4_000_000_000;
-        assert_eq!(error("OFF\n4000000000 4000000000 0\n0 0 0\n").1, implausible(huge, huge, 6));
-        let overflow = expected(&number_of("vertices"), b"18446744073709551615");
+        assert_eq!(
+            error("OFF\n4000000000 4000000000 0\n0 0 0\n").1,
+            implausible_counts_message(huge, huge, 6)
+        );
+        let overflow = expected_message(&count_label("vertices"), b"18446744073709551615");
         assert_eq!(error("OFF\n18446744073709551615 1 0\n").1, overflow);
         let text = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n";
-        assert_eq!(error(text), (Some(6), too_many_corners(4_000_000_000)));
+        assert_eq!(error(text), (Some(6), too_many_corners_message(4_000_000_000)));
     }
 }

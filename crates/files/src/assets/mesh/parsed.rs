@@ -30,7 +30,7 @@ pub(crate) struct Faces {
 
 impl Faces {
     /// Adds a corner to the current face. Call [`Faces::end_face`] after the last corner.
-    pub(crate) fn corner(&mut self, vertex: u32) {
+    pub(crate) fn push_corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
@@ -51,7 +51,11 @@ impl Faces {
     }
 
     /// Replaces each corner's vertex with the first vertex at the same position.
-    pub(super) fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
+    pub(super) fn merge_coincident_vertices(
+        &mut self,
+        positions: &[Vec3],
+        token: &CancelToken,
+    ) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
         for place in coincident::find_coincident_vertices(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
@@ -106,7 +110,7 @@ pub(crate) struct ParsedMesh {
 
 /// Extreme values of a color component, each with the byte offset of its color.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Extremes {
+pub(crate) struct ComponentExtremes {
     least: Option<(f64, usize)>,
     greatest: Option<(f64, usize)>,
     non_finite: Option<(f64, usize)>,
@@ -114,7 +118,7 @@ pub(crate) struct Extremes {
     fraction: Option<(f64, usize)>,
 }
 
-impl Extremes {
+impl ComponentExtremes {
     pub(super) fn add(&mut self, value: f64, at: usize) {
         if !value.is_finite() {
             self.non_finite.get_or_insert((value, at));
@@ -137,32 +141,32 @@ impl Extremes {
     }
 
     /// Returns the byte offset of a color with a value outside [0, `one`], and a warning.
-    pub(super) fn outside(&self, one: f64) -> Option<(usize, String)> {
+    pub(super) fn out_of_range_warning(&self, one: f64) -> Option<(usize, String)> {
         let least = self.least.filter(|(least, _)| *least < 0.0);
         let greatest = self.greatest.filter(|(greatest, _)| *greatest > one);
         let (value, at) = self.non_finite.or(greatest).or(least)?;
-        Some((at, color_clamped(value, one)))
+        Some((at, clamped_color_warning(value, one)))
     }
 
     /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
-    pub(super) fn fraction(&self) -> Option<(usize, String)> {
-        self.fraction.map(|(value, at)| (at, color_not_integer(value)))
+    pub(super) fn fraction_warning(&self) -> Option<(usize, String)> {
+        self.fraction.map(|(value, at)| (at, fractional_color_warning(value)))
     }
 }
 
 /// Warning about colors that are out of range.
-pub(super) fn color_clamped(value: f64, one: f64) -> String {
+pub(super) fn clamped_color_warning(value: f64, one: f64) -> String {
     format!("the color component {value} is outside the range from 0 to {one}; such values are clamped")
 }
 
 /// Warning about fractions in colors declared as integers.
-pub(super) fn color_not_integer(value: f64) -> String {
+pub(super) fn fractional_color_warning(value: f64) -> String {
     format!("the header declares integer colors, but a component is {value}; fractions are dropped")
 }
 
 /// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ColorRange(Extremes);
+pub(crate) struct ColorRange(ComponentExtremes);
 
 impl ColorRange {
     /// Adds a color and its byte offset.
@@ -172,20 +176,20 @@ impl ColorRange {
 
     /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are
     /// assumed to be bright colors rather than bytes.
-    pub(crate) fn one(&self) -> f64 {
+    pub(crate) fn full_intensity(&self) -> f64 {
         let (max, has_fractions) = (self.0.max(), self.0.fraction.is_some());
         let are_bytes = max > 2.0 || (max > 1.0 && !has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
     }
 
     /// Returns the byte offset of a color with an out-of-range value, and a warning.
-    pub(super) fn outside(&self) -> Option<(usize, String)> {
-        self.0.outside(self.one())
+    pub(super) fn out_of_range_warning(&self) -> Option<(usize, String)> {
+        self.0.out_of_range_warning(self.full_intensity())
     }
 
     /// Converts a color in this range to bytes.
-    pub(crate) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
-        color_bytes(parts.map(|part| part / self.one()))
+    pub(crate) fn color_to_bytes(&self, parts: [f64; 3]) -> [u8; 3] {
+        color_bytes(parts.map(|part| part / self.full_intensity()))
     }
 }
 
@@ -198,7 +202,7 @@ pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
 pub(super) const ALPHA_IGNORED: &str = "color alpha is ignored";
 
 /// Like [`ALPHA_IGNORED`], but with a line number.
-pub(super) fn alpha_ignored(line: usize) -> String {
+pub(super) fn alpha_ignored_warning(line: usize) -> String {
     format!("line {line}: {ALPHA_IGNORED}")
 }
 

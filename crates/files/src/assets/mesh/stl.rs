@@ -5,9 +5,9 @@
 //! of the corners instead. Coincident corners are merged into one vertex. The format has no units and no
 //! standard colors.
 
-use super::assemble::{assemble, assemble_text};
+use super::assemble::{assemble, assemble_text_mesh};
 use super::parsed::{Faces, ParsedMesh};
-use super::text::{Cursor, expected, with_line_feeds};
+use super::text::{Cursor, convert_mac_line_ends, expected_message};
 use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::read;
 use crate::math::DVec3;
@@ -27,12 +27,12 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     }
     match detect_encoding(source.bytes) {
         StlEncoding::Text => {
-            let bytes = with_line_feeds(source.bytes);
+            let bytes = convert_mac_line_ends(source.bytes);
             let source = MeshSource { bytes: &bytes, ..*source };
             let mut reader =
                 TextReader { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
             let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
-            assemble_text(&source, parsed, |face| reader.start_of(face))
+            assemble_text_mesh(&source, parsed, |face| reader.polygon_offset(face))
         }
         StlEncoding::Binary => {
             assemble(source, ParsedMesh { has_separate_corners: true, ..read_binary(source)? })
@@ -59,28 +59,28 @@ fn detect_encoding(bytes: &[u8]) -> StlEncoding {
 
 /// Whether the file size matches the number of facets if the file is read as binary.
 fn has_binary_size(bytes: &[u8]) -> bool {
-    claimed_facets(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
+    declared_facet_count(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
 /// Number of facets according to a binary header. `None` if the file is too short.
-fn claimed_facets(bytes: &[u8]) -> Option<u64> {
+fn declared_facet_count(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..START)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
 /// Reads a binary STL file.
 fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
-    let Some(claimed) = claimed_facets(source.bytes) else {
-        return Err(source.wrong(not_stl(source.bytes.trim_ascii_start())));
+    let Some(claimed) = declared_facet_count(source.bytes) else {
+        return Err(source.malformed_error(not_stl_message(source.bytes.trim_ascii_start())));
     };
     let facets = source.bytes[START..].chunks_exact(FACET);
     let excess = facets.remainder().len();
     let found = facets.len() as u64;
     if found < claimed {
-        return Err(source.wrong(missing_facets(claimed, found)));
+        return Err(source.malformed_error(missing_facets_message(claimed, found)));
     }
     if found == 0 {
-        return Err(source.wrong(format!(
+        return Err(source.malformed_error(format!(
             "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET} bytes)"
         )));
     }
@@ -88,37 +88,40 @@ fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
     if claimed != 0 && (found > claimed || excess > 0) {
         let bytes = (found - claimed) * FACET as u64 + excess as u64;
-        warnings.push(excess_bytes(bytes, claimed));
+        warnings.push(excess_bytes_warning(bytes, claimed));
     }
     let mut parsed = ParsedMesh { warnings, ..ParsedMesh::default() };
     parsed.positions.reserve(3 * count as usize);
     for (index, facet) in facets.take(count as usize).enumerate() {
         if index % BATCH == 0 {
-            source.tick(START + index * FACET)?;
+            source.report_progress(START + index * FACET)?;
         }
         let (floats, _) = facet.as_chunks::<4>();
         let float = |place: usize| f64::from(f32::from_le_bytes(floats[place]));
         // The first three floats are the normal.
         for corner in 1..=3 {
-            add(&mut parsed, DVec3::new(float(3 * corner), float(3 * corner + 1), float(3 * corner + 2)));
+            add_corner(
+                &mut parsed,
+                DVec3::new(float(3 * corner), float(3 * corner + 1), float(3 * corner + 2)),
+            );
         }
         parsed.faces.end_face(3);
     }
     Ok(parsed)
 }
 
-fn not_stl(found: &[u8]) -> String {
+fn not_stl_message(found: &[u8]) -> String {
     let wanted = format!("text STL starting with solid, or binary STL of at least {START} bytes");
-    expected(&wanted, found)
+    expected_message(&wanted, found)
 }
 
-fn missing_facets(claimed: u64, found: u64) -> String {
+fn missing_facets_message(claimed: u64, found: u64) -> String {
     let facets = if claimed == 1 { "facet" } else { "facets" };
     format!("the header claims {claimed} {facets}, but the file ends after {found}")
 }
 
 /// Warning about bytes after the last facet.
-fn excess_bytes(bytes: u64, claimed: u64) -> String {
+fn excess_bytes_warning(bytes: u64, claimed: u64) -> String {
     format!("ignored {bytes} bytes after the {claimed} facets declared in the header")
 }
 
@@ -126,13 +129,13 @@ const VERTEX_OUTSIDE: &str = "a vertex is not between \"outer loop\" and \"endlo
 const ENDS_IN_FACET: &str = "the file ends inside a facet";
 const KEYWORD: &str = "an STL keyword";
 
-fn short_loop(corners: usize) -> String {
+fn short_loop_message(corners: usize) -> String {
     format!("a loop with only {corners} corners")
 }
 
 /// Adds a corner as a separate vertex.
-fn add(parsed: &mut ParsedMesh, position: DVec3) {
-    parsed.faces.corner(parsed.positions.len() as u32);
+fn add_corner(parsed: &mut ParsedMesh, position: DVec3) {
+    parsed.faces.push_corner(parsed.positions.len() as u32);
     parsed.positions.push(position);
 }
 
@@ -146,7 +149,7 @@ struct TextReader<'a> {
 
 impl TextReader<'_> {
     /// Returns the byte offset of a face's loop. `None` for faces with 3 corners.
-    fn start_of(&self, face: usize) -> Option<usize> {
+    fn polygon_offset(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }
 
@@ -157,7 +160,7 @@ impl TextReader<'_> {
         let mut words = 0;
         while self.cursor.skip_to_word() {
             if words % BATCH == 0 {
-                self.source.tick(self.cursor.at())?;
+                self.source.report_progress(self.cursor.offset())?;
             }
             words += 1;
             let start = self.cursor;
@@ -165,15 +168,15 @@ impl TextReader<'_> {
             let is = |name: &str| word.eq_ignore_ascii_case(name.as_bytes());
             if is("vertex") {
                 let Some(count) = &mut corners else {
-                    return self.wrong(start, VERTEX_OUTSIDE);
+                    return self.fail_with_line(start, VERTEX_OUTSIDE);
                 };
                 *count += 1;
                 let position = DVec3::new(self.float()?, self.float()?, self.float()?);
-                add(&mut parsed, position);
+                add_corner(&mut parsed, position);
             } else if is("loop") {
-                loop_start = start.at();
+                loop_start = start.offset();
                 if corners.replace(0).is_some() {
-                    return self.wrong(start, "a loop inside a loop");
+                    return self.fail_with_line(start, "a loop inside a loop");
                 }
             } else if is("endloop") {
                 match corners.take() {
@@ -184,39 +187,40 @@ impl TextReader<'_> {
                         faces += 1;
                         parsed.faces.end_face(count);
                     }
-                    Some(count) => return self.wrong(start, short_loop(count)),
-                    None => return self.wrong(start, "\"endloop\" without \"outer loop\""),
+                    Some(count) => return self.fail_with_line(start, short_loop_message(count)),
+                    None => return self.fail_with_line(start, "\"endloop\" without \"outer loop\""),
                 }
             } else if is("solid") || is("endsolid") {
                 self.skip_name();
             } else if is("normal") {
                 self.skip_normal();
             } else if !(is("facet") || is("outer") || is("endfacet")) {
-                return self.wrong(start, expected(KEYWORD, word));
+                return self.fail_with_line(start, expected_message(KEYWORD, word));
             }
             if parsed.positions.len() > Faces::MOST_CORNERS {
-                return self.wrong(start, "too many corners for one mesh; split it into several files");
+                return self
+                    .fail_with_line(start, "too many corners for one mesh; split it into several files");
             }
         }
         if corners.is_some() {
-            return self.wrong(self.cursor, ENDS_IN_FACET);
+            return self.fail_with_line(self.cursor, ENDS_IN_FACET);
         }
         Ok(parsed)
     }
 
-    fn wrong<T>(&self, at: Cursor<'_>, reason: impl Into<String>) -> Result<T, AssetError> {
+    fn fail_with_line<T>(&self, at: Cursor<'_>, reason: impl Into<String>) -> Result<T, AssetError> {
         let end = self.source.bytes.trim_ascii_end().len();
-        Err(self.source.wrong_at(at.at().min(end), reason))
+        Err(self.source.malformed_error_with_line(at.offset().min(end), reason))
     }
 
     fn float(&mut self) -> Result<f64, AssetError> {
         if !self.cursor.skip_to_word() {
-            return self.wrong(self.cursor, "the file ends inside a vertex");
+            return self.fail_with_line(self.cursor, "the file ends inside a vertex");
         }
         let mut start = self.cursor;
         match self.cursor.float() {
             Some(value) => Ok(value),
-            None => self.wrong(self.cursor, expected("a coordinate", start.word())),
+            None => self.fail_with_line(self.cursor, expected_message("a coordinate", start.word())),
         }
     }
 
@@ -225,7 +229,7 @@ impl TextReader<'_> {
     fn skip_name(&mut self) {
         let bytes = self.source.bytes;
         let is_blank = |byte: &u8| byte.is_ascii_whitespace();
-        let mut at = self.cursor.at();
+        let mut at = self.cursor.offset();
         while bytes.get(at).is_some_and(|byte| *byte != b'\n') {
             let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
             if word.eq_ignore_ascii_case(b"facet") {
@@ -400,24 +404,28 @@ mod tests {
         bytes.extend(b"rest");
         let loaded = read(&bytes).expect("read");
         assert_eq!(loaded.mesh.triangles.len(), 3);
-        assert_eq!(loaded.warnings, [excess_bytes(54, 3)]);
+        assert_eq!(loaded.warnings, [excess_bytes_warning(54, 3)]);
     }
 
     #[test]
     fn errors_include_line_and_reason() {
         let cut = binary_of(b"", 9, &TETRAHEDRON);
-        assert_eq!(error(&cut), (None, missing_facets(9, 4)));
-        assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, missing_facets(u64::from(u32::MAX), 0));
-        assert_eq!(error(b"PK\x03\x04 an archive").1, not_stl(b"PK\x03\x04 an archive"));
+        assert_eq!(error(&cut), (None, missing_facets_message(9, 4)));
+        assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, missing_facets_message(u64::from(u32::MAX), 0));
+        assert_eq!(error(b"PK\x03\x04 an archive").1, not_stl_message(b"PK\x03\x04 an archive"));
         let wide: Vec<u8> = "solid a\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(error(&wide), (Some(1), read::UTF16_TEXT.to_owned()));
         assert_eq!(error(b"solid a\nendsolid a\n"), (None, NO_FACES.to_owned()));
         for (text, line, reason) in [
-            ("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n", 4, expected("a coordinate", b"x")),
+            (
+                "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n",
+                4,
+                expected_message("a coordinate", b"x"),
+            ),
             ("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 1\n", 4, ENDS_IN_FACET.to_owned()),
             ("solid\nvertex 0 0 1\n", 2, VERTEX_OUTSIDE.to_owned()),
-            ("solid\nouter loop\nvertex 0 0 1\nendloop\n", 4, short_loop(1)),
-            ("solid\ncube 1\n", 2, expected(KEYWORD, b"cube")),
+            ("solid\nouter loop\nvertex 0 0 1\nendloop\n", 4, short_loop_message(1)),
+            ("solid\ncube 1\n", 2, expected_message(KEYWORD, b"cube")),
         ] {
             assert_eq!(error(text.as_bytes()), (Some(line), reason), "{text}");
         }

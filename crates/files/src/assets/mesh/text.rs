@@ -13,7 +13,7 @@ use crate::assets::read;
 use crate::control::{CancelToken, Cancelled};
 
 /// Replaces carriage returns with line feeds in files without line feeds (classic Mac OS).
-pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
+pub(super) fn convert_mac_line_ends(bytes: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
         return Cow::Borrowed(bytes);
     }
@@ -27,7 +27,7 @@ pub(super) fn strip_byte_order_mark(bytes: &[u8]) -> &[u8] {
 
 /// Decodes a line as UTF-8. If it is not valid UTF-8, decodes it as Latin-1, where each byte is one
 /// character.
-pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
+pub(super) fn decode_line(line: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(line) {
         Ok(text) => Cow::Borrowed(text),
         Err(_) => Cow::Owned(line.iter().copied().map(char::from).collect()),
@@ -54,7 +54,7 @@ impl Lines {
         let mut reader = BufReader::with_capacity(Self::BUFFER, file);
         let unreadable = |error| AssetError::unreadable(path, read::describe_error(&error));
         let start = reader.fill_buf().map_err(unreadable)?;
-        let end = if matches!(with_line_feeds(start), Cow::Owned(_)) { b'\r' } else { b'\n' };
+        let end = if matches!(convert_mac_line_ends(start), Cow::Owned(_)) { b'\r' } else { b'\n' };
         let mark = start.len() - strip_byte_order_mark(start).len();
         reader.consume(mark);
         Ok(Self { reader, end, line: Vec::new() })
@@ -103,7 +103,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Byte offset.
-    pub(super) fn at(&self) -> usize {
+    pub(super) fn offset(&self) -> usize {
         self.at
     }
 
@@ -182,17 +182,17 @@ impl<'a> Cursor<'a> {
 }
 
 /// Formats the first 20 bytes of a word for a message. Control characters are escaped.
-pub(super) fn shown(bytes: &[u8]) -> String {
+pub(super) fn quote_word(bytes: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(20)]))
 }
 
 /// Error message for an unexpected word.
-pub(super) fn expected(wanted: &str, found: &[u8]) -> String {
-    format!("expected {wanted}, found {}", shown(found))
+pub(super) fn expected_message(wanted: &str, found: &[u8]) -> String {
+    format!("expected {wanted}, found {}", quote_word(found))
 }
 
 /// Error message for a line that ends too early.
-pub(super) fn expected_at_line_end(wanted: &str) -> String {
+pub(super) fn unexpected_line_end_message(wanted: &str) -> String {
     format!("expected {wanted}, found the end of the line")
 }
 
@@ -213,9 +213,9 @@ mod tests {
 
     #[test]
     fn lone_carriage_returns_become_line_feeds() {
-        assert_eq!(*with_line_feeds(b"a\rb\r"), *b"a\nb\n");
+        assert_eq!(*convert_mac_line_ends(b"a\rb\r"), *b"a\nb\n");
         for as_it_is in [b"a\r\nb\rc".as_slice(), b"a\nb", b"a", b""] {
-            assert!(matches!(with_line_feeds(as_it_is), Cow::Borrowed(same) if same == as_it_is));
+            assert!(matches!(convert_mac_line_ends(as_it_is), Cow::Borrowed(same) if same == as_it_is));
         }
     }
 

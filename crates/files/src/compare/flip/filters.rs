@@ -52,7 +52,7 @@ impl Filters {
             [&zeros, taps, &zeros].concat()
         };
         let blurs = SENSITIVITY.map(|terms| {
-            let mut blurs = blurs(terms, blur_radius, pixels_per_degree);
+            let mut blurs = contrast_sensitivity_blurs(terms, blur_radius, pixels_per_degree);
             blurs.iter_mut().for_each(|blur| blur.taps = padded(&blur.taps, blur_radius));
             blurs
         });
@@ -93,10 +93,10 @@ impl Filters {
     /// Detects edges and points in the achromatic channel.
     pub(super) fn detect_features(&self, y: &Plane) -> Features {
         let lightness = Plane { values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(), ..*y };
-        let smooth = lightness.along_rows(&self.smooth);
+        let smooth = lightness.filter_along_rows(&self.smooth);
         let strengths = |taps: &[f64]| {
-            let across = lightness.along_rows(taps).along_columns(&self.smooth);
-            let down = smooth.along_columns(taps);
+            let across = lightness.filter_along_rows(taps).filter_along_columns(&self.smooth);
+            let down = smooth.filter_along_columns(taps);
             across.values.iter().zip(&down.values).map(|(x, y)| (x * x + y * y).sqrt()).collect()
         };
         Features { edges: strengths(&self.edge), points: strengths(&self.point) }
@@ -104,7 +104,11 @@ impl Filters {
 }
 
 /// Creates the Gaussian blurs for a channel. Their weights are chosen so that all 2D taps sum to 1.
-fn blurs(terms: &[SensitivityTerm], radius: usize, pixels_per_degree: f64) -> Vec<WeightedBlur> {
+fn contrast_sensitivity_blurs(
+    terms: &[SensitivityTerm],
+    radius: usize,
+    pixels_per_degree: f64,
+) -> Vec<WeightedBlur> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;

@@ -74,7 +74,7 @@ fn opponent_planes(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Pla
     for row in 0..height {
         let y = position(tile.y, row, pair.height());
         for column in 0..width {
-            let pixel = pair.at(position(tile.x, column, pair.width()), y)[which];
+            let pixel = pair.pixel_pair(position(tile.x, column, pair.width()), y)[which];
             let OpponentColor { y, cx, cz } =
                 OpponentColor::from_linear(pixel.clamp(Vec3::ZERO, Vec3::ONE).as_dvec3());
             for (plane, value) in planes.iter_mut().zip([y, cx, cz]) {

@@ -6,10 +6,10 @@ use super::super::SOFTWARE;
 use super::super::png::add_text;
 use super::frame_time;
 use crate::control::CancelToken;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 pub(super) fn encode(
-    frames: &[Picture],
+    frames: &[Srgb8Image],
     metadata: &[(String, String)],
     token: &CancelToken,
 ) -> Result<Vec<u8>, EncodingError> {

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Width and height of the pattern.
 const SIDE: usize = 4;
@@ -28,7 +28,7 @@ impl Dither {
     /// Dithers an image and returns the palette index of each pixel.
     pub(super) fn palette_indices(
         &self,
-        picture: &Picture,
+        picture: &Srgb8Image,
         token: &CancelToken,
     ) -> Result<Vec<u8>, Cancelled> {
         let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();

@@ -8,7 +8,7 @@ use super::super::{SOFTWARE, one_line};
 use super::dither::Dither;
 use super::frame_time;
 use crate::control::CancelToken;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Size of the palette.
 const COLORS: usize = 256;
@@ -18,7 +18,7 @@ const SAMPLES: usize = 1 << 20;
 const EVERY_SAMPLE: i32 = 1;
 
 pub(super) fn encode(
-    frames: &[Picture],
+    frames: &[Srgb8Image],
     metadata: &[(String, String)],
     token: &CancelToken,
 ) -> Result<Vec<u8>, EncodingError> {
@@ -39,7 +39,7 @@ pub(super) fn encode(
     // Compress several frames in parallel.
     let delay = frame_time(frames.len(), 100.0).round() as u16;
     let dither = Dither::new(&palette);
-    let compress = |picture: &Picture| {
+    let compress = |picture: &Srgb8Image| {
         let buffer = dither.palette_indices(picture, token)?;
         let mut frame = Frame { delay, width, height, buffer: buffer.into(), ..Frame::default() };
         frame.make_lzw_pre_encoded();
@@ -60,7 +60,7 @@ pub(super) fn encode(
 }
 
 /// Chooses a palette for all frames, with three bytes per color.
-fn palette(frames: &[Picture]) -> Vec<u8> {
+fn palette(frames: &[Srgb8Image]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
     // An odd step avoids sampling the same columns in every row.
     let step = (pixels / SAMPLES) | 1;

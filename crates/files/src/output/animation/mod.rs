@@ -6,7 +6,7 @@ mod gif;
 
 use super::{AnimationFormat, OutputError};
 use crate::control::CancelToken;
-use crate::film::Picture;
+use crate::film::Srgb8Image;
 
 /// Duration of an animation (a full turn of the camera) in seconds.
 const TURN_SECONDS: f64 = 4.0;
@@ -19,7 +19,7 @@ const SHORTEST_FRAME: f64 = 0.02;
 /// The format does not support the frames, the encoder fails, or the work is cancelled
 /// ([`OutputError::Cancelled`]).
 pub fn encode(
-    frames: &[Picture],
+    frames: &[Srgb8Image],
     metadata: &[(String, String)],
     format: AnimationFormat,
     token: &CancelToken,
@@ -27,7 +27,7 @@ pub fn encode(
     let failed = |why: String| OutputError::Animation { format, why };
     let Some(first) = frames.first() else { return Err(failed("has no frames".to_owned())) };
     format.check_size(first.width, first.height)?;
-    let fits = |frame: &Picture| {
+    let fits = |frame: &Srgb8Image| {
         (frame.width, frame.height) == (first.width, first.height)
             && frame.pixels.len() == first.width as usize * first.height as usize
     };

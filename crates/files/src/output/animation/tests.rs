@@ -3,17 +3,17 @@ use std::path::Path;
 use super::*;
 
 /// A gradient with a moving square.
-fn frame(number: u32) -> Picture {
+fn frame(number: u32) -> Srgb8Image {
     let (width, height) = (96, 40);
     let pixel = |i: u32| {
         let (x, y) = (i % width, i / width);
         let is_square = (10..20).contains(&y) && (number * 7..number * 7 + 10).contains(&x);
         if is_square { [250, 20, 30] } else { [(x + 60) as u8, (2 * x + 9) as u8, (250 - 4 * y) as u8] }
     };
-    Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
+    Srgb8Image { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
-fn frames() -> Vec<Picture> {
+fn frames() -> Vec<Srgb8Image> {
     (0..8).map(frame).collect()
 }
 
@@ -68,9 +68,9 @@ fn gif_dithering_preserves_gradients_on_average() {
             let (x, y, k) = (i % 96, i / 96, number % 8);
             [(25 * k + x / 4) as u8, (220 - 22 * k + y / 2) as u8, (90 + 60 * (k % 3) + (x + y) / 6) as u8]
         };
-        Picture { width: 96, height: 40, pixels: (0..96 * 40).map(pixel).collect() }
+        Srgb8Image { width: 96, height: 40, pixels: (0..96 * 40).map(pixel).collect() }
     };
-    let frames: Vec<Picture> = (0..8).map(smooth).collect();
+    let frames: Vec<Srgb8Image> = (0..8).map(smooth).collect();
     let bytes = encode(&frames, &[], AnimationFormat::Gif, &CancelToken::new()).expect("encoded");
     let shown = decoded(&bytes);
     assert_eq!(shown.len(), frames.len());
@@ -87,7 +87,7 @@ fn gif_dithering_preserves_gradients_on_average() {
         [0, 1, 2].map(|channel| (0..16).map(|i| f64::from(pixels[at(i) + channel])).sum::<f64>() / 16.0)
     };
     // Mean distance between block means, in 8-bit levels.
-    let off = |frame: &Picture, shown: &[u8]| {
+    let off = |frame: &Srgb8Image, shown: &[u8]| {
         let blocks = (0..10).flat_map(|y| (0..24).map(move |x| (x, y)));
         let each = blocks.map(|(x, y)| {
             let (wanted, found) = (block(frame.pixels.as_flattened(), x, y), block(shown, x, y));
@@ -95,7 +95,7 @@ fn gif_dithering_preserves_gradients_on_average() {
         });
         each.sum::<f64>() / 240.0
     };
-    let banded = |frame: &Picture| frame.pixels.iter().flat_map(nearest).collect::<Vec<u8>>();
+    let banded = |frame: &Srgb8Image| frame.pixels.iter().flat_map(nearest).collect::<Vec<u8>>();
     let dithered: f64 = frames.iter().zip(&shown).map(|(frame, shown)| off(frame, shown)).sum();
     let plain: f64 = frames.iter().map(|frame| off(frame, &banded(frame))).sum();
     assert!(
@@ -122,7 +122,7 @@ fn static_gif_pixels_are_equal_in_all_frames() {
 #[test]
 fn images_with_few_colors_are_lossless() {
     let pixels = (0..64).map(|i| [[1, 2, 3], [250, 128, 7], [77, 77, 78]][i % 3]).collect();
-    let frame = Picture { width: 8, height: 8, pixels };
+    let frame = Srgb8Image { width: 8, height: 8, pixels };
     let frames = vec![frame; 8];
     let bytes = encode(&frames, &[], AnimationFormat::Gif, &CancelToken::new()).expect("encoded");
     assert!(decoded(&bytes).iter().all(|shown| shown == frames[0].pixels.as_flattened()));
@@ -131,11 +131,11 @@ fn images_with_few_colors_are_lossless() {
 #[test]
 fn invalid_frames_and_cancellation_are_errors() {
     let token = CancelToken::new();
-    let wide = Picture { width: 70_000, height: 1, pixels: vec![[0; 3]; 70_000] };
+    let wide = Srgb8Image { width: 70_000, height: 1, pixels: vec![[0; 3]; 70_000] };
     let error = encode(&[wide], &[], AnimationFormat::Gif, &token).expect_err("too wide");
     assert!(matches!(error, OutputError::Animation { format: AnimationFormat::Gif, .. }), "{error}");
     assert!(encode(&[], &[], AnimationFormat::Gif, &token).is_err());
-    let odd = Picture { width: 2, height: 1, pixels: vec![[0; 3]; 2] };
+    let odd = Srgb8Image { width: 2, height: 1, pixels: vec![[0; 3]; 2] };
     assert!(encode(&[frame(0), odd], &[], AnimationFormat::Apng, &token).is_err());
     token.cancel();
     for format in [AnimationFormat::Gif, AnimationFormat::Apng] {

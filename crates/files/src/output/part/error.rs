@@ -29,7 +29,7 @@ pub enum PartError {
         source: io::Error,
     },
     /// The path is not a regular file.
-    #[error("{}: it is {}, not a part or checkpoint", path.display(), kind.words())]
+    #[error("{}: it is {}, not a part or checkpoint", path.display(), kind.description())]
     NotRegular {
         /// The path.
         path: PathBuf,
@@ -101,7 +101,7 @@ pub enum PartError {
         count: u32,
     },
     /// Some parts are missing.
-    #[error("{}; render them with --shard, or merge the others with --partial", missing_parts(missing, *count))]
+    #[error("{}; render them with --shard, or merge the others with --partial", missing_parts_message(missing, *count))]
     Missing {
         /// Indices of the missing parts.
         missing: Vec<u32>,
@@ -118,14 +118,14 @@ pub enum PartError {
 
 impl PartError {
     /// Whether too many files are open in the process or the system. Opening more files would also fail.
-    pub fn is_out_of_files(&self) -> bool {
+    pub fn is_too_many_open_files(&self) -> bool {
         let Self::Unreadable { source, .. } = self else { return false };
         matches!(source.raw_os_error().map(Errno::from_raw), Some(Errno::EMFILE | Errno::ENFILE))
     }
 }
 
 /// Describes missing parts, for example `2 of 8 parts are missing: 3/8, 4/8`.
-pub fn missing_parts(missing: &[u32], count: u32) -> String {
+pub fn missing_parts_message(missing: &[u32], count: u32) -> String {
     format!("{} of {count} parts are missing: {}", missing.len(), part_list(missing, count))
 }
 

@@ -13,7 +13,7 @@ use crate::film::{Convergence, Film, FilmError, Quantity, Rect, SumOrder};
 
 /// Header of a part or checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+pub struct PartHeader {
     /// Type of the file.
     pub kind: PartKind,
     /// Everything the image depends on, with user-visible names.
@@ -61,7 +61,7 @@ pub struct Dependency {
     pub value: String,
 }
 
-impl Head {
+impl PartHeader {
     /// Whether all numbers are in range.
     pub(super) fn has_valid_numbers(&self) -> bool {
         /// Maximum width, height and number of parts.
@@ -80,17 +80,20 @@ impl Head {
     }
 
     /// Returns the name of the input file with this hexadecimal hash. `None` if no input file has this hash.
-    pub(super) fn input_with_hash(&self, hash: &str) -> Option<&str> {
+    pub(super) fn input_name_by_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
-        self.identity.iter().find(matches).map(|input| name_of(&input.name))
+        self.identity.iter().find(matches).map(|input| strip_file_prefix(&input.name))
     }
 
     /// Searches the input files, then the scene's other references, for a name that matches the end of
     /// `path`. The file need not exist. Returns the name, relative to the scene's folder.
-    pub(super) fn input_matching_path(&self, path: &Path) -> Option<&str> {
+    pub(super) fn input_name_by_path(&self, path: &Path) -> Option<&str> {
         let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         let references = self.references.iter().map(String::as_str);
-        inputs.map(|input| name_of(&input.name)).chain(references).find(|name| is_end_of_path(name, path))
+        inputs
+            .map(|input| strip_file_prefix(&input.name))
+            .chain(references)
+            .find(|name| is_end_of_path(name, path))
     }
 }
 
@@ -197,7 +200,7 @@ impl ImageHeader {
     }
 
     /// Returns the settings for encoding the image file. `None` if a name is unknown.
-    pub fn finish(&self) -> Option<DevelopSettings> {
+    pub fn develop_settings(&self) -> Option<DevelopSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
             Some(word) => RangeMap::Unresolved(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
@@ -220,7 +223,7 @@ impl ImageHeader {
     ///
     /// # Errors
     /// There is not enough memory.
-    pub fn film(&self) -> Result<Film, FilmError> {
+    pub fn create_film(&self) -> Result<Film, FilmError> {
         let [x, y, width, height] = self.crop;
         let film = Film::new(self.width, self.height, Some(Rect { x, y, width, height }))?;
         Ok(match self.is_by_photons {
@@ -231,7 +234,11 @@ impl ImageHeader {
 }
 
 /// Describes the differences between two lists of inputs. `here` and `there` are the names of the lists.
-pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &str)) -> Vec<String> {
+pub fn dependency_differences(
+    a: &[Dependency],
+    b: &[Dependency],
+    (here, there): (&str, &str),
+) -> Vec<String> {
     let value_of = |all: &[Dependency], name: &str| {
         all.iter().find(|input| input.name == name).map(|input| input.value.clone())
     };
@@ -240,7 +247,7 @@ pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &st
     names.extend(b.iter().map(|input| input.name.as_str()).filter(|name| value_of(a, name).is_none()));
     let differing = names.into_iter().filter(|name| value_of(a, name) != value_of(b, name));
     let differing: Vec<&str> = differing.collect();
-    let is_named = differing.iter().any(|name| !is_content(name));
+    let is_named = differing.iter().any(|name| !is_content_hash(name));
     differing
         .iter()
         // The total hash is only useful if nothing else differs.
@@ -248,11 +255,13 @@ pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &st
         .filter(|name| !is_named || **name != EVERYTHING)
         .map(|name| match (value_of(a, name), value_of(b, name)) {
             _ if *name == EVERYTHING => "the scene's shapes, materials, lights or camera differ".to_owned(),
-            (Some(_), Some(_)) if is_content(name) => format!("{} has different content", name_of(name)),
-            (a, b) if is_content(name) => {
+            (Some(_), Some(_)) if is_content_hash(name) => {
+                format!("{} has different content", strip_file_prefix(name))
+            }
+            (a, b) if is_content_hash(name) => {
                 let place = if a.is_some() { here } else { there };
                 debug_assert!(a.is_some() != b.is_some());
-                format!("{} is only used {place}", name_of(name))
+                format!("{} is only used {place}", strip_file_prefix(name))
             }
             (Some(a), Some(b)) if *name == PROGRAM => {
                 format!("it was rendered by glimt {a} {here} and glimt {b} {there}; use the same build")
@@ -268,11 +277,11 @@ const PROGRAM: &str = "glimt";
 /// Name of the input that contains the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
-fn is_content(name: &str) -> bool {
+fn is_content_hash(name: &str) -> bool {
     name.starts_with(FILE) || name == EVERYTHING
 }
 
-fn name_of(name: &str) -> &str {
+fn strip_file_prefix(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
@@ -291,7 +300,7 @@ impl Dependency {
     }
 
     /// Creates the input that contains the hash of everything the image depends on.
-    pub fn everything(key: impl Into<String>) -> Self {
+    pub fn combined_hash(key: impl Into<String>) -> Self {
         Self { name: EVERYTHING.to_owned(), value: key.into() }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::head::{Head, PartKind, differences};
+use super::head::{PartHeader, PartKind, dependency_differences};
 use super::{PartError, PartFile};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -44,8 +44,8 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
 }
 
 /// Describes how two headers differ in the image or in its division into parts.
-fn head_differences(a: &Head, b: &Head) -> Vec<String> {
-    let mut found = differences(&a.identity, &b.identity, ("here", "there"));
+fn head_differences(a: &PartHeader, b: &PartHeader) -> Vec<String> {
+    let mut found = dependency_differences(&a.identity, &b.identity, ("here", "there"));
     let counts = (a.share.count, b.share.count);
     if counts.0 != counts.1 {
         found.push(format!("the image has {} parts here and {} there", counts.0, counts.1));
@@ -90,12 +90,12 @@ pub fn merge(
     if !missing.is_empty() && !is_partial {
         return Err(PartError::Missing { missing, count });
     }
-    let film = first.head.picture.film()?;
+    let film = first.head.picture.create_film()?;
     for tile in 0..film.tile_count() {
         token.check()?;
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
-            0 => whole_tile(parts, tile, area)?,
+            0 => tile_in_single_part(parts, tile, area)?,
             blocks => sum_blocks(parts, blocks, tile, area)?,
         };
         let is_complete = stored.as_ref().is_some_and(|(_, is_complete)| *is_complete);
@@ -106,7 +106,7 @@ pub fn merge(
         if let Some((stored, _)) = stored {
             let why = format!("tile {tile} does not belong to this image");
             let damaged = |_| PartError::Damaged { path: first.path.clone(), why };
-            film.restore(tile, stored).map_err(damaged)?;
+            film.restore_tile(tile, stored).map_err(damaged)?;
         }
         tell(tile + 1, &film);
     }
@@ -115,10 +115,14 @@ pub fn merge(
 }
 
 /// Returns a tile that only one part contains, and whether the tile has all of its samples.
-fn whole_tile(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(StoredTile, bool)>, PartError> {
+fn tile_in_single_part(
+    parts: &[PartFile],
+    tile: usize,
+    area: usize,
+) -> Result<Option<(StoredTile, bool)>, PartError> {
     let mut found: Option<(StoredTile, &PartFile)> = None;
     for part in parts {
-        let Some(stored) = part.tile(tile, area)? else { continue };
+        let Some(stored) = part.read_tile(tile, area)? else { continue };
         if let Some((_, twin)) = &found {
             let why = format!("it contains tile {tile}, which is also in {}", twin.path.display());
             return Err(PartError::Damaged { path: part.path.clone(), why });
@@ -138,7 +142,7 @@ fn sum_blocks(
     let damaged = |part: &PartFile, why: String| PartError::Damaged { path: part.path.clone(), why };
     let mut tiles = Vec::new();
     for part in parts {
-        if let Some(stored) = part.tile(tile, area)? {
+        if let Some(stored) = part.read_tile(tile, area)? {
             tiles.push((part, stored));
         }
     }

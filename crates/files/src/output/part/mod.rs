@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | 12 | magic number, not used by any image format |
 //! | 4 | format version |
-//! | 4, n | length of the header, and the header: [`Head`] as JSON |
+//! | 4, n | length of the header, and the header: [`PartHeader`] as JSON |
 //! | 16 | digest of all preceding bytes |
 //! | 4, 4, n, 16 | for each tile with samples: index, length, data, digest |
 //! | 4, 4, n, 16 | the footer in the same form, with an index not used by tiles: counts, digest of all records, render state |
@@ -19,10 +19,12 @@ mod merge;
 mod read;
 mod save;
 
-pub use error::{PartError, PartIndex, missing_parts};
-pub use head::{Dependency, Head, ImageHeader, PartKind, PartShare, ToneHeader, differences};
+pub use error::{PartError, PartIndex, missing_parts_message};
+pub use head::{
+    Dependency, ImageHeader, PartHeader, PartKind, PartShare, ToneHeader, dependency_differences,
+};
 pub use merge::{MergedParts, check, merge};
-pub use read::{PartFile, input_with_content, input_with_name, is_part};
+pub use read::{PartFile, input_name_by_content, input_name_by_path, is_part};
 pub use save::save;
 
 /// Magic number. As in PNG, a program that converts the file as if it were text corrupts the number, so the

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 
-use super::head::{Head, PartKind};
+use super::head::{PartHeader, PartKind};
 use super::{Digest, FOOTER, Footer, MARK, PartError, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -19,7 +19,7 @@ pub struct PartFile {
     /// Path of the file.
     pub path: PathBuf,
     /// Header.
-    pub head: Head,
+    pub head: PartHeader,
     /// State of the render that wrote the file.
     pub state: serde_json::Value,
     /// Number of nonfinite samples.
@@ -42,21 +42,21 @@ pub fn is_part(path: &Path) -> bool {
 /// Finds an input file that has the same content as the file at `path`, and returns its name. Input files
 /// must not be overwritten, even if the parts were rendered on another machine. `None` if there is no such
 /// input or the file cannot be read.
-pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn input_name_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open(path).ok()?).ok()?;
     let hash = hasher.finalize().to_hex();
-    parts.iter().find_map(|part| part.head.input_with_hash(&hash))
+    parts.iter().find_map(|part| part.head.input_name_by_hash(&hash))
 }
 
 /// Finds an input file whose name matches the end of `path`, and returns the name. Unlike a comparison of
 /// contents, this also finds files that were missing or have changed since.
-pub fn input_with_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn input_name_by_path<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
     parts
         .iter()
-        .find_map(|part| [&absolute, &real].into_iter().find_map(|path| part.head.input_matching_path(path)))
+        .find_map(|part| [&absolute, &real].into_iter().find_map(|path| part.head.input_name_by_path(path)))
 }
 
 impl PartFile {
@@ -70,30 +70,30 @@ impl PartFile {
         let file = open(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
         let mut reader = PartReader { path, file: BufReader::with_capacity(1 << 20, &file), at: 0, size };
-        let (head, header_digest) = reader.head()?;
+        let (head, header_digest) = reader.read_header()?;
         // Read the tiles up to the footer.
         let (mut tiles, mut records) = (Vec::<(u32, u64, u32)>::new(), blake3::Hasher::new());
         let mut bytes = Vec::new();
         let end = loop {
             token.check()?;
-            let (number, offset, digest) = reader.record(&header_digest, &mut bytes)?;
+            let (number, offset, digest) = reader.read_record(&header_digest, &mut bytes)?;
             if number == FOOTER {
                 break serde_json::from_slice::<Footer>(&bytes);
             }
             if tiles.last().is_some_and(|(last, ..)| *last >= number) {
-                return Err(reader.damaged("the tiles are out of order"));
+                return Err(reader.damaged_error("the tiles are out of order"));
             }
             records.update(&digest);
             tiles.push((number, offset, bytes.len() as u32));
         };
-        let end = end.map_err(|_| reader.damaged("the footer is malformed"))?;
+        let end = end.map_err(|_| reader.damaged_error("the footer is malformed"))?;
         let is_complete =
             end.tiles == tiles.len() as u64 && end.records == records.finalize().to_hex().as_str();
         if !is_complete {
-            return Err(reader.damaged("some tiles are missing"));
+            return Err(reader.damaged_error("some tiles are missing"));
         }
         if reader.at != size {
-            return Err(reader.damaged(&format!("{} bytes follow the footer", size - reader.at)));
+            return Err(reader.damaged_error(&format!("{} bytes follow the footer", size - reader.at)));
         }
         let Footer { non_finite, state, .. } = end;
         Ok(Self { path: path.to_owned(), head, state, non_finite, file, header_digest, tiles })
@@ -103,11 +103,11 @@ impl PartFile {
     ///
     /// # Errors
     /// Same as [`Self::open`].
-    pub fn head(path: &Path) -> Result<Head, PartError> {
+    pub fn read_header(path: &Path) -> Result<PartHeader, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
-        PartReader { path, file: BufReader::new(&file), at: 0, size }.head().map(|(head, _)| head)
+        PartReader { path, file: BufReader::new(&file), at: 0, size }.read_header().map(|(head, _)| head)
     }
 
     /// Checks the type of the file.
@@ -123,7 +123,7 @@ impl PartFile {
     }
 
     /// Indices of the tiles in the file.
-    pub fn tiles(&self) -> impl Iterator<Item = usize> {
+    pub fn tile_indices(&self) -> impl Iterator<Item = usize> {
         self.tiles.iter().map(|(number, ..)| *number as usize)
     }
 
@@ -131,7 +131,7 @@ impl PartFile {
     ///
     /// # Errors
     /// The file has changed since it was opened.
-    pub fn tile(&self, tile: usize, area: usize) -> Result<Option<StoredTile>, PartError> {
+    pub fn read_tile(&self, tile: usize, area: usize) -> Result<Option<StoredTile>, PartError> {
         let Ok(index) = self.tiles.binary_search_by_key(&tile, |(number, ..)| *number as usize) else {
             return Ok(None);
         };
@@ -154,12 +154,12 @@ impl PartFile {
     /// # Errors
     /// The tiles do not belong to the film.
     pub fn restore(&self, film: &Film) -> Result<(), PartError> {
-        for tile in self.tiles() {
+        for tile in self.tile_indices() {
             let why = || format!("tile {tile} does not belong to this image");
             let damaged = || PartError::Damaged { path: self.path.clone(), why: why() };
             let area = film.tile_rect(tile).ok_or_else(damaged)?.area();
-            if let Some(stored) = self.tile(tile, area)? {
-                film.restore(tile, stored).map_err(|_| damaged())?;
+            if let Some(stored) = self.read_tile(tile, area)? {
+                film.restore_tile(tile, stored).map_err(|_| damaged())?;
             }
         }
         film.add_non_finite(self.non_finite);
@@ -170,9 +170,9 @@ impl PartFile {
 /// Opens a regular file. If the process has reached its limit on open files, raises the limit and tries
 /// again.
 fn open(path: &Path) -> Result<File, PartError> {
-    let opened = match file::open(path) {
+    let opened = match file::open_regular_file(path) {
         Err(error) if error.raw_os_error() == Some(nix::errno::Errno::EMFILE as i32) => {
-            raise_file_limit().and_then(|()| file::open(path))
+            raise_file_limit().and_then(|()| file::open_regular_file(path))
         }
         opened => opened,
     };
@@ -195,85 +195,85 @@ struct PartReader<'a> {
 }
 
 impl PartReader<'_> {
-    fn damaged(&self, why: &str) -> PartError {
+    fn damaged_error(&self, why: &str) -> PartError {
         PartError::Damaged { path: self.path.to_owned(), why: why.to_owned() }
     }
 
-    fn unfinished(&self) -> PartError {
+    fn unfinished_error(&self) -> PartError {
         PartError::Unfinished { path: self.path.to_owned(), bytes: self.size }
     }
 
     /// Reads exactly `bytes.len()` bytes.
-    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), PartError> {
+    fn read_exact(&mut self, bytes: &mut [u8]) -> Result<(), PartError> {
         match self.file.read_exact(bytes) {
             Ok(()) => {
                 self.at += bytes.len() as u64;
                 Ok(())
             }
-            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Err(self.unfinished()),
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Err(self.unfinished_error()),
             Err(source) => Err(PartError::Unreadable { path: self.path.to_owned(), source }),
         }
     }
 
-    fn word(&mut self) -> Result<u32, PartError> {
+    fn read_u32(&mut self) -> Result<u32, PartError> {
         let mut bytes = [0; 4];
-        self.fill(&mut bytes)?;
+        self.read_exact(&mut bytes)?;
         Ok(u32::from_le_bytes(bytes))
     }
 
     /// Reads `length` bytes. Fails before allocating memory if the file is too short.
-    fn bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
+    fn read_bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
         if u64::from(length) > self.size - self.at {
-            return Err(self.unfinished());
+            return Err(self.unfinished_error());
         }
         into.resize(length as usize, 0);
-        self.fill(into)
+        self.read_exact(into)
     }
 
-    fn head(&mut self) -> Result<(Head, Digest), PartError> {
+    fn read_header(&mut self) -> Result<(PartHeader, Digest), PartError> {
         let mut mark = Vec::new();
-        self.bytes(self.size.min(MARK.len() as u64) as u32, &mut mark)?;
+        self.read_bytes(self.size.min(MARK.len() as u64) as u32, &mut mark)?;
         match mark.len() < MARK.len() {
-            true if MARK.starts_with(&mark) => return Err(self.unfinished()),
+            true if MARK.starts_with(&mark) => return Err(self.unfinished_error()),
             false if mark == MARK => {}
             true | false => return Err(PartError::Foreign { path: self.path.to_owned() }),
         }
-        let version = self.word()?;
+        let version = self.read_u32()?;
         if version != VERSION {
             return Err(PartError::Version { path: self.path.to_owned(), found: version, known: VERSION });
         }
-        let length = self.word()?;
+        let length = self.read_u32()?;
         let mut text = Vec::new();
-        self.bytes(length, &mut text)?;
+        self.read_bytes(length, &mut text)?;
         let start = [&MARK[..], &version.to_le_bytes(), &length.to_le_bytes(), &text].concat();
         let mut found = Digest::default();
-        self.fill(&mut found)?;
+        self.read_exact(&mut found)?;
         if digest(&Digest::default(), &[&start]) != found {
-            return Err(self.damaged("the header's checksum is wrong"));
+            return Err(self.damaged_error("the header's checksum is wrong"));
         }
-        let head: Head =
-            serde_json::from_slice(&text).map_err(|_| self.damaged("the header is malformed"))?;
+        let head: PartHeader =
+            serde_json::from_slice(&text).map_err(|_| self.damaged_error("the header is malformed"))?;
         if !head.has_valid_numbers() {
-            return Err(self.damaged(IMPOSSIBLE_HEADER));
+            return Err(self.damaged_error(IMPOSSIBLE_HEADER));
         }
         Ok((head, found))
     }
 
     /// Reads the next record: its index, the offset of its data, and its digest.
-    fn record(
+    fn read_record(
         &mut self,
         header_digest: &Digest,
         bytes: &mut Vec<u8>,
     ) -> Result<(u32, u64, Digest), PartError> {
         let begin = self.at;
-        let (number, length) = (self.word()?, self.word()?);
+        let (number, length) = (self.read_u32()?, self.read_u32()?);
         let offset = self.at;
-        self.bytes(length, bytes)?;
+        self.read_bytes(length, bytes)?;
         let mut found = Digest::default();
-        self.fill(&mut found)?;
+        self.read_exact(&mut found)?;
         let start = [number.to_le_bytes(), length.to_le_bytes()].concat();
         if digest(header_digest, &[&start, bytes]) != found {
-            return Err(self.damaged(&format!("wrong checksum of bytes {begin} to {}", self.at)));
+            return Err(self.damaged_error(&format!("wrong checksum of bytes {begin} to {}", self.at)));
         }
         Ok((number, offset, found))
     }

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::super::OutputError;
 use super::super::write::{Durability, WritePolicy, atomic_with};
-use super::{Digest, FOOTER, Footer, Head, MARK, VERSION, digest};
+use super::{Digest, FOOTER, Footer, MARK, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
@@ -21,7 +21,7 @@ use crate::film::Film;
 /// The file cannot be written.
 pub fn save(
     path: &Path,
-    head: &Head,
+    head: &PartHeader,
     film: &Film,
     state: &Value,
     guard: &WritePolicy<'_>,
@@ -36,7 +36,7 @@ const CHUNK_BYTES: usize = 1 << 20;
 /// Encodes on a separate thread and writes on the current thread.
 fn write(
     file: &mut dyn Write,
-    head: &Head,
+    head: &PartHeader,
     film: &Film,
     state: &Value,
     token: &CancelToken,
@@ -45,7 +45,7 @@ fn write(
     std::thread::scope(|scope| {
         let named = std::thread::Builder::new().name("glimt-part".to_owned());
         let make_chunks = move || {
-            make(
+            encode_part(
                 &mut ChunkSender { sender, bytes: Vec::with_capacity(CHUNK_BYTES) },
                 head,
                 film,
@@ -55,7 +55,7 @@ fn write(
         };
         let Ok(making) = named.spawn_scoped(scope, make_chunks) else {
             // Encode on this thread. This is slower, but avoids losing hours of work.
-            return make(&mut BufWriter::with_capacity(CHUNK_BYTES, file), head, film, state, token);
+            return encode_part(&mut BufWriter::with_capacity(CHUNK_BYTES, file), head, film, state, token);
         };
         // If writing fails, the channel is closed and the encoding thread stops.
         for chunk in chunks {
@@ -86,9 +86,9 @@ impl Write for ChunkSender {
     }
 }
 
-fn make(
+fn encode_part(
     file: &mut impl Write,
-    head: &Head,
+    head: &PartHeader,
     film: &Film,
     state: &Value,
     token: &CancelToken,
@@ -105,20 +105,25 @@ fn make(
     for tile in 0..film.tile_count() {
         token.check().map_err(io::Error::other)?;
         bytes.clear();
-        if film.store(tile, &mut bytes) {
-            records.update(&record(file, &header_digest, tile as u32, &bytes)?);
+        if film.serialize_tile(tile, &mut bytes) {
+            records.update(&write_record(file, &header_digest, tile as u32, &bytes)?);
             tiles += 1;
         }
     }
     // Write the footer.
     let records = records.finalize().to_hex().to_string();
     let end = Footer { tiles, non_finite: film.non_finite_samples(), records, state: state.clone() };
-    record(file, &header_digest, FOOTER, &serde_json::to_vec(&end)?)?;
+    write_record(file, &header_digest, FOOTER, &serde_json::to_vec(&end)?)?;
     file.flush()
 }
 
 /// Writes a record and returns its digest.
-fn record(file: &mut impl Write, header_digest: &Digest, number: u32, bytes: &[u8]) -> io::Result<Digest> {
+fn write_record(
+    file: &mut impl Write,
+    header_digest: &Digest,
+    number: u32,
+    bytes: &[u8],
+) -> io::Result<Digest> {
     let length = u32::try_from(bytes.len()).map_err(io::Error::other)?;
     let start = [number.to_le_bytes(), length.to_le_bytes()].concat();
     let digest = digest(header_digest, &[&start, bytes]);

@@ -18,7 +18,7 @@ fn film(index: u32, count: u32) -> Film {
     for tile in (0..film.tile_count()).filter(|tile| *tile as u32 % count == index - 1) {
         let rect = film.tile_rect(tile).expect("a tile");
         let radiance = (0..rect.area() * 3).map(|i| Vec3::new(i as f32 / 3.0, tile as f32, 0.1)).collect();
-        film.add(tile, &TileSamples { pixels: rect.into(), samples: 3, radiance, negative: None });
+        film.add_samples(tile, &TileSamples { pixels: rect.into(), samples: 3, radiance, negative: None });
     }
     film
 }
@@ -33,13 +33,13 @@ fn finish() -> DevelopSettings {
     }
 }
 
-fn head(index: u32, count: u32, film: &Film) -> Head {
-    Head {
+fn head(index: u32, count: u32, film: &Film) -> PartHeader {
+    PartHeader {
         kind: PartKind::Part,
         identity: vec![
             Dependency::setting("seed", "7"),
             Dependency::file("knot.obj", "12ab"),
-            Dependency::everything("ff"),
+            Dependency::combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
         picture: ImageHeader::new(film, &finish()),
@@ -55,7 +55,7 @@ const OPEN: WritePolicy<'static> = WritePolicy {
     losses: AttributeLossPolicy::Refuse,
 };
 
-fn put(folder: &Path, name: &str, head: &Head, film: &Film) -> PathBuf {
+fn put(folder: &Path, name: &str, head: &PartHeader, film: &Film) -> PathBuf {
     let path = folder.join(name);
     save(&path, head, film, &json!({ "a": 1 }), &OPEN, (&CancelToken::new(), Durability::Process))
         .expect("saved");
@@ -91,7 +91,7 @@ fn parts_merge_in_any_order() {
         assert_eq!(film.radiance().pixels, whole.radiance().pixels, "{count} parts");
         assert_eq!(film.mean_luminance_error(), whole.mean_luminance_error());
         let part = opened(&paths[0]).expect("a part");
-        assert_eq!(part.head.picture.finish(), Some(finish()));
+        assert_eq!(part.head.picture.develop_settings(), Some(finish()));
         assert_eq!(part.state, json!({ "a": 1 }));
     }
 }
@@ -110,25 +110,28 @@ fn mismatched_parts_are_rejected() {
     assert!(matches!(doubled, PartError::Doubled { index: 2, count: 3, .. }), "{doubled}");
     // Change the seed, a mesh, the scene, the number of parts, the output settings and the type.
     let film = film(2, 3);
-    let other = |change: &dyn Fn(&mut Head)| {
+    let other = |change: &dyn Fn(&mut PartHeader)| {
         let mut head = head(2, 3, &film);
         change(&mut head);
         let path = put(folder.path(), "other.part", &head, &film);
         error(&[paths[0].clone(), path, paths[2].clone()])
     };
-    type HeadEdit<'a> = &'a dyn Fn(&mut Head);
+    type HeadEdit<'a> = &'a dyn Fn(&mut PartHeader);
     for (change, words) in [
-        (&(|head: &mut Head| head.identity[0].value = "8".into()) as HeadEdit<'_>, &["seed", "8", "7"][..]),
-        (&|head: &mut Head| head.identity[1].value = "cd".into(), &["knot.obj"]),
-        (&|head: &mut Head| head.identity[2].value = "00".into(), &["materials"]),
-        (&|head: &mut Head| head.share.count = 4, &["4", "3"]),
-        (&|head: &mut Head| head.picture.bit_depth = 8, &["settings"]),
+        (
+            &(|head: &mut PartHeader| head.identity[0].value = "8".into()) as HeadEdit<'_>,
+            &["seed", "8", "7"][..],
+        ),
+        (&|head: &mut PartHeader| head.identity[1].value = "cd".into(), &["knot.obj"]),
+        (&|head: &mut PartHeader| head.identity[2].value = "00".into(), &["materials"]),
+        (&|head: &mut PartHeader| head.share.count = 4, &["4", "3"]),
+        (&|head: &mut PartHeader| head.picture.bit_depth = 8, &["settings"]),
     ] {
         let PartError::Other { path, differences, .. } = other(change) else { panic!("{words:?}") };
         assert!(path.ends_with("other.part") && differences.len() == 1, "{differences:?}");
         assert!(words.iter().all(|word| differences[0].contains(word)), "{differences:?}");
     }
-    let checkpoint = other(&|head: &mut Head| head.kind = PartKind::Checkpoint);
+    let checkpoint = other(&|head: &mut PartHeader| head.kind = PartKind::Checkpoint);
     assert!(
         matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
         "{checkpoint}"
@@ -172,7 +175,7 @@ fn invalid_headers_are_rejected() {
     let film = film(1, 2);
     let right = head(1, 2, &film);
     assert!(opened(&put(folder.path(), "right", &right, &film)).is_ok());
-    let changes: [fn(&mut Head); 9] = [
+    let changes: [fn(&mut PartHeader); 9] = [
         |head| head.share.index = 0,
         |head| head.share.index = 3,
         |head| head.share.count = 0,
@@ -203,10 +206,10 @@ fn too_many_open_files_are_detected() {
     };
     use nix::errno::Errno;
     for number in [Errno::EMFILE, Errno::ENFILE] {
-        assert!(unreadable(number as i32).is_out_of_files(), "{number}");
+        assert!(unreadable(number as i32).is_too_many_open_files(), "{number}");
     }
-    assert!(!unreadable(Errno::ENOENT as i32).is_out_of_files());
-    assert!(!PartError::Foreign { path: "a".into() }.is_out_of_files());
+    assert!(!unreadable(Errno::ENOENT as i32).is_too_many_open_files());
+    assert!(!PartError::Foreign { path: "a".into() }.is_too_many_open_files());
 }
 
 #[test]
@@ -229,8 +232,8 @@ fn metadata_differences_are_listed() {
 fn parts_from_different_builds_do_not_match() {
     let inputs = |build: &str| vec![Dependency::setting("glimt", build), Dependency::setting("width", "4")];
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
-    assert_eq!(differences(&a, &a, ("here", "there")), [""; 0]);
-    let found = differences(&a, &b, ("here", "there"));
+    assert_eq!(dependency_differences(&a, &a, ("here", "there")), [""; 0]);
+    let found = dependency_differences(&a, &b, ("here", "there"));
     assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 
@@ -270,7 +273,7 @@ proptest! {
 fn inputs_match_the_end_of_a_path() {
     let film = film(1, 1);
     let names = ["maps/a.png", "../b.png", "maps/../../c/d.png", "..", ""];
-    let head = Head { references: names.map(str::to_owned).into(), ..head(1, 1, &film) };
+    let head = PartHeader { references: names.map(str::to_owned).into(), ..head(1, 1, &film) };
     for (path, expected) in [
         ("/scenes/knot.obj", Some("knot.obj")),
         ("/scenes/maps/a.png", Some("maps/a.png")),
@@ -281,6 +284,6 @@ fn inputs_match_the_end_of_a_path() {
         ("/d.png", None),
         ("/scenes", None),
     ] {
-        assert_eq!(head.input_matching_path(Path::new(path)), expected, "{path}");
+        assert_eq!(head.input_name_by_path(Path::new(path)), expected, "{path}");
     }
 }

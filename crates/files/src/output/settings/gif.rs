@@ -16,15 +16,15 @@ const HAS_PALETTE: u8 = 0x80;
 /// Reads a GIF from the start. The frame count is missing if the file is truncated. Returns `None` if the
 /// file has no frames.
 pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
-    let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = next(&mut file)?;
+    let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = read_array(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));
     let mut info = ImageInfo { format: "GIF".to_owned(), size: Some(size), ..ImageInfo::default() };
     skip_palette(&mut file, flags)?;
     let mut frames = 0;
     let is_complete = loop {
-        match next(&mut file) {
+        match read_array(&mut file) {
             Some([EXTENSION]) => {
-                let Some([kind]) = next(&mut file) else { break false };
+                let Some([kind]) = read_array(&mut file) else { break false };
                 let mut comment = Vec::new();
                 let keep = |part: &[u8]| comment.extend_from_slice(if kind == COMMENT { part } else { &[] });
                 if read_sub_blocks(&mut file, keep).is_none() {
@@ -47,21 +47,21 @@ pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
 }
 
 /// Reads the next `N` bytes.
-fn next<const N: usize>(file: &mut impl Read) -> Option<[u8; N]> {
+fn read_array<const N: usize>(file: &mut impl Read) -> Option<[u8; N]> {
     let mut bytes = [0; N];
     file.read_exact(&mut bytes).ok().map(|()| bytes)
 }
 
 fn skip_palette(file: &mut impl Read, flags: u8) -> Option<()> {
     let colors = if flags & HAS_PALETTE != 0 { 2 << (flags & 7) } else { 0 };
-    (0..colors).try_for_each(|_| next::<3>(file).map(|_| ()))
+    (0..colors).try_for_each(|_| read_array::<3>(file).map(|_| ()))
 }
 
 /// Skips a frame: position and size, palette, code size, pixels.
 fn skip_frame(file: &mut impl Read) -> Option<()> {
-    let [_, _, _, _, _, _, _, _, flags] = next(file)?;
+    let [_, _, _, _, _, _, _, _, flags] = read_array(file)?;
     skip_palette(file, flags)?;
-    let [_] = next(file)?;
+    let [_] = read_array(file)?;
     read_sub_blocks(file, |_| {})
 }
 
@@ -69,7 +69,7 @@ fn skip_frame(file: &mut impl Read) -> Option<()> {
 fn read_sub_blocks(file: &mut impl Read, mut take: impl FnMut(&[u8])) -> Option<()> {
     let mut content = [0; 255];
     loop {
-        let [length] = next(file)?;
+        let [length] = read_array(file)?;
         let part = &mut content[..usize::from(length)];
         if part.is_empty() {
             return Some(());

@@ -41,7 +41,7 @@ pub struct ImageInfo {
 
 impl ImageInfo {
     /// Whether any version of glimt wrote the file.
-    pub fn is_own(&self) -> bool {
+    pub fn is_written_by_glimt(&self) -> bool {
         self.program.as_deref().is_some_and(|program| program.split(' ').next() == Some(PROGRAM))
     }
 
@@ -101,12 +101,12 @@ pub enum ImageInfoError {
 /// [`ImageInfoError`].
 pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     let unreadable = |why: String| ImageInfoError::Unreadable { path: path.to_owned(), why };
-    let (opened, _) = match file::open(path) {
+    let (opened, _) = match file::open_regular_file(path) {
         Ok(Ok(found)) => found,
-        Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a regular file", kind.words()))),
+        Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a regular file", kind.description()))),
         Err(error) => return Err(unreadable(describe_error(&error))),
     };
-    let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
+    let start = read_start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
     if start.starts_with(&PART_MAGIC) {
         // `read_part` opens the file again. Use only one descriptor at a time.
         drop(opened);
@@ -132,7 +132,7 @@ pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     })
 }
 
-fn start(file: &File) -> std::io::Result<Vec<u8>> {
+fn read_start(file: &File) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(START_BYTES).read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -196,7 +196,7 @@ fn read_exr(bytes: &[u8]) -> Option<ImageInfo> {
 }
 
 fn read_part(path: &Path) -> Result<ImageInfo, String> {
-    let head = PartFile::head(path).map_err(|error| error.to_string())?;
+    let head = PartFile::read_header(path).map_err(|error| error.to_string())?;
     let format = match head.kind {
         PartKind::Part => format!("part {} of {}", head.share.index, head.share.count),
         PartKind::Checkpoint => "checkpoint".to_owned(),

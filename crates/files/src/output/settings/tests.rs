@@ -1,7 +1,7 @@
 use super::super::{AnimationFormat, EncodeOptions, Format, animation, encode};
 use super::*;
 use crate::control::CancelToken;
-use crate::film::{Picture, RadianceImage};
+use crate::film::{RadianceImage, Srgb8Image};
 
 fn settings() -> Vec<(String, String)> {
     [("glimt:scene", "hüte.toml"), ("glimt:samples", "1 to 64, 7.50 on average"), ("Error", "none: at all")]
@@ -24,7 +24,7 @@ fn settings_round_trip_in_all_image_formats() {
         let mut info = read_header(&bytes).expect(extension);
         assert_eq!(info.size, Some((12, 7)), "{extension}");
         assert_eq!(info.program.as_deref(), Some(SOFTWARE), "{extension}");
-        assert!(info.is_own() && info.frames.is_none());
+        assert!(info.is_written_by_glimt() && info.frames.is_none());
         // PNG stores non-ASCII text separately, which changes the order.
         let mut expected = expected();
         info.settings.sort();
@@ -37,7 +37,7 @@ fn settings_round_trip_in_all_image_formats() {
 
 #[test]
 fn settings_round_trip_in_animations() {
-    let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
+    let frame = Srgb8Image { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
     for (format, name, frames) in
         [(AnimationFormat::Gif, "GIF", Some(3)), (AnimationFormat::Apng, "APNG", Some(3))]
     {
@@ -56,7 +56,7 @@ fn foreign_images_have_no_settings() {
     let foreign = image::RgbImage::new(3, 2);
     foreign.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("encoded");
     let info = read_header(&bytes).expect("an image");
-    assert!(!info.is_own() && info.settings.is_empty() && info.size == Some((3, 2)));
+    assert!(!info.is_written_by_glimt() && info.settings.is_empty() && info.size == Some((3, 2)));
     assert_eq!(read_header(b"[camera]\n"), Err(None));
 }
 
@@ -69,11 +69,11 @@ fn corrupt_headers_do_not_panic() {
         .map(|extension| Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format"))
         .map(|format| encode(&image, &options, format, &CancelToken::new()).expect("encoded"))
         .collect();
-    let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
+    let frame = Srgb8Image { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
     files.push(
         animation::encode(&[frame], &settings(), AnimationFormat::Gif, &CancelToken::new()).expect("encoded"),
     );
-    let mut next = crate::math::random::unit(5);
+    let mut next = crate::math::random::unit_generator(5);
     for bytes in files {
         for end in 0..bytes.len() {
             let _ = read_header(&bytes[..end]);

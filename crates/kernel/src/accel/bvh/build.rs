@@ -160,10 +160,10 @@ fn partition(
     let is_above_median = start.depth < SURFACE_AREA_LEVELS;
     match split {
         None if count > LEAF_SIZE && is_above_median && centroids.extent() == Vec3::ZERO => {
-            Some((smaller_half(references), true))
+            Some((partition_by_size(references), true))
         }
-        Some(split) if count >= NESTED_SIZE && is_nested(references, bounds, &split) => {
-            Some((smaller_half(references), true))
+        Some(split) if count >= NESTED_SIZE && is_size_split_cheaper(references, bounds, &split) => {
+            Some((partition_by_size(references), true))
         }
         Some(split)
             if count > LEAF_SIZE || split.cost / bounds.half_area() + TRAVERSAL_COST < count as f32 =>
@@ -184,7 +184,7 @@ fn partition(
 }
 
 /// Moves the half with the smaller boxes to the front and returns its length.
-fn smaller_half(references: &mut [PrimitiveReference]) -> usize {
+fn partition_by_size(references: &mut [PrimitiveReference]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by(middle, |a, b| {
         a.bounds.half_area().total_cmp(&b.bounds.half_area()).then(a.id.cmp(&b.id))
@@ -194,12 +194,12 @@ fn smaller_half(references: &mut [PrimitiveReference]) -> usize {
 
 /// Whether splitting by size is much cheaper than splitting at the best plane. If boxes are nested, every
 /// plane leaves nearly full-size boxes on both sides.
-fn is_nested(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
+fn is_size_split_cheaper(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
     let count = references.len() as f32;
     if split.cost < NESTED_COST * bounds.half_area() * count {
         return false;
     }
-    let middle = smaller_half(references);
+    let middle = partition_by_size(references);
     let small = references[..middle].iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
     let cost = small.half_area() * middle as f32 + bounds.half_area() * (count - middle as f32);
     cost < SIZE_SPLIT_COST * split.cost
@@ -218,11 +218,11 @@ struct Split {
 
 impl Split {
     fn is_left(&self, reference: &PrimitiveReference) -> bool {
-        bin_of(reference.centroid()[self.axis], self.start, self.bins_per_length) < self.bin
+        bin_index(reference.centroid()[self.axis], self.start, self.bins_per_length) < self.bin
     }
 }
 
-fn bin_of(centroid: f32, start: f32, bins_per_length: f32) -> usize {
+fn bin_index(centroid: f32, start: f32, bins_per_length: f32) -> usize {
     (((centroid - start) * bins_per_length) as usize).min(BINS - 1)
 }
 
@@ -235,7 +235,7 @@ fn best_split(references: &[PrimitiveReference], centroids: Aabb) -> Option<Spli
     for reference in references {
         let centroid = reference.centroid();
         for axis in 0..3 {
-            let bin = bin_of(centroid[axis], centroids.min[axis], bins_per_length[axis]);
+            let bin = bin_index(centroid[axis], centroids.min[axis], bins_per_length[axis]);
             bounds[axis][bin] = bounds[axis][bin].union(reference.bounds);
             counts[axis][bin] += 1;
         }

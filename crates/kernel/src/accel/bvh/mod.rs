@@ -9,7 +9,7 @@ mod traverse;
 use crate::geometry::Aabb;
 
 pub use packet::{AnyHitCallback, ClosestHitCallback};
-pub use shell::{OverlappingItem, Shell};
+pub use shell::{OverlappingItem, SphericalShell};
 use top_node::TopNode;
 
 /// Maximum number of primitives in a leaf chosen by the surface area heuristic.
@@ -42,7 +42,7 @@ pub struct Bvh {
     /// Whether many boxes contain other boxes.
     is_nested: bool,
     /// The shells of each node's children. `None` if few boxes are nested.
-    shells: Option<Box<[[Shell; 2]]>>,
+    shells: Option<Box<[[SphericalShell; 2]]>>,
 }
 
 /// Two children and their boxes, which fit into one cache line.

@@ -12,7 +12,7 @@ use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::packet::{RayPacket, lane_indices};
 use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits for a packet.
@@ -29,7 +29,7 @@ pub trait AnyHitCallback {
 }
 
 /// A packet preprocessed for the slab test.
-struct SlabPacket<'a> {
+struct SlabRayPacket<'a> {
     origin: &'a [F32x16; 3],
     inverse: [F32x16; 3],
 }
@@ -41,7 +41,7 @@ struct SlabIntervals {
     far: F32x16,
 }
 
-impl<'a> SlabPacket<'a> {
+impl<'a> SlabRayPacket<'a> {
     #[inline(always)]
     fn new(rays: &'a RayPacket, simd: impl Simd) -> Self {
         let [x, y, z] = &rays.direction;
@@ -98,7 +98,7 @@ fn hit_mask(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
 /// The largest ray end, or a negative number if no ray is traced. Compares bits as in
 /// [`SlabIntervals::nearest_entry`].
 #[inline(always)]
-fn largest_end(ends: &F32x16) -> f32 {
+fn max_ray_end(ends: &F32x16) -> f32 {
     let mut all = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         all[lane] = ends[lane].to_bits() as i32;
@@ -121,7 +121,7 @@ impl PendingSubtrees {
     #[inline(always)]
     fn sorted_by_entry((met, entry): (u32, F32x16)) -> Self {
         let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
-        for i in lanes(met) {
+        for i in lane_indices(met) {
             let mut place = near.count;
             while place > 0 && entry[usize::from(near.order[place - 1])] < entry[i] {
                 near.order[place] = near.order[place - 1];
@@ -146,7 +146,7 @@ impl Bvh {
     #[inline(always)]
     fn hit_top_subtrees(
         &self,
-        slabs: &SlabPacket<'_>,
+        slabs: &SlabRayPacket<'_>,
         ends: &F32x16,
         traced: u32,
         simd: impl Simd,
@@ -160,7 +160,7 @@ impl Bvh {
     /// Tests the primitives outside the tree, then visits the leaves that any ray in the packet may hit,
     /// roughly front to back. `traced` is the mask of active rays.
     #[inline(always)]
-    pub fn closest_packet(
+    pub fn closest_hit_packet(
         &self,
         rays: &RayPacket,
         ends: &mut F32x16,
@@ -169,7 +169,7 @@ impl Bvh {
         closest: &mut impl ClosestHitCallback,
         simd: impl Simd,
     ) {
-        let slabs = SlabPacket::new(rays, simd);
+        let slabs = SlabRayPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near = PendingSubtrees::sorted_by_entry(self.hit_top_subtrees(&slabs, ends, traced, simd));
         let mut stack = PacketStack::new();
@@ -180,7 +180,7 @@ impl Bvh {
             if stack.is_empty() && near.count == 0 {
                 return;
             }
-            let end = largest_end(ends) * SLAB_PAD;
+            let end = max_ray_end(ends) * SLAB_PAD;
             loop {
                 let (entry, in_it, child) = match stack.pop() {
                     Some(waiting) => waiting,
@@ -225,7 +225,7 @@ impl Bvh {
     /// Returns the mask of the rays that hit anything inside or outside the tree. `traced` is the mask of
     /// active rays.
     #[inline(always)]
-    pub fn any_packet(
+    pub fn any_hit_packet(
         &self,
         rays: &RayPacket,
         ends: &F32x16,
@@ -234,7 +234,7 @@ impl Bvh {
         any: &mut impl AnyHitCallback,
         simd: impl Simd,
     ) -> u32 {
-        let slabs = SlabPacket::new(rays, simd);
+        let slabs = SlabRayPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
         let (mut subtrees, _) = self.hit_top_subtrees(&slabs, ends, traced, simd);

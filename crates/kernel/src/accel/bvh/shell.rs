@@ -17,7 +17,7 @@ const FAR: f64 = 1e12;
 
 /// A region between two concentric spheres that contains the surfaces of some primitives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shell {
+pub struct SphericalShell {
     center: DVec3,
     /// Radius of a ball that every primitive encloses. Negative if there is no such ball.
     inner: f64,
@@ -25,7 +25,7 @@ pub struct Shell {
 }
 
 /// Position of a box relative to a shell.
-enum ShellPosition {
+enum BoxShellRelation {
     /// All primitives enclose the box.
     Enclosed,
     /// The box may intersect a surface.
@@ -33,17 +33,17 @@ enum ShellPosition {
     Outside,
 }
 
-impl Shell {
+impl SphericalShell {
     /// The shell of an empty set.
     const EMPTY: Self = Self { center: DVec3::ZERO, inner: f64::INFINITY, outer: f64::NEG_INFINITY };
 
     /// The shell of a single sphere.
-    pub fn sphere(center: DVec3, radius: f64) -> Self {
+    pub fn from_sphere(center: DVec3, radius: f64) -> Self {
         Self { center, inner: radius, outer: radius }
     }
 
     /// The shell around the bounding box of an arbitrary primitive. It has no inner ball.
-    pub fn around(bounds: &Aabb) -> Self {
+    pub fn from_bounds(bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let center = (min + max) * 0.5;
         Self { center, inner: f64::NEG_INFINITY, outer: (max - center).length() }
@@ -88,16 +88,16 @@ impl Shell {
         Some((t / a * (1.0 - ROUNDING)) as f32)
     }
 
-    fn box_position(&self, bounds: &Aabb) -> ShellPosition {
+    fn classify_box(&self, bounds: &Aabb) -> BoxShellRelation {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let nearest = self.center.clamp(min, max).distance_squared(self.center);
         let farthest = (self.center - min).abs().max((self.center - max).abs()).length_squared();
         if self.inner > 0.0 && farthest < self.inner * self.inner {
-            ShellPosition::Enclosed
+            BoxShellRelation::Enclosed
         } else if nearest > self.outer * self.outer {
-            ShellPosition::Outside
+            BoxShellRelation::Outside
         } else {
-            ShellPosition::Near
+            BoxShellRelation::Near
         }
     }
 }
@@ -121,12 +121,12 @@ impl Bvh {
     }
 
     /// Adds shells if many primitives are nested. `shell` returns the shell of one primitive.
-    pub fn with_shells(self, shell: impl Fn(u32) -> Shell) -> Self {
+    pub fn with_shells(self, shell: impl Fn(u32) -> SphericalShell) -> Self {
         if !self.is_nested {
             return self;
         }
-        let shells = self.fold_subtrees(Shell::EMPTY, shell, Shell::union);
-        let shells = shells.into_iter().map(|both| both.map(Shell::padded)).collect();
+        let shells = self.fold_subtrees(SphericalShell::EMPTY, shell, SphericalShell::union);
+        let shells = shells.into_iter().map(|both| both.map(SphericalShell::padded)).collect();
         Self { shells: Some(shells), ..self }
     }
 
@@ -193,29 +193,29 @@ impl Bvh {
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
             for side in (0..2).filter(|&side| node.bounds[side].overlaps(other)) {
-                match shells[side].box_position(other) {
-                    ShellPosition::Outside => {}
-                    ShellPosition::Near => stack.push(node.child[side]),
-                    ShellPosition::Enclosed
+                match shells[side].classify_box(other) {
+                    BoxShellRelation::Outside => {}
+                    BoxShellRelation::Near => stack.push(node.child[side]),
+                    BoxShellRelation::Enclosed
                         if visit(OverlappingItem::Enclosing(2 * first as usize + side)) => {}
-                    ShellPosition::Enclosed => return,
+                    BoxShellRelation::Enclosed => return,
                 }
             }
         }
     }
 
-    /// [`Bvh::closest`] with shells. The callback is `dyn` because compiling this function separately for
+    /// [`Bvh::closest_hit`] with shells. The callback is `dyn` because compiling this function separately for
     /// each caller would not make it faster.
     #[cold]
     #[inline(never)]
-    pub(super) fn closest_nested(
+    pub(super) fn closest_hit_with_shells(
         &self,
-        shells: &[[Shell; 2]],
+        shells: &[[SphericalShell; 2]],
         ray: &Ray,
         test: &mut dyn FnMut(u32, f32) -> Option<f32>,
     ) {
         let mut t_max = ray.t_max;
-        let enter = NestedRay::new(ray);
+        let enter = ShellRay::new(ray);
         let mut stack = ArrayVec::<(f32, ChildRef), { DEEP_STACK + 1 }>::new();
         stack.push((0.0, ChildRef { first: 0, count: 0 }));
         while let Some((entry, ChildRef { first, count })) = stack.pop() {
@@ -237,16 +237,16 @@ impl Bvh {
         }
     }
 
-    /// [`Bvh::any`] with shells.
+    /// [`Bvh::any_hit`] with shells.
     #[cold]
     #[inline(never)]
-    pub(super) fn any_nested(
+    pub(super) fn any_hit_with_shells(
         &self,
-        shells: &[[Shell; 2]],
+        shells: &[[SphericalShell; 2]],
         ray: &Ray,
         test: &mut dyn FnMut(u32) -> bool,
     ) -> bool {
-        let enter = NestedRay::new(ray);
+        let enter = ShellRay::new(ray);
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
         stack.push(ChildRef { first: 0, count: 0 });
         while let Some(ChildRef { first, count }) = stack.pop() {
@@ -267,18 +267,18 @@ impl Bvh {
 }
 
 /// A ray preprocessed for box and shell tests.
-struct NestedRay {
+struct ShellRay {
     slabs: SlabRay,
     line: RayF64,
 }
 
-impl NestedRay {
+impl ShellRay {
     fn new(ray: &Ray) -> Self {
         Self { slabs: SlabRay::new(ray.origin, ray.direction), line: ray.to_f64() }
     }
 
     /// Lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
-    fn entry_distance(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
+    fn entry_distance(&self, bounds: &Aabb, shell: &SphericalShell, t_max: f32) -> Option<f32> {
         let of_box = self.slabs.entry_distance(bounds.min, bounds.max, t_max)?;
         let of_shell = shell.entry_distance(&self.line)?;
         let entry = if of_shell > of_box { of_shell } else { of_box };

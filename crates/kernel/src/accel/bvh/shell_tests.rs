@@ -2,7 +2,7 @@ use super::*;
 use crate::control::CancelToken;
 use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
-use crate::math::random::signed as random;
+use crate::math::random::signed_generator as random;
 
 /// `count` nested spheres in shuffled order, surrounded by the same number of small spheres. The centers of
 /// the nested spheres are up to `spread` apart.
@@ -21,7 +21,9 @@ fn tree(spheres: &[Sphere]) -> Bvh {
     let boxes: Vec<_> = spheres.iter().map(Sphere::bounds).collect();
     let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
     tree.validate(&boxes).expect("a valid tree");
-    tree.with_shells(|id| Shell::sphere(spheres[id as usize].center, spheres[id as usize].radius))
+    tree.with_shells(|id| {
+        SphericalShell::from_sphere(spheres[id as usize].center, spheres[id as usize].radius)
+    })
 }
 
 /// Rays that start inside, between, and outside the spheres. Some are tangential.
@@ -40,7 +42,7 @@ fn rays(count: usize) -> Vec<Ray> {
 /// The nearest hit and the number of spheres tested.
 fn closest(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
     let (mut best, mut tests) = (None, 0);
-    tree.closest(ray, |id, t_max| {
+    tree.closest_hit(ray, |id, t_max| {
         tests += 1;
         let t = spheres[id as usize].intersect(&Ray { t_max, ..*ray }.to_f64())?.t;
         best = best.filter(|best| *best < (t, id)).or(Some((t, id)));
@@ -64,7 +66,7 @@ fn nested_hits_match_brute_force() {
             let expected = brute(&spheres, ray);
             assert_eq!(closest(&tree, &spheres, ray).0, expected, "{ray:?}");
             let is_hit = |id: u32| spheres[id as usize].intersect(&ray.to_f64()).is_some();
-            assert_eq!(tree.any(ray, is_hit), expected.is_some(), "{ray:?}");
+            assert_eq!(tree.any_hit(ray, is_hit), expected.is_some(), "{ray:?}");
         }
     }
 }

@@ -41,13 +41,13 @@ impl TopNode {
         references: &[PrimitiveReference],
     ) -> Self {
         let mut open = vec![root];
-        while let Some(place) = largest_replaceable(&open, |child, room| child.count == 0 && room > 0) {
+        while let Some(place) = largest_openable_child(&open, |child, room| child.count == 0 && room > 0) {
             let node = &nodes[open.swap_remove(place).1.first as usize];
             let both = node.bounds.into_iter().zip(node.child);
             open.extend(both.filter(|(bounds, _)| !bounds.is_empty()));
         }
         while let Some(place) =
-            largest_replaceable(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
+            largest_openable_child(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
         {
             let ChildRef { first, count } = open.swap_remove(place).1;
             let each = |first: u32| (references[first as usize].bounds, ChildRef { first, count: 1 });
@@ -120,7 +120,7 @@ impl TopNode {
 
 /// Index of the largest box that `may_open` accepts for replacement. `may_open` receives the child and the
 /// number of free slots.
-fn largest_replaceable(
+fn largest_openable_child(
     open: &[(Aabb, ChildRef)],
     may_open: impl Fn(ChildRef, usize) -> bool,
 ) -> Option<usize> {
@@ -171,8 +171,8 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::packet::{RayPacket, active_lanes, lanes};
-    use crate::math::random::signed as random;
+    use crate::geometry::packet::{RayPacket, active_lanes, lane_indices};
+    use crate::math::random::signed_generator as random;
 
     /// Records which primitives are tested against which rays.
     struct TestLog(Vec<u32>);
@@ -225,10 +225,10 @@ mod tests {
                 }
                 let (mut closest, mut any) = (TestLog(vec![0; count]), TestLog(vec![0; count]));
                 let traced = active_lanes(&ends, PortableSimd);
-                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
-                tree.any_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
+                tree.closest_hit_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
+                tree.any_hit_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
                 for (id, bounds) in boxes.iter().enumerate() {
-                    for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
+                    for lane in lane_indices((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
                         let is_met = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
                         let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);

@@ -5,7 +5,7 @@ use arrayvec::ArrayVec;
 use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
 use crate::accel::{RayInterval, TreeNode};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
@@ -13,18 +13,18 @@ impl Bvh {
     /// returns the ray's new end on a hit. Primitives exactly at the ray's end are still tested because the
     /// caller may break ties by id.
     #[inline]
-    pub fn closest(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
+    pub fn closest_hit(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
-            self.closest_nested(shells, ray, &mut test);
+            self.closest_hit_with_shells(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
-            self.closest_within::<SHALLOW_STACK>(ray, test);
+            self.closest_hit_with_stack::<SHALLOW_STACK>(ray, test);
         } else {
-            self.closest_within::<DEEP_STACK>(ray, test);
+            self.closest_hit_with_stack::<DEEP_STACK>(ray, test);
         }
     }
 
     #[inline]
-    fn closest_within<const STACK_SIZE: usize>(
+    fn closest_hit_with_stack<const STACK_SIZE: usize>(
         &self,
         ray: &Ray,
         mut test: impl FnMut(u32, f32) -> Option<f32>,
@@ -84,13 +84,13 @@ impl Bvh {
 
     /// Whether any primitive in the leaves that the ray may hit satisfies `test`.
     #[inline]
-    pub fn any(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
+    pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         if let Some(shells) = &self.shells {
-            self.any_nested(shells, ray, &mut test)
+            self.any_hit_with_shells(shells, ray, &mut test)
         } else if self.depth < SHALLOW_STACK {
-            self.any_within::<SHALLOW_STACK>(ray, test)
+            self.any_hit_with_stack::<SHALLOW_STACK>(ray, test)
         } else {
-            self.any_within::<DEEP_STACK>(ray, test)
+            self.any_hit_with_stack::<DEEP_STACK>(ray, test)
         }
     }
 
@@ -123,7 +123,7 @@ impl Bvh {
     /// Visits every primitive in leaves whose boxes overlap `other`.
     pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
-        for subtree in lanes(self.top.overlap_mask(other)) {
+        for subtree in lane_indices(self.top.overlap_mask(other)) {
             stack.push(self.top.subtree(subtree).1);
             while let Some(current) = stack.pop() {
                 if current.count > 0 {
@@ -139,7 +139,11 @@ impl Bvh {
     }
 
     #[inline]
-    fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
+    fn any_hit_with_stack<const STACK_SIZE: usize>(
+        &self,
+        ray: &Ray,
+        mut test: impl FnMut(u32) -> bool,
+    ) -> bool {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut stack = [ChildRef::NONE; STACK_SIZE];
         let mut size = 1;
@@ -174,7 +178,7 @@ mod tests {
     use super::*;
     use crate::control::CancelToken;
     use crate::math::Vec3;
-    use crate::math::random::signed;
+    use crate::math::random::signed_generator;
 
     /// Finds the nearest hit by brute force, treating each box as a solid.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
@@ -188,7 +192,7 @@ mod tests {
 
     #[test]
     fn hits_match_brute_force() {
-        let mut next = signed(1);
+        let mut next = signed_generator(1);
         // Integer positions produce coplanar faces and exact ties.
         let boxes: Vec<_> = (0..500)
             .map(|_| {
@@ -202,14 +206,14 @@ mod tests {
             let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
             let slabs = SlabRay::new(ray.origin, ray.direction);
             let mut best: Option<(f32, u32)> = None;
-            tree.closest(&ray, |id, t_max| {
+            tree.closest_hit(&ray, |id, t_max| {
                 let t = slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
                 let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
                 better.then(|| best = Some((t, id)))?;
                 Some(t)
             });
             assert_eq!(best, brute(&boxes, &ray));
-            let any = tree.any(&ray, |id| {
+            let any = tree.any_hit(&ray, |id| {
                 slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
             });
             assert_eq!(any, best.is_some());
@@ -237,11 +241,14 @@ mod tests {
             let nan = Ray { t_max: f32::NAN, ..Ray::new(Vec3::NAN, Vec3::NAN) };
             for ray in [nan, Ray { t_max: f32::INFINITY, ..nan }, Ray::new(Vec3::ZERO, Vec3::NAN)] {
                 let mut tests = 0;
-                tree.closest(&ray, |_, _| {
+                tree.closest_hit(&ray, |_, _| {
                     tests += 1;
                     None
                 });
-                assert!(tests <= 2 * count && !tree.any(&ray, |_| false), "{tests} tests for {count} boxes");
+                assert!(
+                    tests <= 2 * count && !tree.any_hit(&ray, |_| false),
+                    "{tests} tests for {count} boxes"
+                );
             }
         }
     }

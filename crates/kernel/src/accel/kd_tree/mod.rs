@@ -126,7 +126,7 @@ impl KdTree {
                 continue;
             }
             if let NodeKind::Inner { axis, at, right } = kind {
-                let [below, above] = halves(bounds, axis, at);
+                let [below, above] = split_box(bounds, axis, at);
                 pending.extend([(above, right, depth + 1), (below, place + 1, depth + 1)]);
             }
         }
@@ -139,7 +139,7 @@ impl KdTree {
             let kind = self.nodes[place as usize].kind();
             visit(cell, kind);
             if let NodeKind::Inner { axis, at, right } = kind {
-                let [below, above] = halves(cell, axis, at);
+                let [below, above] = split_box(cell, axis, at);
                 pending.extend([(right, above), (place + 1, below)]);
             }
         }
@@ -147,7 +147,7 @@ impl KdTree {
 }
 
 /// The parts of a box below and above a plane.
-fn halves(cell: Aabb, axis: usize, at: f32) -> [Aabb; 2] {
+fn split_box(cell: Aabb, axis: usize, at: f32) -> [Aabb; 2] {
     let (mut below, mut above) = (cell, cell);
     below.max[axis] = at;
     above.min[axis] = at;

@@ -76,15 +76,15 @@ impl PlaneRay {
 }
 
 /// Stack entry: a node and the ray's interval inside it.
-type Pending = (u32, f32, f32);
+type PendingNode = (u32, f32, f32);
 
 impl KdTree {
     /// Finds the nearest hit. Among hits at the same distance, the lowest triangle index wins.
-    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
+    pub fn closest_hit(&self, ray: &Ray) -> Option<ShapeHit> {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut best: Option<ShapeHit> = None;
         let mut t_max = ray.t_max;
-        self.visit(ray, |leaf| {
+        self.visit_leaves(ray, |leaf| {
             for &place in leaf {
                 let triangle = &self.triangles[place as usize];
                 if triangle.id == ray.start {
@@ -102,10 +102,10 @@ impl KdTree {
     }
 
     /// Whether the ray hits any triangle other than `except`.
-    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
+    pub fn any_hit(&self, ray: &Ray, except: Option<u32>) -> bool {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut found = false;
-        self.visit(ray, |leaf| {
+        self.visit_leaves(ray, |leaf| {
             found = leaf.iter().any(|&place| {
                 let triangle = &self.triangles[place as usize];
                 let is_left_out = Some(triangle.id) == except || triangle.id == ray.start;
@@ -119,13 +119,13 @@ impl KdTree {
     /// Visits the leaves that the ray may hit, front to back. `test` receives a leaf's triangle indices and
     /// returns the ray's new end, or `None` to stop. Non-finite rays visit no leaves.
     #[inline(always)]
-    fn visit(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
+    fn visit_leaves(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
         if self.nodes.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {
             return;
         }
         let planes = PlaneRay::new(ray, &self.bounds);
         let Some((mut near, mut far)) = planes.box_interval(&self.bounds, ray.t_max) else { return };
-        let mut stack: [Pending; STACK_SIZE] = [(0, 0.0, 0.0); STACK_SIZE];
+        let mut stack: [PendingNode; STACK_SIZE] = [(0, 0.0, 0.0); STACK_SIZE];
         let mut size = 0;
         let mut place = 0;
         loop {

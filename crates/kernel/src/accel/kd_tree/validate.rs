@@ -2,7 +2,7 @@
 
 use super::build::depth_limit;
 use super::node::NodeKind;
-use super::{KdTree, halves};
+use super::{KdTree, split_box};
 use crate::accel::reference::ClippedTriangle;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
@@ -57,7 +57,7 @@ impl KdTree {
                     if !(at > cell.min[axis] && at < cell.max[axis]) {
                         return Err(format!("the plane of node {place} is outside its cell"));
                     }
-                    let [below, above] = halves(cell, axis, at);
+                    let [below, above] = split_box(cell, axis, at);
                     for (place, cell) in [(right, above), (place + 1, below)] {
                         let touches =
                             |id: &&u32| !ClippedTriangle::clipped(corners(**id), &cell).points().is_empty();
@@ -99,7 +99,7 @@ fn check_leaf(
     if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::from_points(corners(id)))) {
         return Err(format!("leaf {place} refers to triangle {id}, which is outside its cell"));
     }
-    let must = |id: &&u32| reaches_into(cell, corners(**id));
+    let must = |id: &&u32| triangle_enters_cell(cell, corners(**id));
     match inside.iter().filter(must).find(|id| sorted.binary_search(id).is_err()) {
         Some(id) => Err(format!("leaf {place} is missing triangle {id}")),
         None => Ok(()),
@@ -111,8 +111,8 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
 }
 
 /// Whether a triangle extends into a cell, not counting parts of the triangle that are in a face of the cell.
-fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
-    let (min, max) = ClippedTriangle::clipped(corners, cell).extent();
+fn triangle_enters_cell(cell: &Aabb, corners: [Vec3; 3]) -> bool {
+    let (min, max) = ClippedTriangle::clipped(corners, cell).bounds();
     (0..3).all(|axis| {
         let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
         let rounding = 1e-12 * low.abs().max(high.abs());

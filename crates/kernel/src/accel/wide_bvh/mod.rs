@@ -8,7 +8,7 @@ mod node;
 mod simd;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
@@ -49,14 +49,14 @@ impl WideBvh {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        Self::build_with(Quality::default(), count, corners, token)
+        Self::build_with_quality(Quality::default(), count, corners, token)
     }
 
     /// Builds a tree with the given quality, which does not affect the hits.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
-    pub fn build_with(
+    pub fn build_with_quality(
         quality: Quality,
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -68,13 +68,13 @@ impl WideBvh {
 
     /// Sets the instruction set for traversal. Falls back to the fastest supported one if the processor lacks
     /// `instructions`.
-    pub fn with(mut self, instructions: InstructionSet) -> Self {
-        self.instructions = instructions.available();
+    pub fn with_instruction_set(mut self, instructions: InstructionSet) -> Self {
+        self.instructions = instructions.or_best_supported();
         self
     }
 
     /// Instruction set used for traversal.
-    pub fn instructions(&self) -> InstructionSet {
+    pub fn instruction_set(&self) -> InstructionSet {
         self.instructions
     }
 
@@ -132,40 +132,40 @@ impl WideBvh {
     }
 
     /// Finds the nearest hit. Among hits at the same distance, the lowest triangle index wins.
-    pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
-        if self.nodes.is_empty() { None } else { simd::closest(self, ray) }
+    pub fn closest_hit(&self, ray: &Ray) -> Option<ShapeHit> {
+        if self.nodes.is_empty() { None } else { simd::closest_hit(self, ray) }
     }
 
     /// Whether the ray hits any triangle other than `except`.
-    pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
-        !self.nodes.is_empty() && simd::any(self, ray, except)
+    pub fn any_hit(&self, ray: &Ray, except: Option<u32>) -> bool {
+        !self.nodes.is_empty() && simd::any_hit(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
+    /// [`WideBvh::closest_hit`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
     /// camera rays through neighboring pixels.
-    pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
+    pub fn closest_hit_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
-        if !self.nodes.is_empty() && !simd::closest_packet(self, rays, ends, hits) {
+        if !self.nodes.is_empty() && !simd::closest_hit_packet(self, rays, ends, hits) {
             for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
-                *hit = self.closest(&Ray { t_max: ends[lane], ..rays[lane] });
+                *hit = self.closest_hit(&Ray { t_max: ends[lane], ..rays[lane] });
             }
         }
     }
 
-    /// [`WideBvh::any`] for up to [`PACKET_SIZE`] rays. Returns the mask of the rays that hit. `except` is
+    /// [`WideBvh::any_hit`] for up to [`PACKET_SIZE`] rays. Returns the mask of the rays that hit. `except` is
     /// empty or has one entry per ray.
-    pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
+    pub fn any_hit_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET_SIZE && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
             return 0;
         }
-        if let Some(bits) = simd::any_packet(self, rays, ends, except) {
+        if let Some(bits) = simd::any_hit_packet(self, rays, ends, except) {
             return bits;
         }
         let alone = |lane: usize| {
             let ray = Ray { t_max: ends[lane], ..rays[lane] };
-            u32::from(self.any(&ray, except.get(lane).copied().flatten())) << lane
+            u32::from(self.any_hit(&ray, except.get(lane).copied().flatten())) << lane
         };
         if self.instructions == InstructionSet::Portable {
             return (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(alone).sum();
@@ -173,7 +173,7 @@ impl WideBvh {
         let mut bits = 0;
         for_each_coherent_group(rays, ends, |group, count| {
             let as_packet =
-                (count >= SMALL_GROUP).then(|| simd::any_packet(self, rays, group, except)).flatten();
+                (count >= SMALL_GROUP).then(|| simd::any_hit_packet(self, rays, group, except)).flatten();
             let one_by_one = || (0..rays.len()).filter(|&lane| group[lane] >= 0.0).map(alone).sum();
             bits |= as_packet.unwrap_or_else(one_by_one);
         });
@@ -192,13 +192,18 @@ impl WideBvh {
     /// Like [`WideBvh::visit_overlapping`], but stops when `visit` returns false. Returns whether all
     /// triangles were visited.
     pub fn visit_overlapping_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
-        self.nodes.is_empty() || self.visit_overlapping_below(0, other, &mut visit)
+        self.nodes.is_empty() || self.visit_overlapping_in_subtree(0, other, &mut visit)
     }
 
-    fn visit_overlapping_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32) -> bool) -> bool {
+    fn visit_overlapping_in_subtree(
+        &self,
+        place: u32,
+        other: &Aabb,
+        visit: &mut impl FnMut(u32) -> bool,
+    ) -> bool {
         let node = &self.nodes[place as usize];
-        lanes(node.overlap_mask(other)).all(|slot| match node.child(slot) {
-            node::Child::Inner(child) => self.visit_overlapping_below(child, other, visit),
+        lane_indices(node.overlap_mask(other)).all(|slot| match node.child(slot) {
+            node::Child::Inner(child) => self.visit_overlapping_in_subtree(child, other, visit),
             node::Child::Leaf { first, count } => {
                 let packs = &self.packs[first as usize..(first + count) as usize];
                 packs.iter().flat_map(TrianglePack::ids).all(&mut *visit)
@@ -291,15 +296,19 @@ mod tests {
     use crate::accel::packet_t_max;
     use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, rays};
     use crate::geometry::watertight::ShearedRay;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
         built_with(Quality::Medium, mesh)
     }
 
     fn built_with(quality: Quality, mesh: &[[Vec3; 3]]) -> WideBvh {
-        let tree =
-            WideBvh::build_with(quality, mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+        let tree = WideBvh::build_with_quality(
+            quality,
+            mesh.len() as u32,
+            |id| mesh[id as usize],
+            &CancelToken::new(),
+        );
         let tree = tree.expect("never canceled");
         tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a valid tree");
         tree
@@ -313,13 +322,13 @@ mod tests {
             for (tree, instructions) in
                 of_each(mesh).iter().flat_map(|tree| InstructionSet::ALL.map(|one| (tree, one)))
             {
-                let tree = tree.clone().with(instructions);
+                let tree = tree.clone().with_instruction_set(instructions);
                 for ray in rays(mesh) {
                     let expected = closest_by_brute_force(mesh, &ray);
-                    let found = tree.closest(&ray);
+                    let found = tree.closest_hit(&ray);
                     assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
                     assert_eq!(
-                        tree.any(&ray, None),
+                        tree.any_hit(&ray, None),
                         expected.is_some(),
                         "mesh {number}, {instructions:?}, {ray:?}"
                     );
@@ -353,10 +362,10 @@ mod tests {
         for (number, mesh) in difficult_meshes().iter().enumerate() {
             let mut tree = built(mesh);
             for instructions in InstructionSet::ALL {
-                tree = tree.with(instructions);
+                tree = tree.with_instruction_set(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
-                    tree.closest_packet(&rays, &packet_t_max(&rays), &mut found);
+                    tree.closest_hit_packet(&rays, &packet_t_max(&rays), &mut found);
                     let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
                     let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
                         let bits = |hit: &ShapeHit| {
@@ -368,7 +377,7 @@ mod tests {
                     let except: Vec<_> = (0..rays.len())
                         .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
                         .collect();
-                    let any = tree.any_packet(&rays, &packet_t_max(&rays), &except);
+                    let any = tree.any_hit_packet(&rays, &packet_t_max(&rays), &except);
                     for (i, ray) in rays.iter().enumerate() {
                         let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
                         let others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
@@ -396,22 +405,29 @@ mod tests {
             .collect();
         let apart = [rays[0], Ray { direction: -rays[0].direction, ..rays[0] }];
         for instructions in InstructionSet::ALL {
-            let tree = built(&mesh).with(instructions);
-            let are_vectors = tree.instructions() != InstructionSet::Portable;
+            let tree = built(&mesh).with_instruction_set(instructions);
+            let are_vectors = tree.instruction_set() != InstructionSet::Portable;
             let mut hits = [None; PACKET_SIZE];
             assert_eq!(
-                simd::closest_packet(&tree, &rays, &packet_t_max(&rays), &mut hits),
+                simd::closest_hit_packet(&tree, &rays, &packet_t_max(&rays), &mut hits),
                 are_vectors,
                 "{instructions:?}"
             );
             assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET_SIZE } else { 0 });
             let all = (1 << PACKET_SIZE) - 1;
-            assert_eq!(simd::any_packet(&tree, &rays, &packet_t_max(&rays), &[]), are_vectors.then_some(all));
+            assert_eq!(
+                simd::any_hit_packet(&tree, &rays, &packet_t_max(&rays), &[]),
+                are_vectors.then_some(all)
+            );
             assert!(
-                !simd::closest_packet(&tree, &apart, &packet_t_max(&apart), &mut hits[..2]),
+                !simd::closest_hit_packet(&tree, &apart, &packet_t_max(&apart), &mut hits[..2]),
                 "{instructions:?}"
             );
-            assert_eq!(simd::any_packet(&tree, &apart, &packet_t_max(&apart), &[]), None, "{instructions:?}");
+            assert_eq!(
+                simd::any_hit_packet(&tree, &apart, &packet_t_max(&apart), &[]),
+                None,
+                "{instructions:?}"
+            );
         }
     }
 
@@ -428,9 +444,9 @@ mod tests {
             let ray = Ray::new(at, direction);
             let expected = closest_by_brute_force(&mesh, &ray);
             for instructions in InstructionSet::ALL {
-                let tree = tree.clone().with(instructions);
-                assert_eq!(bits(tree.closest(&ray)), bits(expected), "{instructions:?}, {direction:?}");
-                assert_eq!(tree.any(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
+                let tree = tree.clone().with_instruction_set(instructions);
+                assert_eq!(bits(tree.closest_hit(&ray)), bits(expected), "{instructions:?}, {direction:?}");
+                assert_eq!(tree.any_hit(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
             }
         }
         assert!(closest_by_brute_force(&mesh, &Ray::new(at, Vec3::Z * 1e-20)).is_some());
@@ -442,8 +458,8 @@ mod tests {
         let tree = built(&mesh);
         let ray = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
         for instructions in InstructionSet::ALL {
-            let tree = tree.clone().with(instructions);
-            assert!(tree.any(&ray, None) && !tree.any(&ray, Some(0)));
+            let tree = tree.clone().with_instruction_set(instructions);
+            assert!(tree.any_hit(&ray, None) && !tree.any_hit(&ray, Some(0)));
         }
     }
 }

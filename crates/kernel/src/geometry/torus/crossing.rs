@@ -28,7 +28,7 @@ const KINK: f64 = 1e-9;
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A line near a torus around the z axis. The torus's circle has radius 1.
-pub(super) struct UnitLine {
+pub(super) struct UnitTorusLine {
     /// Point on the line closest to the center.
     pub(super) foot: DVec3,
     /// Unit direction.
@@ -45,7 +45,7 @@ struct LineSample {
     slope: f64,
 }
 
-impl UnitLine {
+impl UnitTorusLine {
     /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by `room`
     /// times the tube radius.
     pub(super) fn nearby_interval(&self, room: f64) -> Option<(f64, f64)> {
@@ -103,7 +103,7 @@ impl UnitLine {
 
     /// Points between `from` and `to` where the line enters the torus. `from` must be outside. There are at
     /// most two such points.
-    pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
+    pub(super) fn entry_points(&self, from: f64, to: f64) -> [Option<f64>; 2] {
         /// Step past a crossing. Long enough to reach the other side despite rounding, unless the line grazes
         /// the surface.
         const BEYOND: f64 = 1e-10;
@@ -223,7 +223,7 @@ mod tests {
     }
 
     /// Lines close to the circle. Some run along the axis or through it.
-    fn lines(tube: f64) -> impl Iterator<Item = UnitLine> {
+    fn lines(tube: f64) -> impl Iterator<Item = UnitTorusLine> {
         let mut state = 3;
         (0..30_000).map(move |i| {
             let mut next = || random(&mut state);
@@ -235,7 +235,7 @@ mod tests {
                 _ => DVec3::new(next(), next(), next()),
             };
             let direction = direction.normalize();
-            UnitLine { foot: near - direction * near.dot(direction), direction, tube }
+            UnitTorusLine { foot: near - direction * near.dot(direction), direction, tube }
         })
     }
 

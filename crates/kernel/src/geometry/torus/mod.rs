@@ -11,7 +11,7 @@ use super::surface_of_revolution::{
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
-use crossing::UnitLine;
+use crossing::UnitTorusLine;
 
 /// Margin around a torus, relative to the tube radius. It ensures that the searched interval of a line starts
 /// outside the torus.
@@ -29,9 +29,9 @@ pub struct Torus {
 }
 
 impl SurfaceF64 for Torus {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.nearest(ray))));
-        self.exact_at(out, from_circle)
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
+        self.surface_f64_from_directions(out, from_circle)
     }
 }
 
@@ -44,10 +44,10 @@ impl Torus {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
+        self.intersect_f64(ray).map(surface_of_revolution::to_shape_hit)
     }
 
-    fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
+    fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let (line, unit_line, unit) = self.unit_line(ray);
         let (enter, leave) = unit_line.nearby_interval(ROOM)?;
         let from = enter.max(-line.start / unit);
@@ -60,10 +60,10 @@ impl Torus {
 
     /// The line through a ray, the same line in units of the circle's radius, and the length of that unit in
     /// terms of the ray's t.
-    fn unit_line(&self, ray: &RayF64) -> (LocalLine, UnitLine, f64) {
+    fn unit_line(&self, ray: &RayF64) -> (LocalLine, UnitTorusLine, f64) {
         let line = self.frame.line_to_local(ray);
         let length = line.direction.length();
-        let unit_line = UnitLine {
+        let unit_line = UnitTorusLine {
             foot: line.foot / self.radius,
             direction: line.direction / length,
             tube: self.tube / self.radius,
@@ -72,17 +72,17 @@ impl Torus {
     }
 
     /// Values of t (at most two) at which a ray that starts outside enters the torus.
-    pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
+    pub fn entry_points(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
-        unit_line.entries(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
+        unit_line.entry_points(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
     /// Surface point at a hit.
-    pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.nearest(ray))));
-        self.surface_at(out, from_circle)
+    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
+        self.surface_from_directions(out, from_circle)
     }
 
     /// Direction of a point from the axis, and its direction from the circle in the plane through the axis.
@@ -106,11 +106,11 @@ impl Torus {
 
     /// Surface point for a direction from the axis and a direction from the circle, as returned by
     /// [`Torus::circle_directions`].
-    fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
+    fn surface_from_directions(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
-        let SurfacePointF64 { point, normal, reach } = self.exact_at(out, from_circle);
-        SurfacePoint::exact(
+        let SurfacePointF64 { point, normal, reach } = self.surface_f64_from_directions(out, from_circle);
+        SurfacePoint::from_f64(
             point,
             normal,
             Vec2::new(angle_to_u(out) as f32, angle_to_u(from_circle) as f32),
@@ -120,19 +120,19 @@ impl Torus {
         )
     }
 
-    /// [`Torus::surface_at`] without texture coordinates and tangents.
-    fn exact_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePointF64 {
+    /// [`Torus::surface_from_directions`] without texture coordinates and tangents.
+    fn surface_f64_from_directions(&self, out: DVec2, from_circle: DVec2) -> SurfacePointF64 {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
         SurfacePointF64 {
             point: self.frame.point_to_world((out * ring).extend(self.tube * up)),
             normal: self.frame.vector_to_world((out * across).extend(up)),
-            reach: self.reach(),
+            reach: self.coordinate_bound(),
         }
     }
 
     /// Point and unit normal at the given texture coordinates.
-    pub fn at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, from_circle) = (direction_at_u(u), direction_at_u(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
         (
@@ -141,7 +141,7 @@ impl Torus {
         )
     }
 
-    fn reach(&self) -> f64 {
+    fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.radius + self.tube
     }
 
@@ -152,8 +152,11 @@ impl Torus {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
-        let (point, normal) =
-            if x < share { self.at(x / share, y) } else { self.at((x - share) / (1.0 - share), 1.5 - y) };
+        let (point, normal) = if x < share {
+            self.point_and_normal(x / share, y)
+        } else {
+            self.point_and_normal((x - share) / (1.0 - share), 1.5 - y)
+        };
         AreaPoint { point, normal }
     }
 
@@ -221,7 +224,7 @@ mod tests {
     fn met(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = ring().intersect(&ray)?;
-        Some((hit.t, ring().surface(&ray, &hit).normal))
+        Some((hit.t, ring().surface_point(&ray, &hit).normal))
     }
 
     #[test]
@@ -240,7 +243,7 @@ mod tests {
     #[test]
     fn entries_are_complete_and_in_order() {
         let entries = |origin: Vec3, direction: Vec3| {
-            ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
+            ring().entry_points(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
         };
         let x = |x: f32| Vec3::new(x, 0.0, 0.0);
         assert_eq!(entries(x(-9.0), Vec3::X), [Some(6.5), Some(10.5)]);
@@ -275,12 +278,12 @@ mod tests {
     fn v_is_one_half_on_the_outermost_circle() {
         let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = ring().intersect(&ray).expect("aimed at it");
-        let surface = ring().surface(&ray, &hit);
+        let surface = ring().surface_point(&ray, &hit);
         let pi = std::f32::consts::PI;
         assert_eq!(surface.uv.as_vec2(), Vec2::splat(0.5));
         assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
         assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
-        let (point, normal) = ring().at(0.5, 0.75);
+        let (point, normal) = ring().point_and_normal(0.5, 0.75);
         assert!((point - DVec3::new(2.0, 0.5, 0.0)).length() < 1e-14 && (normal - DVec3::Y).length() < 1e-14);
     }
 

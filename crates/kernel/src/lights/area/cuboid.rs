@@ -76,7 +76,7 @@ impl ShapeEmitter for BoxEmitter {
             Some((_, (face, _))) if face.rectangle.is_accurate() => 1.0 / total,
             Some((k, (face, _))) => {
                 let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
-                met.pdf_by_area(f64::from(area)) * (face.solid_angle / total)
+                met.uniform_area_pdf(f64::from(area)) * (face.solid_angle / total)
             }
             None => 0.0,
         }

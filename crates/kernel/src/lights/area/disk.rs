@@ -37,7 +37,7 @@ impl ShapeEmitter for DiskEmitter {
     /// Samples the disk with a pdf within 20 % of uniform over the solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let view = self.seen_from(point);
+        let view = self.view_from(point);
         let (direction, distance, factor) = view.sample(self.normal, u);
         let direction = direction.as_vec3();
         LightSamplePoint {
@@ -48,7 +48,7 @@ impl ShapeEmitter for DiskEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let view = self.seen_from(from);
+        let view = self.view_from(from);
         if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
     }
 
@@ -71,7 +71,7 @@ impl DiskEmitter {
     /// perpendicular to it (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
     /// 2017).
     #[inline(always)]
-    pub fn seen_from(&self, point: Vec3) -> DiskView {
+    pub fn view_from(&self, point: Vec3) -> DiskView {
         let to_center = self.center - point.as_dvec3();
         let height = -to_center.dot(self.normal);
         let flat = to_center + self.normal * height;

@@ -18,12 +18,12 @@ pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
     opacity: Option<Opacity>,
     coat: Option<Arc<EmissionCoat>>,
-    chart: UvChart,
+    chart: UvMapping,
 }
 
 /// Maps points on a light to texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub enum UvChart {
+pub enum UvMapping {
     /// The shape's own UV parameterization.
     Shape(Shape),
     /// UVs of a mesh's triangles, sorted by primitive index.
@@ -45,16 +45,16 @@ pub struct UvTriangle {
 
 impl EmissionTexture {
     /// Creates the factor from a texture and an opacity. Returns `None` if there is neither.
-    pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvChart) -> Option<Self> {
-        Self::under_coat(texture, opacity, None, chart)
+    pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvMapping) -> Option<Self> {
+        Self::with_coat(texture, opacity, None, chart)
     }
 
     /// [`EmissionTexture::new`] under a clear coat.
-    pub fn under_coat(
+    pub fn with_coat(
         texture: Option<&Arc<Texture>>,
         opacity: Option<&Opacity>,
         coat: Option<&Arc<EmissionCoat>>,
-        chart: UvChart,
+        chart: UvMapping,
     ) -> Option<Self> {
         let is_any = texture.is_some() || opacity.is_some() || coat.is_some();
         let own =
@@ -70,14 +70,14 @@ impl EmissionTexture {
     /// The factor at the given texture coordinates.
     #[inline]
     pub fn lookup(&self, uv: DVec2) -> Vec3 {
-        self.lookup_at(&TexturePoint::sharp(uv))
+        self.lookup_texture_point(&TexturePoint::from_uv(uv))
     }
 
     #[inline]
-    fn lookup_at(&self, at: &TexturePoint) -> Vec3 {
+    fn lookup_texture_point(&self, at: &TexturePoint) -> Vec3 {
         let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.lookup(at));
         match &self.opacity {
-            Some(opacity) => color * opacity.at(at, &mut 0),
+            Some(opacity) => color * opacity.evaluate(at, &mut 0),
             None => color,
         }
     }
@@ -95,13 +95,14 @@ impl EmissionTexture {
     /// The factor at a point on the light, for a ray in a given direction. `primitive` is the mesh triangle
     /// that contains the point.
     #[inline]
-    pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
-        self.at_position(point, primitive) * self.coat_transmittance(point, primitive, direction)
+    pub fn radiance_factor(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
+        self.radiance_factor_without_coat(point, primitive)
+            * self.coat_transmittance(point, primitive, direction)
     }
 
-    /// [`EmissionTexture::at`] without the coat.
-    pub fn at_position(&self, point: Vec3, primitive: u32) -> Vec3 {
-        self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
+    /// [`EmissionTexture::radiance_factor`] without the coat.
+    pub fn radiance_factor_without_coat(&self, point: Vec3, primitive: u32) -> Vec3 {
+        self.lookup_texture_point(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
     /// The clear coat's transmittance for a ray in a given direction.
@@ -118,7 +119,7 @@ impl EmissionTexture {
 /// Length of the probe ray that finds the normal at a point, as a fraction of the light's size.
 const PROBE: f64 = 1e-3;
 
-impl UvChart {
+impl UvMapping {
     /// The unit normal at a point that is viewed from either side. `None` if the probe ray misses the
     /// surface.
     fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
@@ -129,7 +130,7 @@ impl UvChart {
                 let ray =
                     RayF64 { origin: point - direction * (PROBE * size), direction, t_max: f64::INFINITY };
                 let hit = shape.intersect(&ray)?;
-                Some(shape.surface(&ray, &hit).normal.as_dvec3())
+                Some(shape.surface_point(&ray, &hit).normal.as_dvec3())
             }
             Self::Triangles(patches) => {
                 let index = patches.binary_search_by_key(&primitive, |patch| patch.primitive).ok()?;
@@ -141,12 +142,12 @@ impl UvChart {
 
     fn texture_point(&self, point: DVec3, primitive: u32) -> TexturePoint {
         let patches = match self {
-            Self::Shape(shape) => return TexturePoint::sharp(shape.uv_at(point)),
+            Self::Shape(shape) => return TexturePoint::from_uv(shape.uv_at(point)),
             Self::Triangles(patches) => patches,
         };
         let found = patches.binary_search_by_key(&primitive, |patch| patch.primitive);
         let Ok(UvTriangle { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
-            return TexturePoint::sharp(DVec2::ZERO);
+            return TexturePoint::from_uv(DVec2::ZERO);
         };
         let weights = barycentric_weights(corners, point);
         let between = |uvs: [Vec2; 3]| {
@@ -158,6 +159,6 @@ impl UvChart {
             let (footprint, tangents) = (Footprint::POINT, [Vec3::ZERO; 2]);
             Box::new(SecondUvPoint { uv: between(uvs), footprint, tangents })
         };
-        TexturePoint { second: second_uvs.map(second), ..TexturePoint::sharp(between(uvs)) }
+        TexturePoint { second: second_uvs.map(second), ..TexturePoint::from_uv(between(uvs)) }
     }
 }

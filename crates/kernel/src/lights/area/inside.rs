@@ -12,12 +12,12 @@ use crate::sampling::distribution::DiscreteDistribution;
 /// The inside of a shape. If the shape is closed, its inside is sampled uniformly over all directions from
 /// points inside, and is invisible from outside. If it is open, its inside is sampled by area.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InsideEmitter {
+pub struct InwardEmitter {
     shape: Shape,
     by_area: DiscreteDistribution,
 }
 
-impl ShapeEmitter for InsideEmitter {
+impl ShapeEmitter for InwardEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         match self.shape.encloses(point.as_dvec3()) {
             Some(true) => self.sample_directions(point, u),
@@ -31,7 +31,7 @@ impl ShapeEmitter for InsideEmitter {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
             None if self.is_first_hit(from, met.direction, met.distance) => {
-                met.pdf_by_area(self.by_area.total())
+                met.uniform_area_pdf(self.by_area.total())
             }
             None => 0.0,
         }
@@ -45,7 +45,7 @@ impl ShapeEmitter for InsideEmitter {
 /// Solid angle of the full sphere of directions, in sr.
 const ALL_AROUND: f32 = 4.0 * PI;
 
-impl InsideEmitter {
+impl InwardEmitter {
     /// Creates an emitter for a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
         Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.areas())? })

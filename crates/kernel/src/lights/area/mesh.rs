@@ -83,10 +83,10 @@ impl MeshEmitter {
             (corners[0] + corners[1] + corners[2]) / 3.0 * vector_area_of(corners).length()
         });
         let center = center.sum::<DVec3>() / by_area.total();
-        let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::of_triangle(corners)).collect();
-        let Some(bounds) = LightBounds::around(all.iter().flatten()) else { return Ok(None) };
+        let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::from_triangle(corners)).collect();
+        let Some(bounds) = LightBounds::union(all.iter().flatten()) else { return Ok(None) };
         let tree = if all.len() > MAX_WITHOUT_TREE { LightTree::new(&all, token)? } else { None };
-        let sampling = match (tree, TrianglePairQuad::of(&triangles)) {
+        let sampling = match (tree, TrianglePairQuad::from_triangles(&triangles)) {
             (Some(tree), _) => MeshSampling::Tree(tree),
             (None, Some(quad)) => MeshSampling::Quad(Box::new(quad)),
             (None, None) => MeshSampling::Area(AreaSampledTriangles::new(&triangles, &by_area)),
@@ -123,18 +123,18 @@ impl MeshEmitter {
 
     /// The triangles, if they are sampled by area.
     #[inline(always)]
-    pub fn area_sampled(&self) -> Option<&AreaSampledTriangles> {
+    pub fn as_area_sampled(&self) -> Option<&AreaSampledTriangles> {
         if let MeshSampling::Area(facets) = &self.sampling { Some(facets) } else { None }
     }
 
     /// The parallelogram, if the light is sampled as a quad.
     #[inline(always)]
-    pub fn triangle_pair(&self) -> Option<&TrianglePairQuad> {
+    pub fn as_triangle_pair(&self) -> Option<&TrianglePairQuad> {
         if let MeshSampling::Quad(two) = &self.sampling { Some(two) } else { None }
     }
 
     /// The light tree over the triangles, if there are many.
-    pub fn tree(&self) -> Option<&LightTree> {
+    pub fn light_tree(&self) -> Option<&LightTree> {
         if let MeshSampling::Tree(tree) = &self.sampling { Some(tree) } else { None }
     }
 
@@ -161,7 +161,7 @@ impl MeshEmitter {
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
                 let LightSamplePoint { direction, target, factor } =
-                    emitter(corners)?.sample(point, [rest, u[1]]);
+                    triangle_emitter(corners)?.sample(point, [rest, u[1]]);
                 (LightSamplePoint { direction, target, factor: factor / pick.probability }, *primitive)
             }
         };
@@ -177,11 +177,11 @@ impl MeshEmitter {
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         let tree = match &self.sampling {
             MeshSampling::Quad(quad) => return quad.quad.pdf(from, met),
-            MeshSampling::Area(_) => return met.pdf_by_area(self.by_area.total()),
+            MeshSampling::Area(_) => return met.uniform_area_pdf(self.by_area.total()),
             MeshSampling::Tree(tree) => tree,
         };
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
-        let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
+        let own = index.ok().and_then(|index| Some((index, triangle_emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
             tree.probability(&Receiver::without_lobe(from, normal), index as u32) * own.pdf(from, met)
         })
@@ -204,7 +204,7 @@ impl TrianglePairQuad {
     const FLATNESS: f64 = 1e-5;
 
     /// The parallelogram formed by two triangles that share an edge, or `None` if they do not form one.
-    fn of(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
+    fn from_triangles(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
         let [(first, one), (second, two)] = triangles else { return None };
         let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
         if normal(first).dot(normal(second)) <= 0.0 {
@@ -271,6 +271,6 @@ impl AreaSampledTriangles {
     }
 }
 
-fn emitter([a, b, c]: &[DVec3; 3]) -> Option<TriangleEmitter> {
+fn triangle_emitter([a, b, c]: &[DVec3; 3]) -> Option<TriangleEmitter> {
     TriangleEmitter::new(&Triangle { a: *a, b: *b, c: *c })
 }

@@ -1,7 +1,7 @@
 //! Emitting shapes, one file each.
 //!
 //! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
-//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add bounds on its
+//! [`Emitter`], and arms in `of_any` and [`front_area_light`]. If the shape is flat, also add bounds on its
 //! emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
@@ -21,7 +21,7 @@ pub mod textured_quad;
 pub mod torus;
 pub mod triangle;
 
-pub use emission_texture::{EmissionTexture, UvChart, UvTriangle};
+pub use emission_texture::{EmissionTexture, UvMapping, UvTriangle};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
@@ -35,7 +35,7 @@ use crate::geometry::triangle::Triangle;
 use crate::math::{DVec2, DVec3, Vec3};
 use cuboid::BoxEmitter;
 use disk::DiskEmitter;
-use inside::InsideEmitter;
+use inside::InwardEmitter;
 use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
 use see_through::SeeThroughEmitter;
@@ -71,14 +71,14 @@ pub struct AreaLight {
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
-    pub part: LightPart,
+    pub part: LightCoverage,
     /// Bounds on the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
 /// The part of an object to which a light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightPart {
+pub enum LightCoverage {
     /// The entire object.
     Whole,
     /// The triangles that the emitter lists.
@@ -116,7 +116,7 @@ pub enum Emitter {
     /// A torus.
     Torus(TorusEmitter),
     /// The inside of a shape.
-    Inside(Box<InsideEmitter>),
+    Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
     SeeThrough(Box<SeeThroughEmitter>),
     /// Triangles of a mesh.
@@ -164,12 +164,12 @@ impl Emitter {
         if let Self::Quad(quad) = self {
             return Some((quad, None));
         }
-        self.as_mesh().and_then(MeshEmitter::triangle_pair).map(|two| (two.quad(), Some(two)))
+        self.as_mesh().and_then(MeshEmitter::as_triangle_pair).map(|two| (two.quad(), Some(two)))
     }
 }
 
 /// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
-pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
             let Sphere { center, radius } = *sphere;
@@ -179,19 +179,19 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Box(cuboid) => Emitter::Box(BoxEmitter::new(cuboid)),
         Shape::Triangle(triangle) => Emitter::Triangle(TriangleEmitter::new(triangle)?),
         Shape::Disk(disk) => Emitter::Disk(DiskEmitter::new(disk)),
-        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RevolutionEmitter::of_cylinder(cylinder))),
-        Shape::Cone(cone) => Emitter::Cone(Box::new(RevolutionEmitter::of_cone(cone))),
+        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RevolutionEmitter::from_cylinder(cylinder))),
+        Shape::Cone(cone) => Emitter::Cone(Box::new(RevolutionEmitter::from_cone(cone))),
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
         Shape::Plane(_) => return None,
     };
-    let bounds = bounds(shape, radiance)?;
-    let (side, texture, part) = (Side::Front, None, LightPart::Whole);
+    let bounds = emission_bounds(shape, radiance)?;
+    let (side, texture, part) = (Side::Front, None, LightCoverage::Whole);
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
 /// area.
-pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn see_through_area_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
         // Seen from outside, the front is hit at most once in each direction.
@@ -200,8 +200,8 @@ pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32)
         (Shape::Torus(_), _) => true,
     };
     let light = match side {
-        Side::Front => area_light(shape, radiance, object)?,
-        Side::Back => back_light(shape, radiance, object)?,
+        Side::Front => front_area_light(shape, radiance, object)?,
+        Side::Back => back_area_light(shape, radiance, object)?,
     };
     let see_through = if hides_itself { SeeThroughEmitter::new(shape, side) } else { None };
     Some(match see_through {
@@ -211,7 +211,7 @@ pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32)
 }
 
 /// Creates the light on the back of a shape, or returns `None` if the shape is infinite or has no area.
-pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let turned = match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
         Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
@@ -219,10 +219,10 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Plane(_) => return None,
         Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => None,
     };
-    let light = area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
+    let light = front_area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
     let emitter = match turned {
         Some(_) => light.shape,
-        None => Emitter::Inside(Box::new(InsideEmitter::new(shape)?)),
+        None => Emitter::Inside(Box::new(InwardEmitter::new(shape)?)),
     };
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
@@ -230,7 +230,7 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
 /// Bounds on a shape's emission. `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
 /// Other shapes are assumed to emit a quarter of their area times the radiance in every direction, which is
 /// the mean over all directions for convex shapes (Cauchy).
-fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
+fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let normal = match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
         Shape::Triangle(Triangle { a, b, c }) => Some((b - a).cross(c - a)),
@@ -247,7 +247,7 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
         Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
-    Some(LightBounds::in_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
+    Some(LightBounds::from_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
 }
 
 impl AreaLight {
@@ -280,7 +280,7 @@ impl AreaLight {
             LightGeometry::Object(_) | LightGeometry::SeeThrough(_) | LightGeometry::Nothing => 0,
         };
         Some(LightSample {
-            weight: sample.weight * texture.at(target, primitive, sample.direction),
+            weight: sample.weight * texture.radiance_factor(target, primitive, sample.direction),
             ..sample
         })
     }
@@ -290,7 +290,7 @@ impl AreaLight {
     pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.source());
+            let (end, source) = (ShadowRayEnd::At(target), self.geometry());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -299,7 +299,7 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn source(&self) -> LightGeometry {
+    pub(super) fn geometry(&self) -> LightGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }

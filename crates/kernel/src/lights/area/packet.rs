@@ -15,7 +15,7 @@ macro_rules! triangle_packet_of {
         });
         for $i in 0..PACKET_SIZE {
             let source = LightGeometry::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
-            row.sources.set($i, source);
+            row.sources.set_geometry($i, source);
         }
         row
     }};
@@ -33,7 +33,7 @@ impl AreaLight {
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.source();
+        let source = self.geometry();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {
@@ -61,7 +61,7 @@ impl AreaLight {
             }
             return row;
         }
-        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::area_sampled) {
+        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::as_area_sampled) {
             return triangle_packet_of!(i => (facets, self), points, u);
         }
         if let Emitter::TexturedQuad(picture) = &self.shape {

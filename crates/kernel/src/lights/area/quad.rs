@@ -45,7 +45,7 @@ impl ShapeEmitter for QuadEmitter {
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        self.solid_angle_pdf(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
+        self.solid_angle_pdf(to_corner).unwrap_or_else(|| met.uniform_area_pdf(f64::from(self.area)))
     }
 
     fn center(&self) -> DVec3 {
@@ -60,7 +60,7 @@ impl QuadEmitter {
         let by_area = self.sample_by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
-                let spherical = rectangle.seen_from(to_corner, self.normal);
+                let spherical = rectangle.project_to_sphere(to_corner, self.normal);
                 let [x, y] = spherical.sample(u);
                 let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
                 let is_accurate = spherical.is_accurate();
@@ -122,7 +122,8 @@ impl QuadEmitter {
     /// area.
     #[inline(always)]
     pub(super) fn solid_angle_pdf(&self, to_corner: Vec3) -> Option<f32> {
-        let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
+        let spherical =
+            self.rectangle.as_ref().map(|rectangle| rectangle.project_to_sphere(to_corner, self.normal));
         spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
     }
 
@@ -152,7 +153,7 @@ pub struct SphericalRectangle {
 
 impl PlanarRectangle {
     #[inline(always)]
-    fn seen_from(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
+    fn project_to_sphere(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
         let (x0, y0, z) = (to_corner.dot(self.x), to_corner.dot(self.y), to_corner.dot(normal));
         SphericalRectangle::new([x0, x0 + self.width], [y0, y0 + self.height], z)
     }

@@ -42,7 +42,7 @@ impl ShapeEmitter for SeeThroughEmitter {
     }
 
     fn pdf(&self, _: Vec3, met: &LightHit) -> f32 {
-        met.pdf_by_area(self.by_area.total())
+        met.uniform_area_pdf(self.by_area.total())
     }
 
     fn center(&self) -> DVec3 {

@@ -22,7 +22,7 @@ impl ShapeEmitter for SphereEmitter {
     /// Accurate even for narrow cones.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let (axis, distance, sin2_max) = self.cone_around(point);
+        let (axis, distance, sin2_max) = self.cone_unchecked(point);
         let is_outside = sin2_max < 1.0;
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
         let one_minus_cos_max = one_minus_cos(sin2_max);
@@ -53,12 +53,12 @@ impl SphereEmitter {
     /// Unit direction to the center, distance to the center, and sin² of the cone's half angle. `None` if the
     /// point is inside the sphere.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
-        Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
+        Some(self.cone_unchecked(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }
 
     /// Like [`SphereEmitter::cone`], but returns a sin² of at least 1 for points inside the sphere.
     #[inline(always)]
-    fn cone_around(&self, point: Vec3) -> (Vec3, f32, f32) {
+    fn cone_unchecked(&self, point: Vec3) -> (Vec3, f32, f32) {
         let to_center = self.center - point.as_dvec3();
         let distance = to_center.length();
         let sin = self.radius / distance;

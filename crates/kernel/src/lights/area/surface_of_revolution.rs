@@ -22,7 +22,7 @@ pub trait RevolutionSide {
     type View: RevolutionSideView;
 
     /// The side seen from a point. `None` if the point is behind the side.
-    fn seen_from(&self, point: Vec3) -> Option<Self::View>;
+    fn view_from(&self, point: Vec3) -> Option<Self::View>;
 }
 
 /// A curved side seen from a point.
@@ -53,12 +53,12 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
     /// Samples nearly uniformly over the solid angle. The density varies between meridians, and it varies by
     /// up to 20 % on a cap.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let view = self.view(point);
+        let view = self.view_from(point);
         let share = view.share as f32;
         let (direction, distance, factor) = match (view.side, view.cap) {
             (Some((side, meridians)), _) if u[0] < share => {
                 let (angle, density) = meridians.sample(u[1]);
-                let around = SinCos::of(angle);
+                let around = SinCos::from_angle(angle);
                 let (from_pole, distance) = side.point_at(around, f64::from(u[0] / share));
                 let factor = side.cosine_extent(around) / (density * f64::from(share));
                 (side.pole().direction(from_pole, around), distance, factor)
@@ -75,14 +75,14 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let view = self.view(from);
+        let view = self.view_from(from);
         let share = f64::from(view.share as f32);
         let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
         let density = match (view.side, view.cap) {
             (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
             (Some((side, meridians)), _) => {
                 let angle = side.pole().azimuth(met.direction);
-                share * meridians.pdf(angle) / side.cosine_extent(SinCos::of(angle.abs()))
+                share * meridians.pdf(angle) / side.cosine_extent(SinCos::from_angle(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -95,13 +95,13 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
 }
 
 impl<S: RevolutionSide> RevolutionEmitter<S> {
-    fn view(&self, point: Vec3) -> RevolutionView<S::View> {
-        let side = self.side.seen_from(point).map(|view| {
+    fn view_from(&self, point: Vec3) -> RevolutionView<S::View> {
+        let side = self.side.view_from(point).map(|view| {
             let meridians = AzimuthDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
             (view, meridians)
         });
         let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
-        let caps = self.caps.iter().flatten().map(|cap| (cap.seen_from(point), cap.normal()));
+        let caps = self.caps.iter().flatten().map(|cap| (cap.view_from(point), cap.normal()));
         let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
         let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
         let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
@@ -136,7 +136,7 @@ pub struct CylinderView {
 
 impl RevolutionEmitter<CylinderSide> {
     /// Creates an emitter for an entire cylinder.
-    pub fn of_cylinder(cylinder: &Cylinder) -> Self {
+    pub fn from_cylinder(cylinder: &Cylinder) -> Self {
         let caps = [1, 2].map(|number| cylinder.cap(number));
         let across = caps[1].centroid() - caps[0].centroid();
         let side = CylinderSide {
@@ -153,7 +153,7 @@ impl RevolutionEmitter<CylinderSide> {
 impl RevolutionSide for CylinderSide {
     type View = CylinderView;
 
-    fn seen_from(&self, point: Vec3) -> Option<CylinderView> {
+    fn view_from(&self, point: Vec3) -> Option<CylinderView> {
         let to_middle = self.middle - point.as_dvec3();
         let height = to_middle.dot(self.axis);
         let across = to_middle - self.axis * height;
@@ -172,13 +172,13 @@ impl RevolutionSide for CylinderSide {
 
 impl CylinderView {
     /// Distance to the cross-section circle, computed without cancellation.
-    fn to_circle(&self, around: SinCos) -> f64 {
+    fn distance_to_circle(&self, around: SinCos) -> f64 {
         let off = self.distance * around.sin;
         let half_chord = ((self.radius - off) * (self.radius + off)).max(0.0).sqrt();
         self.power / (self.distance * around.cos + half_chord)
     }
 
-    fn cosines(&self, to_circle: f64) -> [f64; 2] {
+    fn end_cosines(&self, to_circle: f64) -> [f64; 2] {
         self.ends.map(|end| end / (to_circle * to_circle + end * end).sqrt())
     }
 }
@@ -193,13 +193,14 @@ impl RevolutionSideView for CylinderView {
     }
 
     fn cosine_extent(&self, around: SinCos) -> f64 {
-        let [low, high] = self.cosines(self.to_circle(SinCos { sin: around.sin.abs(), ..around }));
+        let [low, high] =
+            self.end_cosines(self.distance_to_circle(SinCos { sin: around.sin.abs(), ..around }));
         high - low
     }
 
     fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
-        let to_circle = self.to_circle(SinCos { sin: around.sin.abs(), ..around });
-        let [low, high] = self.cosines(to_circle);
+        let to_circle = self.distance_to_circle(SinCos { sin: around.sin.abs(), ..around });
+        let [low, high] = self.end_cosines(to_circle);
         let cos = low + (high - low) * share;
         let height = to_circle * cos / ((1.0 - cos) * (1.0 + cos)).max(f64::MIN_POSITIVE).sqrt();
         let height = height.clamp(self.ends[0], self.ends[1]);
@@ -236,7 +237,7 @@ pub struct ConeView {
 
 impl RevolutionEmitter<ConeSide> {
     /// Creates an emitter for an entire cone.
-    pub fn of_cone(cone: &Cone) -> Self {
+    pub fn from_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());
         let slant = (height * height + radius * radius).sqrt();
@@ -249,7 +250,7 @@ impl RevolutionEmitter<ConeSide> {
 impl RevolutionSide for ConeSide {
     type View = ConeView;
 
-    fn seen_from(&self, point: Vec3) -> Option<ConeView> {
+    fn view_from(&self, point: Vec3) -> Option<ConeView> {
         let to_tip = self.tip - point.as_dvec3();
         let distance = to_tip.length();
         let pole = to_tip / distance;

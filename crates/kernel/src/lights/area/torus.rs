@@ -92,18 +92,18 @@ impl ShapeEmitter for TorusEmitter {
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
         let turn = libm::sinh(tau) / view.closeness;
-        let Some(slice) = view.slice(SinCos::of(turn.copysign(side))) else {
+        let Some(slice) = view.slice(SinCos::from_angle(turn.copysign(side))) else {
             return LightSamplePoint::NOTHING;
         };
         let (sine, in_slice) = slice.elevation_density(&view).sample(f64::from(u[1]));
-        let place = slice.near_point(&view, slice.tangent(2.0 * sine - 1.0));
+        let place = slice.near_point(&view, slice.tangent_from_sine(2.0 * sine - 1.0));
         let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return LightSamplePoint::NOTHING;
         }
         let offset = view.offset(&slice, &place);
         let direction = offset.normalize();
-        let (densities, first) = view.pdfs_at_entries(&self.torus, &slices, direction);
+        let (densities, first) = view.sum_entry_pdfs(&self.torus, &slices, direction);
         // A grazing ray may miss the torus because of rounding.
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
@@ -118,7 +118,7 @@ impl ShapeEmitter for TorusEmitter {
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slice_density();
-            let (density, first) = view.pdfs_at_entries(&self.torus, &slices, met.direction.as_dvec3());
+            let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, met.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
             let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
@@ -187,7 +187,7 @@ impl TorusView {
             power *= step;
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
             let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
-            slice.map_or(0.0, |slice| slice.near_point(self, slice.tangent(0.0)).factor) * cosh
+            slice.map_or(0.0, |slice| slice.near_point(self, slice.tangent_from_sine(0.0)).factor) * cosh
         }))
     }
 
@@ -226,20 +226,20 @@ impl TorusView {
 
     /// Sum of the pdfs in sr⁻¹ at all points where the ray enters the torus, and the distance to the first
     /// one.
-    fn pdfs_at_entries(
+    fn sum_entry_pdfs(
         &self,
         torus: &Torus,
         slices: &PiecewiseLinear<SLICES>,
         direction: DVec3,
     ) -> (f64, Option<f64>) {
         let ray = RayF64 { origin: self.point, direction, t_max: f64::INFINITY };
-        let entries = torus.entries(&ray);
-        let sum = entries.iter().flatten().map(|t| self.density(slices, direction * *t)).sum();
+        let entries = torus.entry_points(&ray);
+        let sum = entries.iter().flatten().map(|t| self.pdf(slices, direction * *t)).sum();
         (sum, entries[0])
     }
 
     /// Pdf at a point, given its offset from the view point.
-    fn density(&self, slices: &PiecewiseLinear<SLICES>, offset: DVec3) -> f64 {
+    fn pdf(&self, slices: &PiecewiseLinear<SLICES>, offset: DVec3) -> f64 {
         let (x, y) = (self.distance + offset.dot(self.out), offset.dot(self.across));
         let ring = (x * x + y * y).sqrt();
         let turn = SinCos { sin: y / ring, cos: x / ring };
@@ -254,21 +254,21 @@ impl TorusView {
             return 0.0;
         }
         let in_slice =
-            slice.elevation_density(self).pdf((0.5 + 0.5 * slice.sine_of(tangent)).clamp(0.0, 1.0));
+            slice.elevation_density(self).pdf((0.5 + 0.5 * slice.sine_from_tangent(tangent)).clamp(0.0, 1.0));
         self.to_density_over_angle(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
     }
 }
 
 impl TorusSlice {
     /// Converts the relative sine of the elevation to the tangent of the angle to the circle's center.
-    fn tangent(&self, sine: f64) -> f64 {
+    fn tangent_from_sine(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
     /// Converts the tangent of the angle to the circle's center to the relative sine of the elevation.
-    fn sine_of(&self, tangent: f64) -> f64 {
+    fn sine_from_tangent(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
@@ -276,7 +276,9 @@ impl TorusSlice {
     /// Density of the relative sine of the elevation, from its minimum to its maximum.
     fn elevation_density(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
-        PiecewiseLinear(std::array::from_fn(|i| self.near_point(view, self.tangent(sine(i))).factor))
+        PiecewiseLinear(std::array::from_fn(|i| {
+            self.near_point(view, self.tangent_from_sine(sine(i))).factor
+        }))
     }
 
     /// Finds the near point on the circle from the tangent of the angle to the circle's center.

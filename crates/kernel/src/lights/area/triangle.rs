@@ -34,7 +34,7 @@ struct SphericalTriangle {
 impl ShapeEmitter for TriangleEmitter {
     /// Samples uniformly over the solid angle, or over the area for small solid angles.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else {
+        let Some((offsets, spherical)) = self.spherical_triangle(point.as_dvec3()) else {
             return LightSamplePoint::NOTHING;
         };
         let (direction, distance, factor) = if spherical.is_accurate() {
@@ -55,9 +55,9 @@ impl ShapeEmitter for TriangleEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        match self.seen_from(from.as_dvec3()) {
+        match self.spherical_triangle(from.as_dvec3()) {
             Some((_, spherical)) if spherical.is_accurate() => (1.0 / spherical.solid_angle) as f32,
-            Some(_) => met.pdf_by_area(self.area),
+            Some(_) => met.uniform_area_pdf(self.area),
             None => 0.0,
         }
     }
@@ -82,7 +82,7 @@ impl TriangleEmitter {
     }
 
     /// The triangle seen from a point. `None` if the point is behind the triangle.
-    fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
+    fn spherical_triangle(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);
         let [a, b, c] = corners;

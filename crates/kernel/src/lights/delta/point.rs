@@ -45,7 +45,7 @@ impl PointLight {
 }
 
 impl DeltaLight for PointLight {
-    fn isotropic(&self) -> &PointLight {
+    fn isotropic_equivalent(&self) -> &PointLight {
         self
     }
 
@@ -53,7 +53,7 @@ impl DeltaLight for PointLight {
         1.0
     }
 
-    fn solid_angle(&self) -> f64 {
+    fn effective_solid_angle(&self) -> f64 {
         4.0 * PI
     }
 

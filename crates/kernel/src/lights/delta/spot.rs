@@ -23,7 +23,7 @@ pub struct SpotLight {
 }
 
 impl DeltaLight for SpotLight {
-    fn isotropic(&self) -> &PointLight {
+    fn isotropic_equivalent(&self) -> &PointLight {
         &self.point
     }
 
@@ -42,7 +42,7 @@ impl DeltaLight for SpotLight {
     /// The solid angle of the inner cone, whose half angle is (1 − blend)·H, plus the integral of (H −
     /// θ)/(blend·H) over the directions between the two cones.
     #[inline]
-    fn solid_angle(&self) -> f64 {
+    fn effective_solid_angle(&self) -> f64 {
         let SpotCone { inner, faded, .. } = self.cones();
         inner + faded
     }

@@ -34,7 +34,7 @@ const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
     /// A map that is scaled by `factor` and rotated by an angle in degrees.
-    pub fn map(sky: Arc<EnvironmentMap>, factor: Vec3, degrees: f64) -> Self {
+    pub fn from_map(sky: Arc<EnvironmentMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
     }
 

@@ -101,9 +101,12 @@ impl EnvironmentMap {
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.texel_position(direction, turn);
-        let corners = self.corners(place.column, place.row);
+        let corners = self.corner_texels(place.column, place.row);
         let density = self.cell_pdf(place.column, place.row);
-        (color(&corners, place.between), density * relative_pdf(&luminances(&corners), place.along))
+        (
+            interpolate_bilinear(&corners, place.between),
+            density * relative_pdf(&luminances(&corners), place.along),
+        )
     }
 
     /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup`]
@@ -111,12 +114,16 @@ impl EnvironmentMap {
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let GridSample { column, row, rest } = self.cells.sample(u);
-        let corners = self.corners(column as u32, row as u32);
+        let corners = self.corner_texels(column as u32, row as u32);
         let luminances = luminances(&corners);
         let along = warp::bilinear(rest, &luminances);
         let (direction, down) = self.direction_in_cell(column as f32, row, along, turn);
         let density = self.cell_pdf(column as u32, row as u32);
-        (direction, color(&corners, [along[0], down]), density * relative_pdf(&luminances, along))
+        (
+            direction,
+            interpolate_bilinear(&corners, [along[0], down]),
+            density * relative_pdf(&luminances, along),
+        )
     }
 
     /// Unit direction at a position in a cell. `along` contains the fractions of the cell's azimuth and
@@ -160,7 +167,7 @@ impl EnvironmentMap {
             extents[i] = self.heights[at.row + 1] - tops[i];
             pdfs[i] = self.cell_pdf(at.column as u32, at.row as u32);
         }
-        let corners = self.corner_packets(&columns, &rows);
+        let corners = self.corner_texel_packets(&columns, &rows);
         let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
@@ -170,7 +177,7 @@ impl EnvironmentMap {
             let (direction, down) =
                 self.direction_at_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
             set_lane(&mut directions, i, direction);
-            set_lane(&mut colors, i, color(&corners, [along[0], down]));
+            set_lane(&mut colors, i, interpolate_bilinear(&corners, [along[0], down]));
             pdfs[i] *= relative_pdf(&luminances, along);
         }
         (directions, colors, pdfs)
@@ -187,7 +194,7 @@ impl EnvironmentMap {
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
-        let corners = self.corner_packets(&columns, &rows);
+        let corners = self.corner_texel_packets(&columns, &rows);
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.cell_pdf(columns[i], rows[i]);
@@ -196,7 +203,7 @@ impl EnvironmentMap {
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
-            set_lane(&mut colors, i, color(&corners, [between[i], angles[i]]));
+            set_lane(&mut colors, i, interpolate_bilinear(&corners, [between[i], angles[i]]));
             pdfs[i] *= relative_pdf(&luminances(&corners), [between[i], heights[i]]);
         }
         (colors, pdfs)
@@ -247,15 +254,20 @@ impl EnvironmentMap {
 
     /// The texels around a cell.
     #[inline(always)]
-    fn corners(&self, column: u32, row: u32) -> [Vec3; 4] {
+    fn corner_texels(&self, column: u32, row: u32) -> [Vec3; 4] {
         // Avoid `map` because it may not be inlined.
         let [a, b, c, d] = self.corner_indices(column, row);
-        [self.texels.at(a), self.texels.at(b), self.texels.at(c), self.texels.at(d)]
+        [
+            self.texels.linear_value(a),
+            self.texels.linear_value(b),
+            self.texels.linear_value(c),
+            self.texels.linear_value(d),
+        ]
     }
 
     /// The texels around a packet of cells. Separate loops let cache misses overlap.
     #[inline(always)]
-    fn corner_packets(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
+    fn corner_texel_packets(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
         let mut places = [[0; PACKET_SIZE]; 4];
         for i in 0..PACKET_SIZE {
             let own = self.corner_indices(columns[i], rows[i]);
@@ -277,7 +289,7 @@ impl EnvironmentMap {
 
 /// Bilinear interpolation between the texels around a cell.
 #[inline(always)]
-fn color(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
+fn interpolate_bilinear(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
     corners[0].lerp(corners[1], between[0]).lerp(corners[2].lerp(corners[3], between[0]), between[1])
 }
 

@@ -6,19 +6,23 @@ use crate::math::DVec3;
 use crate::sampling::{Dimension, PixelSampler};
 
 /// A map with texels that are computed from their column and row.
-fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
+fn texels_from_fn(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
     let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     let data = TexelData::Float(places.map(|(column, row)| color(column, row)).collect());
     Arc::new(Texels { width, height, data, unusable: 0 })
 }
 
-fn light(texels: &Arc<Texels>, degrees: f64) -> Environment {
-    Environment::map(Arc::new(EnvironmentMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
+fn environment_from_texels(texels: &Arc<Texels>, degrees: f64) -> Environment {
+    Environment::from_map(
+        Arc::new(EnvironmentMap::new(Arc::clone(texels)).expect("light")),
+        Vec3::ONE,
+        degrees,
+    )
 }
 
 /// An irregular map with black areas and a few bright spots.
-fn patchy(width: u32, height: u32) -> Arc<Texels> {
-    map(width, height, |x, y| {
+fn irregular_texels(width: u32, height: u32) -> Arc<Texels> {
+    texels_from_fn(width, height, |x, y| {
         let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
         match random {
             0..40 => Vec3::ZERO,
@@ -28,12 +32,12 @@ fn patchy(width: u32, height: u32) -> Arc<Texels> {
     })
 }
 
-fn random(i: u32) -> [f32; 2] {
+fn random_pair(i: u32) -> [f32; 2] {
     PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Dimension::Light(0)).to_array()
 }
 
 /// Computes the color in a direction in double precision, for reference.
-fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
+fn reference_color(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
     // Undo the rotation about +y.
     let (sin, cos) = (-degrees).to_radians().sin_cos();
     let d =
@@ -50,30 +54,31 @@ fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
     upper.lerp(at(i, j + 1.0).lerp(at(i + 1.0, j + 1.0), x - i), y - j)
 }
 
-fn directions(count: u32) -> impl Iterator<Item = Vec3> {
+fn random_directions(count: u32) -> impl Iterator<Item = Vec3> {
     let of = |u: [f32; 2]| warp::cone([u[0] * 2.0, u[1]], 1.0);
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
-    (0..count).map(move |i| of(random(i))).chain(axes)
+    (0..count).map(move |i| of(random_pair(i))).chain(axes)
 }
 
 #[test]
 fn lookups_match_the_reference() {
     for (width, height) in [(1, 1), (2, 1), (1, 3), (7, 5), (64, 32)] {
-        let texels =
-            map(width, height, |x, y| Vec3::new((x % 5) as f32, (y % 3) as f32, ((x + y) % 2) as f32));
+        let texels = texels_from_fn(width, height, |x, y| {
+            Vec3::new((x % 5) as f32, (y % 3) as f32, ((x + y) % 2) as f32)
+        });
         for degrees in [0.0, 90.0, -30.0, 400.0] {
             let environment = Environment::Map {
                 sky: Arc::new(
-                    EnvironmentMap::new(map(width, height, |x, y| texels.get(x, y) + Vec3::ONE))
+                    EnvironmentMap::new(texels_from_fn(width, height, |x, y| texels.get(x, y) + Vec3::ONE))
                         .expect("light"),
                 ),
                 factor: Vec3::new(1.0, 2.0, 3.0),
                 turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
             };
             // At the poles, any azimuth is correct.
-            for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
-                let expected =
-                    (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
+            for direction in random_directions(4000).filter(|direction| direction.y.abs() < 1.0) {
+                let expected = (reference_color(&texels, direction.as_dvec3(), degrees) + 1.0)
+                    * DVec3::new(1.0, 2.0, 3.0);
                 let found = environment.radiance_and_pdf(direction).0.as_dvec3();
                 assert!(
                     (found - expected).length() < 2e-4 * f64::from(width.max(8)),
@@ -86,19 +91,24 @@ fn lookups_match_the_reference() {
 
 #[test]
 fn sample_pdfs_equal_direction_pdfs() {
-    for texels in [patchy(64, 32), patchy(1, 1), patchy(5, 3), patchy(1000, 500)] {
+    for texels in [
+        irregular_texels(64, 32),
+        irregular_texels(1, 1),
+        irregular_texels(5, 3),
+        irregular_texels(1000, 500),
+    ] {
         let Some(sky) = EnvironmentMap::new(texels) else { continue };
-        let environment = Environment::map(Arc::new(sky), Vec3::new(1.0, 0.5, 2.0), 77.0);
+        let environment = Environment::from_map(Arc::new(sky), Vec3::new(1.0, 0.5, 2.0), 77.0);
         let (mut found, mut off) = (0, 0);
         for i in 0..20_000 {
-            let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
+            let Some(sample) = environment.sample(Vec3::Y, random_pair(i)) else { continue };
             let (radiance, density) = environment.radiance_and_pdf(sample.direction);
             // Rounding the direction changes the result near a black corner of a cell and at cell borders.
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
-            let row =
-                environment.sample_packet(&[[0.0; PACKET_SIZE]; 3], &random(i).map(|u| [u; PACKET_SIZE]));
+            let row = environment
+                .sample_packet(&[[0.0; PACKET_SIZE]; 3], &random_pair(i).map(|u| [u; PACKET_SIZE]));
             assert_eq!(lane(&row.directions, 3), sample.direction);
             assert_eq!(lane(&row.weights, 3), sample.weight);
             found += 1;
@@ -112,13 +122,13 @@ fn sample_pdfs_equal_direction_pdfs() {
 #[test]
 fn sampling_density_follows_interpolated_light() {
     let (width, height) = (64, 32);
-    let texels = map(width, height, |x, y| Vec3::splat(1.0 + ((x * 7 + y * 13) % 10) as f32));
-    let environment = light(&texels, 10.0);
+    let texels = texels_from_fn(width, height, |x, y| Vec3::splat(1.0 + ((x * 7 + y * 13) % 10) as f32));
+    let environment = environment_from_texels(&texels, 10.0);
     let Environment::Map { sky, .. } = &environment else { panic!("a map") };
     let expected = 4.0 * PI * sky.mean_luminance();
     let mut sum = 0.0;
     for i in 0..20_000 {
-        let sample = environment.sample(Vec3::Y, random(i)).expect("light");
+        let sample = environment.sample(Vec3::Y, random_pair(i)).expect("light");
         let weight = f64::from(sample.weight.x);
         let is_near_pole = sample.direction.y.abs() > 0.7;
         let off = (weight / expected - 1.0).abs();
@@ -130,8 +140,11 @@ fn sampling_density_follows_interpolated_light() {
 
 #[test]
 fn pdfs_integrate_to_one_and_cover_all_light() {
-    for texels in [patchy(64, 32), map(32, 16, |x, y| Vec3::splat(f32::from(u8::from(x == 9 && y == 0))))] {
-        let environment = light(&texels, 30.0);
+    for texels in [
+        irregular_texels(64, 32),
+        texels_from_fn(32, 16, |x, y| Vec3::splat(f32::from(u8::from(x == 9 && y == 0)))),
+    ] {
+        let environment = environment_from_texels(&texels, 30.0);
         // The grid avoids column borders, where rounding affects the result.
         let (columns, rows) = (256, 4096);
         let mut whole = 0.0;
@@ -153,7 +166,7 @@ fn pdfs_integrate_to_one_and_cover_all_light() {
 fn sample_frequencies_match_the_pdf() {
     let (width, height) = (24_usize, 12_usize);
     for degrees in [0.0, 135.0] {
-        let environment = light(&patchy(width as u32, height as u32), degrees);
+        let environment = environment_from_texels(&irregular_texels(width as u32, height as u32), degrees);
         let (columns, rows) = (3 * width, 64);
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
@@ -203,7 +216,7 @@ fn sample_frequencies_match_the_pdf() {
 
 #[test]
 fn black_maps_are_rejected() {
-    assert_eq!(EnvironmentMap::new(map(8, 4, |_, _| Vec3::ZERO)), None);
+    assert_eq!(EnvironmentMap::new(texels_from_fn(8, 4, |_, _| Vec3::ZERO)), None);
 }
 
 #[test]
@@ -212,7 +225,7 @@ fn constant_light_is_sampled_above_the_surface() {
     let normal = Vec3::new(0.6, -0.8, 0.0);
     let mut irradiance = Vec3::ZERO;
     for i in 0..4096 {
-        let sample = environment.sample(normal, random(i)).expect("light");
+        let sample = environment.sample(normal, random_pair(i)).expect("light");
         let cosine = sample.direction.dot(normal);
         assert!(cosine > -1e-6);
         let (radiance, density) = environment.radiance_and_pdf(sample.direction);
@@ -225,10 +238,11 @@ fn constant_light_is_sampled_above_the_surface() {
 #[test]
 fn maps_of_any_size_can_be_sampled() {
     for (width, height) in [(1, 1), (65_536, 1), (1, 4096), (4096, 2048)] {
-        let texels = map(width, height, |x, y| Vec3::splat(if (x + y) % 1000 == 0 { 1e6 } else { 1e-3 }));
-        let environment = light(&texels, 0.0);
+        let texels =
+            texels_from_fn(width, height, |x, y| Vec3::splat(if (x + y) % 1000 == 0 { 1e6 } else { 1e-3 }));
+        let environment = environment_from_texels(&texels, 0.0);
         for i in 0..1000 {
-            let sample = environment.sample(Vec3::Y, random(i)).expect("light");
+            let sample = environment.sample(Vec3::Y, random_pair(i)).expect("light");
             assert!(
                 sample.weight.is_finite() && sample.weight.x > 0.0,
                 "{width} {height}: {}",

@@ -30,7 +30,7 @@ pub enum EmissionProfile<'a> {
     Light {
         /// The light.
         light: &'a dyn DeltaLight,
-        /// [`DeltaLight::solid_angle`], which is expensive to compute for some lights.
+        /// [`DeltaLight::effective_solid_angle`], which is expensive to compute for some lights.
         spread: f64,
     },
     /// A cosine distribution around this unit normal.
@@ -79,7 +79,7 @@ impl PhotonTargets {
     /// Creates targets from spheres. `None` if no sphere has a positive radius.
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
-        let balls = merged(balls);
+        let balls = merge_spheres(balls);
         let pick_by_disk = DiscreteDistribution::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
         Some(Self { balls, pick_by_disk })
     }
@@ -110,10 +110,10 @@ impl PhotonTargets {
 
     /// The targets seen from an emission point.
     #[inline]
-    pub fn seen_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetView<'a> {
+    pub fn view_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetView<'a> {
         let mut view = TargetView { sends, seen: ArrayVec::new(), total: 0.0 };
         for ball in &self.balls {
-            let cone = TargetCone::around(ball, from);
+            let cone = TargetCone::from_sphere(ball, from);
             let weight = match &cone {
                 Some(cone) => cone.solid_angle() * sends.max_relative_intensity(cone.axis, cone.sin),
                 None => sends.effective_solid_angle(),
@@ -145,7 +145,7 @@ struct VisibleTarget {
 
 impl TargetView<'_> {
     /// Upper bound on the total power that the targets receive, relative to the peak intensity, in sr.
-    pub fn total(&self) -> f64 {
+    pub fn total_power_bound(&self) -> f64 {
         self.total
     }
 
@@ -169,7 +169,7 @@ impl TargetView<'_> {
     /// Pdf of aimed directions divided by the pdf of unaimed directions. ∞ if emission never generates
     /// `direction`. `made_for` is the target at which the direction was aimed, or `None` for an unaimed
     /// direction.
-    pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
+    pub fn aimed_pdf_ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
         if !(self.total > 0.0) {
             return 1.0;
         }
@@ -203,7 +203,7 @@ struct TargetCone {
 
 impl TargetCone {
     /// The cone of directions from a point to a sphere. `None` if the point is inside.
-    fn around(ball: &BoundingSphere, from: DVec3) -> Option<Self> {
+    fn from_sphere(ball: &BoundingSphere, from: DVec3) -> Option<Self> {
         let to_center = ball.center - from;
         let distance = to_center.length();
         let sin = ball.radius / distance;
@@ -226,14 +226,14 @@ impl TargetCone {
 
 /// Merges spheres into at most [`MAX_TARGETS`] groups. Repeatedly splits the largest group into two along its
 /// longest axis.
-fn merged(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
+fn merge_spheres(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
     if balls.len() <= MAX_TARGETS {
         return balls;
     }
     let mut groups = vec![balls];
     while groups.len() < MAX_TARGETS {
         let size = |group: &Vec<BoundingSphere>| {
-            if group.len() > 1 { BoundingSphere::around(group).radius } else { 0.0 }
+            if group.len() > 1 { BoundingSphere::enclosing(group).radius } else { 0.0 }
         };
         let sizes = groups.iter().map(size).enumerate();
         let Some((largest, _)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
@@ -246,5 +246,5 @@ fn merged(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
         let rest = group.split_off(group.len() / 2);
         groups.extend([group, rest]);
     }
-    groups.iter().map(|group| BoundingSphere::around(group)).collect()
+    groups.iter().map(|group| BoundingSphere::enclosing(group)).collect()
 }

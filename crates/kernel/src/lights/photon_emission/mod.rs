@@ -43,7 +43,7 @@ pub struct BoundingSphere {
 
 impl BoundingSphere {
     /// A sphere that contains all spheres in `balls`. Its center is the center of their bounding box.
-    pub fn around(balls: &[Self]) -> Self {
+    pub fn enclosing(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
             (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
@@ -180,7 +180,7 @@ impl PhotonSource {
     /// Aims a fraction `share` in [0, 1] of the photons at targets. If `share` is 1, all photons hit a
     /// target, and their mean flux is the power that reaches the targets.
     #[must_use]
-    pub fn aimed_at(self, targets: &[BoundingSphere], share: f32) -> Self {
+    pub fn with_targets(self, targets: &[BoundingSphere], share: f32) -> Self {
         let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
         let aim = targets.and_then(|targets| {
             let power_toward = |(number, light)| self.power_toward(number, light, &targets);
@@ -202,7 +202,7 @@ impl PhotonSource {
     }
 
     /// Power of a light, in W.
-    pub fn power_of(&self, light: u32) -> Vec3 {
+    pub fn light_power(&self, light: u32) -> Vec3 {
         self.sources[light as usize].power
     }
 
@@ -247,7 +247,7 @@ impl PhotonSource {
         match self.lights.get(number as u32).family() {
             LightFamily::Delta(light) => {
                 let sends = EmissionProfile::Light { light, spread: source.spread };
-                let PointLight { position, intensity, .. } = *light.isotropic();
+                let PointLight { position, intensity, .. } = *light.isotropic_equivalent();
                 let (direction, ratio) = self.sample_direction_from(position, &sends, targets, u, || {
                     light.sample_direction(u.direction)
                 });
@@ -305,12 +305,12 @@ impl PhotonSource {
         unaimed: impl FnOnce() -> Vec3,
     ) -> (Vec3, f64) {
         let Some(aim) = &self.aim else { return (unaimed(), 0.0) };
-        let view = aim.targets.seen_from(from, sends);
+        let view = aim.targets.view_from(from, sends);
         match targets.and_then(|_| view.sample(u.aim[1], u.direction)) {
-            Some((direction, target)) => (direction, view.ratio(direction, Some(target))),
+            Some((direction, target)) => (direction, view.aimed_pdf_ratio(direction, Some(target))),
             None => {
                 let direction = unaimed();
-                (direction, view.ratio(direction, None))
+                (direction, view.aimed_pdf_ratio(direction, None))
             }
         }
     }
@@ -361,15 +361,18 @@ impl PhotonSource {
         let part = match light.family() {
             LightFamily::Delta(light) => {
                 let sends = EmissionProfile::Light { light, spread: source.spread };
-                targets.seen_from(light.isotropic().position, &sends).total() / source.spread
+                targets.view_from(light.isotropic_equivalent().position, &sends).total_power_bound()
+                    / source.spread
             }
             LightFamily::Infinite(_) => targets.disk_area() / disk,
             LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
                     let (u, piece) = (low_discrepancy_point(i), (i as f32 + 0.5) / PLACES as f32);
                     let place = surface.sample_point(light, piece, u);
-                    let part =
-                        targets.seen_from(place.from, &EmissionProfile::Front(place.normal)).total() / PI;
+                    let part = targets
+                        .view_from(place.from, &EmissionProfile::Front(place.normal))
+                        .total_power_bound()
+                        / PI;
                     part.min(1.0) * mean_channel(place.flux)
                 };
                 (0..PLACES).map(of).sum::<f64>() / f64::from(PLACES) / power
@@ -398,8 +401,8 @@ impl LightEmission {
         let disk = PI * around.radius * around.radius;
         match light.family() {
             LightFamily::Delta(light) => {
-                let spread = light.solid_angle();
-                let PointLight { intensity, falloff, .. } = light.isotropic();
+                let spread = light.effective_solid_angle();
+                let PointLight { intensity, falloff, .. } = light.isotropic_equivalent();
                 let power = match falloff {
                     Falloff::Square => (intensity.as_dvec3() * spread).as_vec3(),
                     Falloff::None => Vec3::ZERO,

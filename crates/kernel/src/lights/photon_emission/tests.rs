@@ -15,7 +15,7 @@ use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionTexture, Emitter, LightPart, MeshEmitter, UvChart, UvTriangle, area_light,
+    AreaLight, EmissionTexture, Emitter, LightCoverage, MeshEmitter, UvMapping, UvTriangle, front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
@@ -89,7 +89,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     }
     all.push((Light::Environment(Environment::Constant(COLOR)), None, 4.0 * PI * disk));
     for shape in shapes() {
-        let light = area_light(&shape, COLOR, OBJECT).expect("an area");
+        let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
         all.push((Light::Area(light), Some(shape), PI * shape.areas().iter().sum::<f64>()));
     }
     all
@@ -145,7 +145,7 @@ fn mean_flux_equals_power_for_any_aimed_fraction() {
     for (light, shape, power) in lights() {
         let plain = source_of(light.clone(), shape);
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
-            let source = plain.clone().aimed_at(targets, share);
+            let source = plain.clone().with_targets(targets, share);
             assert_eq!(source.aimed_share(), share);
             let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
             let exact = power;
@@ -203,7 +203,7 @@ fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonSource, shap
     let others = [around, beside, BoundingSphere { center: DVec3::new(-1.0, 2.0, 1.0), radius: 0.05 }];
     let ways = [(0.0, 1 << 14, 0.12), (0.9, 1 << 14, greatest_error)];
     for (share, count, greatest_error) in ways {
-        let source = source.clone().aimed_at(&others, share);
+        let source = source.clone().with_targets(&others, share);
         let found = mean(&source, count, |photon| disk_contribution(photon, shape));
         let error = found.error.hypot(expected.error);
         let ratio = found.mean / expected.mean;
@@ -241,7 +241,7 @@ fn photons_from_one_light_carry_its_power() {
         let power = COLOR.as_dvec3() * power;
         let told = source.power().as_dvec3();
         assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} instead of {power}");
-        let mut next = numbers(random::unit(1));
+        let mut next = numbers(random::unit_generator(1));
         for _ in 0..1000 {
             let photon = source.emit(&next()).expect("a photon");
             let off = (photon.flux.as_dvec3() / power - 1.0).abs().max_element();
@@ -259,9 +259,9 @@ fn photons_leave_convex_lights() {
         if is_open || matches!(shape, Shape::Torus(_)) {
             continue;
         }
-        let light = Light::Area(area_light(&shape, COLOR, OBJECT).expect("an area"));
+        let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
         let source = source_of(light, Some(shape));
-        let mut next = numbers(random::unit(2));
+        let mut next = numbers(random::unit_generator(2));
         for _ in 0..20_000 {
             let photon = source.emit(&next()).expect("a photon");
             let PhotonOrigin::Surface { normal, .. } = photon.start else { panic!("{photon:?}") };
@@ -291,9 +291,9 @@ fn cell(share: f64, n: usize) -> usize {
 fn photon_directions_follow_the_intensity() {
     let count = 400_000;
     for shape in shapes() {
-        let light = Light::Area(area_light(&shape, COLOR, OBJECT).expect("an area"));
+        let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
         let source = source_of(light, Some(shape));
-        let (mut next, mut counts) = (numbers(random::unit(3)), [0; 256]);
+        let (mut next, mut counts) = (numbers(random::unit_generator(3)), [0; 256]);
         for _ in 0..count {
             let photon = source.emit(&next()).expect("a photon");
             let PhotonOrigin::Surface { normal, .. } = photon.start else { panic!("{photon:?}") };
@@ -318,7 +318,7 @@ fn photon_directions_follow_the_intensity() {
             sums.push(sums[i as usize] + share * angle.sin());
         }
         let source = source_of(Light::Spot(spot), None);
-        let (mut next, mut counts) = (numbers(random::unit(4)), [0; 256]);
+        let (mut next, mut counts) = (numbers(random::unit_generator(4)), [0; 256]);
         for _ in 0..count {
             let photon = source.emit(&next()).expect("a photon");
             let Frame { s, t, .. } = Frame::from_normal(spot.axis);
@@ -339,7 +339,7 @@ fn photon_directions_follow_the_intensity() {
 fn photons_from_infinity_fill_the_disk() {
     for light in [Light::Directional(sun(0.0)), Light::Environment(Environment::Constant(COLOR))] {
         let source = source_of(light, None);
-        let (mut next, mut counts) = (numbers(random::unit(5)), [0; 64]);
+        let (mut next, mut counts) = (numbers(random::unit_generator(5)), [0; 64]);
         for _ in 0..100_000 {
             let photon = source.emit(&next()).expect("a photon");
             let PhotonOrigin::Beyond(start) = photon.start else { panic!("{photon:?}") };
@@ -362,12 +362,12 @@ fn aimed_pdfs_integrate_to_one() {
     let all = targets();
     let lights: [&dyn DeltaLight; 2] = [&point(Falloff::Square), &spot];
     let [everywhere, cone] =
-        lights.map(|light| EmissionProfile::Light { light, spread: light.solid_angle() });
+        lights.map(|light| EmissionProfile::Light { light, spread: light.effective_solid_angle() });
     let sends = [everywhere, cone, EmissionProfile::Front(DVec3::new(0.0, 0.6, 0.8))];
     for sends in sends {
         for balls in [&all[..3], &all[..], &all[..1]] {
             let targets = PhotonTargets::new(balls).expect("targets");
-            let view = targets.seen_from(from, &sends);
+            let view = targets.view_from(from, &sends);
             // Integrate the aimed pdf (the ratio times the emission pdf) over all directions. The integral
             // excludes directions without emission, so estimate their fraction among aimed photons by
             // sampling.
@@ -379,11 +379,13 @@ fn aimed_pdfs_integrate_to_one() {
                 let direction = warp::cone(u, 2.0);
                 let share = sends.relative_intensity(direction);
                 if share > 0.0 {
-                    whole += view.ratio(direction, None) * share / sends.effective_solid_angle() * 4.0 * PI
+                    whole += view.aimed_pdf_ratio(direction, None) * share / sends.effective_solid_angle()
+                        * 4.0
+                        * PI
                         / f64::from(n);
                 }
             }
-            let mut next = numbers(random::unit(6));
+            let mut next = numbers(random::unit_generator(6));
             let (mut useful, tries) = (0.0, 200_000);
             for _ in 0..tries {
                 let u = next();
@@ -408,16 +410,16 @@ fn lights_are_chosen_by_power() {
     let lights =
         Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
     let source = PhotonSource::new(&lights, |_| None, SCENE).expect("power");
-    let (mut next, mut counts) = (numbers(random::unit(8)), [0.0; 7]);
+    let (mut next, mut counts) = (numbers(random::unit_generator(8)), [0.0; 7]);
     let power = source.power();
     let (mut flux, count) = (DVec3::ZERO, 700_000);
     for _ in 0..count {
         let photon = source.emit(&next()).expect("a photon");
         counts[photon.light as usize % 7] += 1.0;
         flux += photon.flux.as_dvec3() / f64::from(count);
-        let share = mean_channel(source.power_of(photon.light)) / mean_channel(power);
+        let share = mean_channel(source.light_power(photon.light)) / mean_channel(power);
         assert!(
-            (mean_channel(photon.flux) * share / mean_channel(source.power_of(photon.light)) - 1.0).abs()
+            (mean_channel(photon.flux) * share / mean_channel(source.light_power(photon.light)) - 1.0).abs()
                 < 1e-5
         );
     }
@@ -437,8 +439,9 @@ fn lights_without_falloff_emit_no_photons() {
     let none = vec![Light::Point(point(Falloff::None))];
     assert!(PhotonSource::new(&lights(none), |_| None, SCENE).is_none());
     let both = vec![Light::Point(point(Falloff::None)), Light::Point(point(Falloff::Square))];
-    let source = PhotonSource::new(&lights(both), |_| None, SCENE).expect("power").aimed_at(&targets(), 0.5);
-    let mut next = numbers(random::unit(9));
+    let source =
+        PhotonSource::new(&lights(both), |_| None, SCENE).expect("power").with_targets(&targets(), 0.5);
+    let mut next = numbers(random::unit_generator(9));
     assert!((0..1000).filter_map(|_| source.emit(&next())).all(|photon| photon.light == 1));
     let nowhere = BoundingSphere { center: DVec3::ZERO, radius: 0.0 };
     assert!(PhotonSource::new(&lights(vec![Light::Directional(sun(0.0))]), |_| None, nowhere).is_none());
@@ -450,7 +453,7 @@ fn fully_aimed_photons_carry_the_target_power() {
     // the area of the target's disk.
     let ball = targets()[0];
     let of = |light: Light| {
-        let source = source_of(light, None).aimed_at(&[ball], 1.0);
+        let source = source_of(light, None).with_targets(&[ball], 1.0);
         mean(&source, 64, |photon| f64::from(photon.flux.y)).mean
     };
     let sin2 = ball.radius * ball.radius / (ball.center - point(Falloff::Square).position).length_squared();
@@ -463,7 +466,7 @@ fn fully_aimed_photons_carry_the_target_power() {
 
 #[test]
 fn many_targets_are_merged() {
-    let mut next = random::signed(10);
+    let mut next = random::signed_generator(10);
     let balls: Vec<BoundingSphere> = (0..500)
         .map(|_| BoundingSphere {
             center: DVec3::from_array([next(), next(), next()].map(|x| f64::from(x) * 3.0)),
@@ -478,7 +481,7 @@ fn many_targets_are_merged() {
         };
         assert!(targets.balls().iter().any(holds), "{ball:?}");
     }
-    let source = source_of(Light::Point(point(Falloff::Square)), None).aimed_at(&balls, 0.5);
+    let source = source_of(Light::Point(point(Falloff::Square)), None).with_targets(&balls, 0.5);
     let found = mean(&source, 1 << 13, |photon| f64::from(photon.flux.y));
     assert!(
         found.error < 1e-2 * found.mean && (found.mean - 4.0 * PI).abs() < 5.0 * found.error,

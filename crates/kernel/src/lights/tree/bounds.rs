@@ -40,12 +40,12 @@ pub struct EmissionCone {
     /// Cosine of the cone's half angle.
     pub cos: f64,
     /// Falloff outside the cone.
-    pub edge: ConeEdge,
+    pub edge: ConeFalloff,
 }
 
 /// Falloff of the emission outside a cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ConeEdge {
+pub enum ConeFalloff {
     /// No emission outside the cone.
     Sharp,
     /// Cosine of the angle to the cone, or 0 from 90° on.
@@ -54,21 +54,21 @@ pub enum ConeEdge {
 
 impl EmissionCone {
     /// All directions.
-    pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: ConeEdge::Sharp };
+    pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: ConeFalloff::Sharp };
 
     /// Emission from the front of a flat surface.
     pub fn lambertian(normal: DVec3) -> Self {
-        Self { axis: normal, cos: 1.0, edge: ConeEdge::Cosine }
+        Self { axis: normal, cos: 1.0, edge: ConeFalloff::Cosine }
     }
 
     /// Emission into a cone with a half angle of up to π.
     pub fn from_half_angle(axis: DVec3, half_angle: f64) -> Self {
-        Self { axis, cos: libm::cos(half_angle), edge: ConeEdge::Sharp }
+        Self { axis, cos: libm::cos(half_angle), edge: ConeFalloff::Sharp }
     }
 
     /// A cone that contains all given cones, around the mean of their axes.
-    fn around<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeEdge::Sharp);
+    fn union<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
+        let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeFalloff::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
         let Some(axis) = sum.try_normalize() else { return Self { edge, ..Self::ALL } };
         Self { axis, cos: cones.map(|cone| cone.cos_max_angle(axis)).fold(1.0, f64::min), edge }
@@ -94,7 +94,7 @@ impl LightBounds {
     }
 
     /// Bounds on a light with inverse-square falloff inside a box.
-    pub fn in_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
+    pub fn from_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let radius = (max - min).length() * 0.5;
         Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
@@ -102,11 +102,11 @@ impl LightBounds {
 
     /// Bounds on the emission of a triangle that faces along (b − a) × (c − a), for a radiance of 1. `None`
     /// if it has no area.
-    pub fn of_triangle(corners: &[DVec3; 3]) -> Option<Self> {
+    pub fn from_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
         let normal = vector_area.try_normalize()?;
-        Some(Self::in_box(
+        Some(Self::from_box(
             Aabb::from_points_f64(*corners),
             vector_area.length(),
             EmissionCone::lambertian(normal),
@@ -114,7 +114,7 @@ impl LightBounds {
     }
 
     /// The union of all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
-    pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+    pub fn union<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for one in all.clone() {
@@ -126,8 +126,8 @@ impl LightBounds {
             space,
             center,
             radius: reaches.fold(0.0, f64::max).min((max - min).length() * 0.5),
-            power: power(all.clone()),
-            cone: EmissionCone::around(all.map(|one| &one.cone)),
+            power: expected_intensity(all.clone()),
+            cone: EmissionCone::union(all.map(|one| &one.cone)),
         })
     }
 }
@@ -135,12 +135,12 @@ impl LightBounds {
 /// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine
 /// emitters contribute all of their power if their axes agree, and a quarter of it if the axes are uniformly
 /// distributed.
-fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
+fn expected_intensity<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
         match cone.edge {
-            ConeEdge::Sharp => everywhere += power,
-            ConeEdge::Cosine => (by_cosine, axes) = (by_cosine + power, axes + cone.axis * *power),
+            ConeFalloff::Sharp => everywhere += power,
+            ConeFalloff::Cosine => (by_cosine, axes) = (by_cosine + power, axes + cone.axis * *power),
         }
     }
     everywhere + 0.25 * (by_cosine + 3.0 * axes.length().min(by_cosine))

@@ -26,7 +26,7 @@ impl LightTree {
         if leaves.is_empty() {
             return Ok(None);
         }
-        builder.node(&mut leaves, 0)?;
+        builder.build_node(&mut leaves, 0)?;
         for (place, leaf) in (0..).zip(&leaves) {
             positions[leaf.light as usize] = place;
         }
@@ -62,7 +62,7 @@ struct LightTreeBuilder<'a> {
 
 impl LightTreeBuilder<'_> {
     /// Builds the node over `leaves` and returns its index. `before` is the number of preceding leaves.
-    fn node(&mut self, leaves: &mut [LightLeaf], before: u32) -> Result<u32, Cancelled> {
+    fn build_node(&mut self, leaves: &mut [LightLeaf], before: u32) -> Result<u32, Cancelled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(LightTreeNode::empty(self.leaves));
         let is_over_lights = leaves.len() <= PACKET_SIZE;
@@ -72,12 +72,12 @@ impl LightTreeBuilder<'_> {
         for (i, count) in groups.into_iter().enumerate() {
             let (own, others) = rest.split_at_mut(count);
             rest = others;
-            let Some(bounds) = LightBounds::around(own.iter().map(|leaf| &leaf.bounds)) else { continue };
-            node.set(i, &bounds, self.unit);
+            let Some(bounds) = LightBounds::union(own.iter().map(|leaf| &leaf.bounds)) else { continue };
+            node.set_child(i, &bounds, self.unit);
             node.first[i] = first;
             node.children[i] = match own {
                 [leaf] if is_over_lights => NodeChild::Light(leaf.light),
-                several => NodeChild::LightTreeNode(self.node(several, first)?),
+                several => NodeChild::LightTreeNode(self.build_node(several, first)?),
             };
             node.count = i as u32 + 1;
             first += count as u32;
@@ -113,7 +113,7 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
         let LeafGroup { start, count, .. } = groups[most_expensive];
         let own = &mut leaves[start..start + count];
         token.check()?;
-        let middle = split(own, unit);
+        let middle = split_leaves(own, unit);
         let (left, right) = own.split_at(middle);
         groups[most_expensive] = LeafGroup::new(start, left);
         groups.insert(most_expensive + 1, LeafGroup::new(start + middle, right));
@@ -130,7 +130,7 @@ struct LeafGroup {
 
 impl LeafGroup {
     fn new(start: usize, leaves: &[LightLeaf]) -> Self {
-        Self { start, count: leaves.len(), cost: LeafSums::of(leaves).cost() }
+        Self { start, count: leaves.len(), cost: LeafSums::from_leaves(leaves).cost() }
     }
 }
 
@@ -149,7 +149,7 @@ impl LeafSums {
     const NOTHING: Self =
         Self { count: 0, power: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, axes: DVec3::ZERO };
 
-    fn of(leaves: &[LightLeaf]) -> Self {
+    fn from_leaves(leaves: &[LightLeaf]) -> Self {
         let mut sum = Self::NOTHING;
         leaves.iter().for_each(|leaf| sum.add(leaf));
         sum
@@ -193,7 +193,7 @@ const BINS: usize = 64;
 
 /// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part. It is a
 /// multiple of `unit`, unless there are too many leaves to sort.
-fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
+fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
         (min, max) = (min.min(leaf.bounds.center), max.max(leaf.bounds.center));
@@ -218,7 +218,7 @@ fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
     }
     // A stable sort makes the tree identical on all machines.
     leaves.sort_by(|a, b| a.bounds.center[axis].total_cmp(&b.bounds.center[axis]));
-    let parts: Vec<LeafSums> = leaves.chunks(unit).map(LeafSums::of).collect();
+    let parts: Vec<LeafSums> = leaves.chunks(unit).map(LeafSums::from_leaves).collect();
     cheapest_split(&parts) * unit
 }
 

@@ -34,7 +34,7 @@ impl<'a> LightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// Creates a cut with at most `room` nodes. [`LightTreeCut::move_to`] must be called before picking.
+    /// Creates a cut with at most `room` nodes. [`LightTreeCut::adapt_to_receiver`] must be called before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::without_lobe(Vec3::ZERO, Vec3::ZERO);
@@ -51,7 +51,7 @@ impl<'a> LightTreeCut<'a> {
 
     /// Adapts the cut to a surface point.
     #[inline(always)]
-    pub fn move_to(&mut self, receiver: &Receiver) {
+    pub fn adapt_to_receiver(&mut self, receiver: &Receiver) {
         let tree = self.tree;
         self.receiver = *receiver;
         self.nodes.clear();
@@ -60,14 +60,14 @@ impl<'a> LightTreeCut<'a> {
         if tree.over_lights.len() <= self.room {
             for &node in &tree.over_lights {
                 self.nodes.push(node);
-                self.importance.push(tree.nodes[node as usize].child_importance(receiver).importance);
+                self.importance.push(tree.nodes[node as usize].child_importances(receiver).importance);
             }
         } else {
             self.nodes.push(ROOT);
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let ExpectedContributions { mut importance, nearness } = node.child_importance(receiver);
+            let ExpectedContributions { mut importance, nearness } = node.child_importances(receiver);
             for i in 0..node.count as usize {
                 if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0
@@ -82,14 +82,14 @@ impl<'a> LightTreeCut<'a> {
         }
         let mut sum = 0.0;
         for importance in &self.importance {
-            sum += total(importance);
+            sum += horizontal_sum(importance);
             self.sums.push(sum);
         }
     }
 
     /// Total importance.
     #[inline(always)]
-    fn total(&self) -> f64 {
+    fn total_importance(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
@@ -97,7 +97,7 @@ impl<'a> LightTreeCut<'a> {
     /// index of each number, the picked light, and the light's probability.
     #[inline(always)]
     pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
-        let all = self.total();
+        let all = self.total_importance();
         if !(all > 0.0) {
             return;
         }
@@ -119,13 +119,13 @@ impl<'a> LightTreeCut<'a> {
             }
             // Stay below the sum over the children, which is positive because the node's share is positive.
             let part = clamp_below((target - before) * scale, shares.total());
-            let child = shares.find(part);
-            let probability = self.share(index, child, inverse);
+            let child = shares.find_child(part);
+            let probability = self.child_probability(index, child, inverse);
             match self.tree.nodes[self.nodes[index] as usize].children[child] {
                 NodeChild::Light(light) => picked(place, light, probability),
                 NodeChild::LightTreeNode(node) => {
                     let so_far = LightPick { light: 0, probability, rest: shares.remap(part, child) };
-                    if let Some(pick) = self.tree.pick_below(node, &self.receiver, so_far, &mut way) {
+                    if let Some(pick) = self.tree.pick_in_subtree(node, &self.receiver, so_far, &mut way) {
                         picked(place, pick.light, pick.probability);
                     }
                 }
@@ -135,7 +135,7 @@ impl<'a> LightTreeCut<'a> {
 
     /// Probability of picking a node's child, given the reciprocal of the total importance.
     #[inline(always)]
-    fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
+    fn child_probability(&self, index: usize, child: usize, inverse: f64) -> f32 {
         (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
@@ -143,7 +143,7 @@ impl<'a> LightTreeCut<'a> {
     #[inline]
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.positions[light as usize];
-        if place == NOT_IN_TREE || !(self.total() > 0.0) {
+        if place == NOT_IN_TREE || !(self.total_importance() > 0.0) {
             return 0.0;
         }
         // Find the cut's last node on the path to the light.
@@ -160,10 +160,10 @@ impl<'a> LightTreeCut<'a> {
             }
         }
         let Some((index, child)) = last else { return 0.0 };
-        let share = self.share(index, child, 1.0 / self.total());
+        let share = self.child_probability(index, child, 1.0 / self.total_importance());
         match self.tree.nodes[self.nodes[index] as usize].children[child] {
             NodeChild::LightTreeNode(below) if share > 0.0 => {
-                self.tree.probability_below(below, &self.receiver, place, share)
+                self.tree.probability_in_subtree(below, &self.receiver, place, share)
             }
             NodeChild::LightTreeNode(_) | NodeChild::Light(_) => share,
         }
@@ -172,7 +172,7 @@ impl<'a> LightTreeCut<'a> {
 
 /// Sums a packet in a fixed order, which is the same on all machines.
 #[inline(always)]
-fn total(importance: &F32x16) -> f64 {
+fn horizontal_sum(importance: &F32x16) -> f64 {
     let mut row = *importance;
     for i in 0..8 {
         row[i] += row[i + 8];

@@ -11,7 +11,7 @@ mod single_node;
 pub use bounds::{EmissionCone, LightBounds};
 pub use cut::LightTreeCut;
 pub use node::{LightTreeNode, NodeChild, Receiver, ReceiverLobe, ReceiverPacket};
-pub use single_node::{PacketPicks, SingleNodeImportance};
+pub use single_node::{LightPickPacket, SingleNodeImportance};
 
 use crate::math::lanes::{F32x16, PACKET_SIZE};
 
@@ -52,21 +52,21 @@ impl LightTree {
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
         let mut way = DescentCache::NEW;
-        self.pick_below(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
+        self.pick_in_subtree(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
     /// Probability that [`LightTree::pick`] picks this light.
     pub fn probability(&self, receiver: &Receiver, light: u32) -> f32 {
         match self.positions[light as usize] {
             NOT_IN_TREE => 0.0,
-            place => self.probability_below(ROOT, receiver, place, 1.0),
+            place => self.probability_in_subtree(ROOT, receiver, place, 1.0),
         }
     }
 
     /// Picks a light from the subtree at `node`. `pick` is the pick so far, and `way` caches the path of the
     /// previous pick for the same point.
     #[inline(always)]
-    fn pick_below(
+    fn pick_in_subtree(
         &self,
         mut node: u32,
         receiver: &Receiver,
@@ -78,7 +78,7 @@ impl LightTree {
             let one = &self.nodes[node as usize];
             if way.nodes[level] != node {
                 way.nodes[level] = node;
-                way.shares[level] = CumulativeImportance::new(&one.child_importance(receiver).importance);
+                way.shares[level] = CumulativeImportance::new(&one.child_importances(receiver).importance);
             }
             let shares = &way.shares[level];
             let total = shares.total();
@@ -86,7 +86,7 @@ impl LightTree {
                 return None;
             }
             let target = scale_to_total(pick.rest, total);
-            let child = shares.find(target);
+            let child = shares.find_child(target);
             pick.probability *= shares.probability(child);
             pick.rest = shares.remap(target, child);
             match one.children[child] {
@@ -99,12 +99,18 @@ impl LightTree {
 
     /// Probability of picking the light at `place` in tree order, given the probability of reaching an
     /// ancestor node.
-    fn probability_below(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
+    fn probability_in_subtree(
+        &self,
+        mut node: u32,
+        receiver: &Receiver,
+        place: u32,
+        mut probability: f32,
+    ) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
             let child = one.child_containing(place);
             probability *=
-                CumulativeImportance::new(&one.child_importance(receiver).importance).probability(child);
+                CumulativeImportance::new(&one.child_importances(receiver).importance).probability(child);
             match one.children[child] {
                 NodeChild::LightTreeNode(below) if probability > 0.0 => node = below,
                 NodeChild::LightTreeNode(_) | NodeChild::Light(_) => return probability,
@@ -120,7 +126,7 @@ impl LightTree {
 
     /// Position of a light in tree order, where nearby lights are close together.
     #[inline(always)]
-    pub fn position_of(&self, light: u32) -> u32 {
+    pub fn leaf_position(&self, light: u32) -> u32 {
         self.positions[light as usize]
     }
 
@@ -185,7 +191,7 @@ impl CumulativeImportance {
 
     /// The child whose interval contains `target`. `target` must be less than the total.
     #[inline(always)]
-    fn find(&self, target: f64) -> usize {
+    fn find_child(&self, target: f64) -> usize {
         let mut child = 0;
         for i in 0..PACKET_SIZE {
             child += usize::from(self.0[i] <= target);
@@ -197,7 +203,7 @@ impl CumulativeImportance {
     #[inline(always)]
     fn remap(&self, target: f64, child: usize) -> f64 {
         let before = if child == 0 { 0.0 } else { self.0[child - 1] };
-        rest(target - before, self.0[child] - before)
+        remap_to_unit(target - before, self.0[child] - before)
     }
 }
 
@@ -228,7 +234,7 @@ fn clamp_below(part: f64, total: f64) -> f64 {
 
 /// Position of `part` within an interval, in [0, 1).
 #[inline(always)]
-fn rest(part: f64, share: f64) -> f64 {
+fn remap_to_unit(part: f64, share: f64) -> f64 {
     const LAST: f64 = 1.0_f64.next_down();
     let rest = part / share;
     if rest < LAST { rest } else { LAST }

@@ -1,6 +1,6 @@
 //! Light tree nodes, which store bounds on their 16 children in SIMD layout.
 
-use super::bounds::{ConeEdge, DistanceFalloff, LightBounds};
+use super::bounds::{ConeFalloff, DistanceFalloff, LightBounds};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
@@ -229,7 +229,7 @@ impl LightTreeNode {
     }
 
     /// Sets a child. `unit` is the unit of power, approximately the power of the entire tree.
-    pub fn set(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
+    pub fn set_child(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power, cone } = bounds;
         let own = &mut self.bounds;
         set_lane(&mut own.center, i, center.as_vec3());
@@ -247,8 +247,8 @@ impl LightTreeNode {
         own.cos[i] = cone.cos as f32;
         own.sin[i] = ((1.0 - cone.cos) * (1.0 + cone.cos)).max(0.0).sqrt() as f32;
         own.end[i] = match cone.edge {
-            ConeEdge::Sharp => 1.0,
-            ConeEdge::Cosine => 0.0,
+            ConeFalloff::Sharp => 1.0,
+            ConeFalloff::Cosine => 0.0,
         };
     }
 
@@ -256,15 +256,20 @@ impl LightTreeNode {
     /// × cosine of the smallest angle between the emission cone and a direction from the child (section 4.2,
     /// with bounds on cosines) × the lobe's response. Never 0 if light from the child may reach the point.
     #[inline(always)]
-    pub fn child_importance(&self, receiver: &Receiver) -> ExpectedContributions {
+    pub fn child_importances(&self, receiver: &Receiver) -> ExpectedContributions {
         let receivers = ReceiverPacket::splat(receiver);
-        expected(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
+        expected_contributions(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
-    /// [`LightTreeNode::child_importance`] of one child for a packet of surface points.
+    /// [`LightTreeNode::child_importances`] of one child for a packet of surface points.
     #[inline(always)]
-    pub fn importance_of_child(&self, child: usize, receivers: &ReceiverPacket, has_lobes: bool) -> F32x16 {
-        expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
+    pub fn child_importance_packet(
+        &self,
+        child: usize,
+        receivers: &ReceiverPacket,
+        has_lobes: bool,
+    ) -> F32x16 {
+        expected_contributions(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
     }
 
     /// The child that contains the leaf at `place` in tree order.
@@ -276,22 +281,22 @@ impl LightTreeNode {
 
 /// Importance of a light for a receiver in each lane.
 #[inline(always)]
-fn expected(
+fn expected_contributions(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
     is_plain: bool,
     has_lobes: bool,
 ) -> ExpectedContributions {
     match (is_plain, has_lobes) {
-        (true, false) => expected_as::<true, false>(bounds, receivers),
-        (false, false) => expected_as::<false, false>(bounds, receivers),
-        (true, true) => expected_as::<true, true>(bounds, receivers),
-        (false, true) => expected_as::<false, true>(bounds, receivers),
+        (true, false) => specialized_contributions::<true, false>(bounds, receivers),
+        (false, false) => specialized_contributions::<false, false>(bounds, receivers),
+        (true, true) => specialized_contributions::<true, true>(bounds, receivers),
+        (false, true) => specialized_contributions::<false, true>(bounds, receivers),
     }
 }
 
 #[inline(always)]
-fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
+fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
 ) -> ExpectedContributions {
@@ -307,14 +312,14 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let [mut square, mut least, mut along] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         square[i] = lane(&offset, i).length_squared();
-        least[i] = at_least(bounds.radius[i] * bounds.radius[i], MIN_IMPORTANCE);
+        least[i] = clamp_min(bounds.radius[i] * bounds.radius[i], MIN_IMPORTANCE);
         along[i] = lane(normal, i).dot(lane(&offset, i));
     }
     let mut inverse = square;
     for i in 0..PACKET_SIZE {
-        inverse[i] = at_least(square[i], least[i]);
+        inverse[i] = clamp_min(square[i], least[i]);
     }
-    inverse_roots(&mut inverse);
+    inverse_sqrt_packet(&mut inverse);
     // Let θ be the angle between the normal and the sphere's center, and β half the angle that the sphere
     // subtends. `towards` is positive if θ − β < 90°. Inside the sphere, light arrives from every direction.
     let [mut sin, mut towards, mut mean] = [[0.0; PACKET_SIZE]; 3];
@@ -325,8 +330,8 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
         // The cosines for points in a sphere are approximately uniformly distributed between the minimum and
         // the maximum. Negative cosines contribute nothing.
-        let above = at_least(towards[i], 0.0);
-        let cut = above * above * bounds.spread[i] * at_least(square[i], least[i]) * inverse[i];
+        let above = clamp_min(towards[i], 0.0);
+        let cut = above * above * bounds.spread[i] * clamp_min(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
     }
     let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
@@ -338,10 +343,10 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
         for i in 0..PACKET_SIZE {
             cos[i] = -lane(&bounds.axis, i).dot(lane(&offset, i)) * inverse[i];
-            without[i] = at_least(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
+            without[i] = clamp_min(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
         }
         let rest = without;
-        inverse_roots(&mut without);
+        inverse_sqrt_packet(&mut without);
         for i in 0..PACKET_SIZE {
             let beyond = cos[i] * bounds.cos[i] + rest[i] * without[i] * bounds.sin[i];
             let is_within = (cos[i] >= bounds.cos[i]) | (square[i] <= least[i]);
@@ -357,7 +362,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
     for i in 0..PACKET_SIZE {
-        let value = at_most(at_least(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
+        let value = clamp_max(clamp_min(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
         let arrives = (towards[i] > -MIN_COSINE)
             & (IS_PLAIN | (away[i] > bounds.end[i] - MIN_COSINE))
             & (bounds.power[i] > 0.0);
@@ -369,10 +374,10 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
 /// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
 /// divisions would take longer than the rest of the node test.
 #[inline(always)]
-fn inverse_roots(x: &mut F32x16) {
+fn inverse_sqrt_packet(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {
         let x = &mut x[i];
-        let square = at_most(*x, MAX_SQUARED_DISTANCE);
+        let square = clamp_max(*x, MAX_SQUARED_DISTANCE);
         let half = 0.5 * square;
         let root = f32::from_bits(0x5f37_5a86_u32.wrapping_sub(square.to_bits() >> 1));
         let root = root * (1.5 - half * root * root);
@@ -384,16 +389,16 @@ fn inverse_roots(x: &mut F32x16) {
 /// Clamps a bound on a cosine.
 #[inline(always)]
 fn clamp_cosine(bound: f32) -> f32 {
-    at_most(at_least(bound, MIN_COSINE), 1.0)
+    clamp_max(clamp_min(bound, MIN_COSINE), 1.0)
 }
 
 #[inline(always)]
-fn at_least(x: f32, least: f32) -> f32 {
+fn clamp_min(x: f32, least: f32) -> f32 {
     if x > least { x } else { least }
 }
 
 #[inline(always)]
-fn at_most(x: f32, most: f32) -> f32 {
+fn clamp_max(x: f32, most: f32) -> f32 {
     if x < most { x } else { most }
 }
 
@@ -405,8 +410,8 @@ mod tests {
     fn inverse_roots_match_exact_division() {
         for exponent in -35..37 {
             let mut x: F32x16 = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
-            let expected = x.map(|x| (1.0 / f64::from(at_most(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
-            inverse_roots(&mut x);
+            let expected = x.map(|x| (1.0 / f64::from(clamp_max(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
+            inverse_sqrt_packet(&mut x);
             for (root, expected) in x.iter().zip(expected) {
                 assert!((root / expected - 1.0).abs() < 4.0 * f32::EPSILON, "{root} {expected}");
             }

@@ -15,7 +15,7 @@ pub struct SingleNodeImportance<'a> {
 
 /// The lights picked for a packet of points.
 #[repr(align(64))]
-pub struct PacketPicks {
+pub struct LightPickPacket {
     /// Index of the picked child for each point.
     children: [u32; PACKET_SIZE],
     /// Index of the picked light for each point.
@@ -61,7 +61,7 @@ impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
         let Self { node, receivers, has_lobes } = self;
         let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for child in 0..node.count as usize % (PACKET_SIZE + 1) {
-            importance[child] = node.importance_of_child(child, receivers, has_lobes);
+            importance[child] = node.child_importance_packet(child, receivers, has_lobes);
             for i in 0..PACKET_SIZE {
                 totals[i] += f64::from(importance[child][i]);
             }
@@ -73,7 +73,7 @@ impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
 impl SingleNodeImportance<'_> {
     /// Picks a light for each point. `u` is in [0, 1).
     #[inline(always)]
-    pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> PacketPicks {
+    pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> LightPickPacket {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // Stay below the total to avoid rounding past the last child with nonzero importance.
@@ -96,21 +96,21 @@ impl SingleNodeImportance<'_> {
                 NodeChild::LightTreeNode(_) => 0,
             };
         }
-        PacketPicks { children, lights, probabilities: self.shares(&values) }
+        LightPickPacket { children, lights, probabilities: self.normalize_importance(&values) }
     }
 
     /// Probabilities of `picks` with these importances.
     #[inline(always)]
-    pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
+    pub fn probabilities(&self, picks: &LightPickPacket) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];
         }
-        self.shares(&values)
+        self.normalize_importance(&values)
     }
 
     #[inline(always)]
-    fn shares(&self, values: &F32x16) -> F32x16 {
+    fn normalize_importance(&self, values: &F32x16) -> F32x16 {
         let mut shares = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let share = (f64::from(values[i]) / self.totals[i]) as f32;

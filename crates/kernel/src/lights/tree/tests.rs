@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::bounds::{ConeEdge, DistanceFalloff};
+use super::bounds::{ConeFalloff, DistanceFalloff};
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
@@ -12,7 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{AreaLight, Emitter, Light, LightPart, Lights, MeshEmitter, Side, area_light};
+use crate::lights::{AreaLight, Emitter, Light, LightCoverage, Lights, MeshEmitter, Side, front_area_light};
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
@@ -42,7 +42,7 @@ fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
         8 => Shape::Box(Cuboid::new(place, across.abs() * size + 0.001, direction * 90.0)),
         _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
     };
-    Light::Area(area_light(&shape, color, object).expect("expected a finite shape"))
+    Light::Area(front_area_light(&shape, color, object).expect("expected a finite shape"))
 }
 
 fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
@@ -68,8 +68,8 @@ const NODES: usize = 12;
 fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
     let mut cut = LightTreeCut::new(tree, nodes);
     // Visit another point first, which should not affect the result.
-    cut.move_to(&Receiver::without_lobe(normal, point));
-    cut.move_to(&Receiver::without_lobe(point, normal));
+    cut.adapt_to_receiver(&Receiver::without_lobe(normal, point));
+    cut.adapt_to_receiver(&Receiver::without_lobe(point, normal));
     cut
 }
 
@@ -90,7 +90,7 @@ proptest! {
 
     #[test]
     fn pick_probabilities_are_exact_and_sum_to_one(seed in any::<u64>(), count in 1_u32..600) {
-        let mut next = random::unit(seed);
+        let mut next = random::unit_generator(seed);
         let lights = lights_of(count, &mut next);
         let tree = tree_of(&lights);
         for _ in 0..4 {
@@ -127,7 +127,7 @@ proptest! {
 
     #[test]
     fn every_contributing_light_can_be_picked(seed in any::<u64>(), count in 1_u32..200) {
-        let mut next = random::unit(seed);
+        let mut next = random::unit_generator(seed);
         let lights = lights_of(count, &mut next);
         let tree = tree_of(&lights);
         for _ in 0..4 {
@@ -155,7 +155,7 @@ proptest! {
 fn spotlights_in_a_column_can_always_be_picked() {
     // The lights form columns, and all of them point down. Each column is one node. Points below some lights
     // in a column may be above the center of the node.
-    let mut next = random::unit(8);
+    let mut next = random::unit_generator(8);
     let spot = |i: u32| {
         let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
@@ -182,7 +182,7 @@ fn spotlights_in_a_column_can_always_be_picked() {
 
 #[test]
 fn pick_frequencies_match_probabilities() {
-    let mut next = random::unit(3);
+    let mut next = random::unit_generator(3);
     let lights = lights_of(300, &mut next);
     let tree = tree_of(&lights);
     for round in 0..4 {
@@ -243,7 +243,7 @@ fn noncontributing_lights_are_not_picked() {
     let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let disk = |place, normal| {
         let disk = Shape::Disk(Disk::new(place, normal, 0.05));
-        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("expected a finite shape"))
+        Light::Area(front_area_light(&disk, Vec3::ONE, 0).expect("expected a finite shape"))
     };
     let spot =
         |place, axis| Light::Spot(SpotLight { point: point_at(place), axis, half_angle: 0.3, blend: 0.2 });
@@ -291,7 +291,7 @@ fn picks_are_proportional_to_irradiance() {
 #[test]
 fn picks_are_invariant_to_power_of_two_scaling() {
     let probabilities = |k: i32| {
-        let mut next = random::unit(5);
+        let mut next = random::unit_generator(5);
         let (unit, power) = (2_f64.powi(k), 4_f32.powi(k));
         let mut lights: Vec<Light> = (0..100)
             .map(|_| {
@@ -315,12 +315,12 @@ fn picks_are_invariant_to_power_of_two_scaling() {
 
 #[test]
 fn joint_bounds_contain_all_lights() {
-    let mut next = random::unit(11);
+    let mut next = random::unit_generator(11);
     for _ in 0..200 {
         let bounds: Vec<LightBounds> = lights_of(20, &mut next).iter().filter_map(Light::bounds).collect();
         for space in [DistanceFalloff::InverseSquare, DistanceFalloff::Constant, DistanceFalloff::Beyond] {
             let own: Vec<_> = bounds.iter().filter(|one| one.space == space).copied().collect();
-            let Some(all) = LightBounds::around(own.iter()) else { continue };
+            let Some(all) = LightBounds::union(own.iter()) else { continue };
             for one in &own {
                 let reach = (one.center - all.center).length() + one.radius;
                 assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
@@ -331,8 +331,8 @@ fn joint_bounds_contain_all_lights() {
             }
         }
     }
-    assert_eq!(LightBounds::around([].iter()), None);
-    assert!(ConeEdge::Cosine > ConeEdge::Sharp);
+    assert_eq!(LightBounds::union([].iter()), None);
+    assert!(ConeFalloff::Cosine > ConeFalloff::Sharp);
 }
 
 #[test]
@@ -354,7 +354,7 @@ fn coincident_and_distant_lights_build_valid_trees() {
 
 #[test]
 fn canceled_builds_return_an_error() {
-    let mut next = random::unit(2);
+    let mut next = random::unit_generator(2);
     let bounds: Vec<_> = lights_of(100, &mut next).iter().map(Light::bounds).collect();
     let token = CancelToken::new();
     assert!(LightTree::new(&bounds, &token).is_ok_and(|tree| tree.is_some()));
@@ -366,7 +366,7 @@ fn canceled_builds_return_an_error() {
 #[test]
 fn packet_picks_match_single_picks() {
     use crate::lights::ReceiverPacket;
-    let mut next = random::unit(21);
+    let mut next = random::unit_generator(21);
     let mut picked = 0;
     for count in [1, 2, 9, 13, 16] {
         let lights = lights_of(count, &mut next);
@@ -419,7 +419,7 @@ fn packet_picks_match_single_picks() {
 
 /// A mesh of triangles with very different sizes, some near and some far.
 fn uneven_mesh(count: u32) -> MeshEmitter {
-    let mut next = random::signed(8);
+    let mut next = random::signed_generator(8);
     let mut corner = |scale: f64| DVec3::new(f64::from(next()), f64::from(next()), f64::from(next())) * scale;
     let triangles = (0..count).map(|i| {
         let (place, size) = (corner(2.0), 0.02 * 1.5_f64.powi((i % 12) as i32));
@@ -432,18 +432,18 @@ fn uneven_mesh(count: u32) -> MeshEmitter {
 fn mesh_pdf_matches_its_samples() {
     for count in [20, 500] {
         let mesh = uneven_mesh(count);
-        assert_eq!(mesh.tree().is_some(), count > 32);
+        assert_eq!(mesh.light_tree().is_some(), count > 32);
         let bounds = mesh.bounds();
         let light = AreaLight {
             side: Side::Front,
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,
-            part: LightPart::Listed,
+            part: LightCoverage::Listed,
             bounds,
             texture: None,
         };
-        let (mut next, mut compared) = (random::unit(5), 0);
+        let (mut next, mut compared) = (random::unit_generator(5), 0);
         for _ in 0..2000 {
             let (point, normal) = place(&mut next);
             let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };

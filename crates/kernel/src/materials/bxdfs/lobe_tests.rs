@@ -1,11 +1,11 @@
 //! Checks for microfacet lobes. The tests of each kind of BSDF use them. Compares values with an `f64`
 //! reference, samples with pdfs, and albedos.
 
-use crate::materials::bsdf::{LobeSet, ShownLobes, SideSamples};
+use crate::materials::bsdf::{DielectricSamplePacket, LobeFilter, LobeSet};
 use crate::materials::bxdf::{Bxdf, SurfaceDirections};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
-use crate::math::random::unit as random;
+use crate::math::random::unit_generator as random;
 use crate::math::{DVec3, Vec3};
 
 use std::f64::consts::{PI, TAU};
@@ -20,14 +20,14 @@ pub const COSINES: [f64; 5] = [0.05, 0.15, 0.4, 0.8, 1.0];
 const TANGENT: Vec3 = Vec3::new(3.0, 0.0, 0.5);
 
 /// Computes a unit direction from its cosine with the z axis and its azimuth.
-pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
+pub fn spherical_direction(cosine: f64, azimuth: f64) -> DVec3 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let (sin, cos) = libm::sincos(azimuth);
     DVec3::new(sine * cos, sine * sin, cosine)
 }
 
 /// D·G/(4 cosθᵢ cosθₒ) around the z axis, computed with the formulas from the papers.
-pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
+pub fn reference_microfacet_brdf(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     let half = (one + other).normalize();
     let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
     let distribution = 1.0 / (PI * u * v * stretched * stretched);
@@ -40,7 +40,7 @@ pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
 
 /// How light reaches the viewer in a narrow lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LitFrom {
+pub enum NarrowLightPath {
     /// By reflection.
     Mirrored,
     /// By refraction. Contains the index of refraction on the light's side divided by the index on the
@@ -50,9 +50,9 @@ pub enum LitFrom {
     Through,
 }
 
-impl LitFrom {
+impl NarrowLightPath {
     /// The sign of z on the light's side.
-    fn side(self) -> f64 {
+    fn light_side_sign(self) -> f64 {
         match self {
             Self::Mirrored => 1.0,
             Self::Refracted(_) | Self::Through => -1.0,
@@ -61,7 +61,7 @@ impl LitFrom {
 }
 
 /// Returns packets of lobe choices and random numbers for `side` × `side` stratified samples.
-fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
+fn stratified_packets(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
     let mut next = random(5);
     (0..side * side).step_by(PACKET_SIZE).map(move |first| {
         let (mut choices, mut u): (F32x16, [F32x16; 2]) = ([0.0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
@@ -79,7 +79,7 @@ fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
 }
 
 /// A sample on either side of a surface.
-pub struct SideSample {
+pub struct TwoSidedSample {
     /// Unit direction.
     pub direction: DVec3,
     /// Pdf of the direction in sr⁻¹.
@@ -91,43 +91,48 @@ pub struct SideSample {
 }
 
 /// A surface whose normal is the z axis, seen from a direction.
-pub struct Subject<B: Bxdf> {
+pub struct TestSurface<B: Bxdf> {
     row: BxdfPacket<B>,
     to_eye: DVec3,
     alphas: [f64; 2],
-    light: LitFrom,
+    light: NarrowLightPath,
 }
 
-impl<B: Bxdf> Subject<B> {
+impl<B: Bxdf> TestSurface<B> {
     /// Creates a surface with a material. `alphas` are the α values of its narrow lobe.
     pub fn new(point: &B::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
-        Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
+        Self::with_light_path(point, alphas, to_eye, NarrowLightPath::Mirrored)
     }
 
-    /// [`Subject::new`] for the given kind of lighting.
-    pub fn lit(point: &B::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
+    /// [`TestSurface::new`] for the given kind of lighting.
+    pub fn with_light_path(
+        point: &B::Point,
+        alphas: [f32; 2],
+        to_eye: DVec3,
+        light: NarrowLightPath,
+    ) -> Self {
         let mut row = BxdfPacket::<B>::default();
         row.reset();
         for i in 0..PACKET_SIZE {
-            let normal = Vec3::Z * light.side() as f32;
+            let normal = Vec3::Z * light.light_side_sign() as f32;
             let place = SurfaceDirections { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
-            row.put(i, point, ShownLobes::ALL, &place);
+            row.set_bsdf(i, point, LobeFilter::ALL, &place);
         }
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
     }
 
     /// Normals on the lit side.
     fn normals(&self) -> Vec3x16 {
-        [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.side() as f32; PACKET_SIZE]]
+        [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.light_side_sign() as f32; PACKET_SIZE]]
     }
 
     /// Cosine between a direction and the normal on the lit side.
     fn height(&self, direction: DVec3) -> f64 {
-        direction.z * self.light.side()
+        direction.z * self.light.light_side_sign()
     }
 
     /// f, the part of f from the wide lobes, and the pdf, for light from each direction.
-    pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
+    pub fn evaluate(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
             let mut rows = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
@@ -143,7 +148,7 @@ impl<B: Bxdf> Subject<B> {
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
                     "the parts should add up to {f}"
                 );
-                let [alone, of_all_lobes] = self.row.f_at(i, some[i].as_vec3());
+                let [alone, of_all_lobes] = self.row.lane_f(i, some[i].as_vec3());
                 assert_eq!(alone, of_all_lobes);
                 let alone = alone.as_dvec3();
                 assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} instead of {f}");
@@ -154,28 +159,29 @@ impl<B: Bxdf> Subject<B> {
     }
 
     /// Directions sampled with `side` × `side` stratified random numbers.
-    pub fn samples(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
-        let rows = grid(side).map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
+    pub fn sample_directions(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
+        let rows = stratified_packets(side)
+            .map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
         let mut all: Vec<DVec3> =
             rows.flat_map(|row| (0..PACKET_SIZE).map(move |i| lane(&row, i).as_dvec3())).collect();
         all.truncate((side * side) as usize);
         all
     }
 
-    /// Samples on either side with the same random numbers as [`Subject::samples`].
-    pub fn side_samples(
+    /// Samples on either side with the same random numbers as [`TestSurface::sample_directions`].
+    pub fn sample_either_side(
         &self,
         side: u32,
-        sample: impl Fn(&BxdfPacket<B>, &F32x16, &[F32x16; 2]) -> SideSamples,
-    ) -> Vec<SideSample> {
-        let rows = grid(side).map(|(choices, u)| sample(&self.row, &choices, &u));
-        let one = |row: &SideSamples, i: usize| SideSample {
+        sample: impl Fn(&BxdfPacket<B>, &F32x16, &[F32x16; 2]) -> DielectricSamplePacket,
+    ) -> Vec<TwoSidedSample> {
+        let rows = stratified_packets(side).map(|(choices, u)| sample(&self.row, &choices, &u));
+        let one = |row: &DielectricSamplePacket, i: usize| TwoSidedSample {
             direction: lane(&row.directions, i).as_dvec3(),
             density: f64::from(row.densities[i]),
             share: f64::from(row.shares[i]),
             is_beyond: row.beyond[i] != 0,
         };
-        let mut all: Vec<SideSample> =
+        let mut all: Vec<TwoSidedSample> =
             rows.flat_map(|row| (0..PACKET_SIZE).map(|i| one(&row, i)).collect::<Vec<_>>()).collect();
         all.truncate((side * side) as usize);
         all
@@ -183,10 +189,10 @@ impl<B: Bxdf> Subject<B> {
 
     /// Albedo of all lobes, estimated as the mean of f·cos/pdf over samples.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
-        self.mean_of(&self.samples(LobeSet::All, side))
+        self.mean_sample_weight(&self.sample_directions(LobeSet::All, side))
     }
 
-    /// [`Subject::sampled_albedo`] with 16 lobe choices per cell.
+    /// [`TestSurface::sampled_albedo`] with 16 lobe choices per cell.
     pub fn albedo_by_choices(&self, side: u32) -> DVec3 {
         let mut next = random(6);
         let mut samples = Vec::new();
@@ -199,13 +205,13 @@ impl<B: Bxdf> Subject<B> {
             let directions = self.row.sample(LobeSet::All, &self.normals(), &choices, &u);
             samples.extend((0..PACKET_SIZE).map(|i| lane(&directions, i).as_dvec3()));
         }
-        self.mean_of(&samples)
+        self.mean_sample_weight(&samples)
     }
 
     /// Maximum of f·cos/pdf over samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
-        let samples = self.samples(LobeSet::All, side);
-        let values = self.values(LobeSet::All, &samples);
+        let samples = self.sample_directions(LobeSet::All, side);
+        let values = self.evaluate(LobeSet::All, &samples);
         let weights = samples.iter().zip(values).map(|(direction, (f, _, pdf))| {
             if pdf > 0.0 { f.max_element() * self.height(*direction).max(0.0) / pdf } else { 0.0 }
         });
@@ -213,8 +219,8 @@ impl<B: Bxdf> Subject<B> {
     }
 
     /// Mean of f·cos/pdf.
-    fn mean_of(&self, samples: &[DVec3]) -> DVec3 {
-        let values = self.values(LobeSet::All, samples);
+    fn mean_sample_weight(&self, samples: &[DVec3]) -> DVec3 {
+        let values = self.evaluate(LobeSet::All, samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)
@@ -230,7 +236,7 @@ impl<B: Bxdf> Subject<B> {
         self.albedo_by_rings(192)
     }
 
-    /// [`Subject::albedo`] with a given number of rings of half vectors.
+    /// [`TestSurface::albedo`] with a given number of rings of half vectors.
     pub fn albedo_by_rings(&self, rings: u32) -> DVec3 {
         let narrow: DVec3 = self
             .half_vectors(rings, 192)
@@ -239,7 +245,7 @@ impl<B: Bxdf> Subject<B> {
             .chunks(PACKET_SIZE)
             .map(|some| {
                 let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
-                let values = self.values(LobeSet::All, &directions);
+                let values = self.evaluate(LobeSet::All, &directions);
                 some.iter().zip(values).map(|((_, weight), (f, wide, _))| (f - wide) * *weight).sum::<DVec3>()
             })
             .sum();
@@ -247,10 +253,10 @@ impl<B: Bxdf> Subject<B> {
         let directions: Vec<DVec3> = (0..rings * steps)
             .map(|i| {
                 let cosine2 = (f64::from(i / steps) + 0.5) / f64::from(rings);
-                direction(cosine2.sqrt(), f64::from(i % steps) / f64::from(steps) * TAU)
+                spherical_direction(cosine2.sqrt(), f64::from(i % steps) / f64::from(steps) * TAU)
             })
             .collect();
-        let wide: DVec3 = self.values(LobeSet::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
+        let wide: DVec3 = self.evaluate(LobeSet::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
@@ -260,14 +266,14 @@ impl<B: Bxdf> Subject<B> {
         (0..rings * steps).filter_map(move |i| {
             let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
             let phi = (f64::from(i % steps) + 0.5) / f64::from(steps) * TAU;
-            let (direction, solid_angle) = self.at_half_vector(y, phi)?;
+            let (direction, solid_angle) = self.map_to_direction(y, phi)?;
             Some((direction, solid_angle / f64::from(rings * steps)))
         })
     }
 
     /// The direction at a point of the half-vector map, and its solid angle per unit area of the map. `None`
     /// if the direction is below the surface.
-    pub fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
+    pub fn map_to_direction(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
         let [u, v] = self.alphas;
         let outside = (1.0 - y) * (1.0 - y);
         let slope = ((1.0 - outside) / outside).sqrt();
@@ -277,9 +283,9 @@ impl<B: Bxdf> Subject<B> {
         let mirrored = half * (2.0 * cosine) - self.to_eye;
         // Ratio between the solid angles of directions and half vectors.
         let (direction, spread) = match self.light {
-            LitFrom::Mirrored => (mirrored, 4.0 * cosine),
-            LitFrom::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
-            LitFrom::Refracted(eta) => {
+            NarrowLightPath::Mirrored => (mirrored, 4.0 * cosine),
+            NarrowLightPath::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
+            NarrowLightPath::Refracted(eta) => {
                 let beyond = (eta * eta - 1.0 + cosine * cosine).sqrt();
                 if beyond.is_nan() {
                     return None;
@@ -295,12 +301,12 @@ impl<B: Bxdf> Subject<B> {
     }
 
     /// The point on the half-vector map that corresponds to a direction.
-    fn place(&self, direction: DVec3) -> [f64; 2] {
+    fn direction_to_map(&self, direction: DVec3) -> [f64; 2] {
         let [u, v] = self.alphas;
         let sum = match self.light {
-            LitFrom::Mirrored => direction + self.to_eye,
-            LitFrom::Through => DVec3::new(direction.x, direction.y, -direction.z) + self.to_eye,
-            LitFrom::Refracted(eta) => self.to_eye + direction * eta,
+            NarrowLightPath::Mirrored => direction + self.to_eye,
+            NarrowLightPath::Through => DVec3::new(direction.x, direction.y, -direction.z) + self.to_eye,
+            NarrowLightPath::Refracted(eta) => self.to_eye + direction * eta,
         };
         let half = if sum.z < 0.0 { -sum } else { sum }.normalize();
         let (x, y) = (half.x / u / half.z, half.y / v / half.z);
@@ -313,7 +319,7 @@ impl<B: Bxdf> Subject<B> {
     pub fn check_samples(&self, what: &str, lobes: LobeSet) {
         const CELLS: u32 = 16;
         // Near total reflection, refraction has a square-root singularity.
-        let fine = if let LitFrom::Refracted(_) = self.light { 36 } else { 12 };
+        let fine = if let NarrowLightPath::Refracted(_) = self.light { 36 } else { 12 };
         let mut next = random(23);
         let mut counts = vec![0.0; (CELLS * CELLS + 1) as usize];
         let total = 400 * 400;
@@ -322,7 +328,7 @@ impl<B: Bxdf> Subject<B> {
             let directions = self.row.sample(lobes, &self.normals(), &numbers(), &[numbers(), numbers()]);
             for i in 0..PACKET_SIZE {
                 let direction = lane(&directions, i).as_dvec3();
-                let [y, turn] = self.place(direction);
+                let [y, turn] = self.direction_to_map(direction);
                 let cell = |part: f64| ((part * f64::from(CELLS)) as u32).min(CELLS - 1);
                 let below = CELLS * CELLS;
                 let number = if self.height(direction) > 0.0 { cell(y) * CELLS + cell(turn) } else { below };
@@ -335,13 +341,13 @@ impl<B: Bxdf> Subject<B> {
         let places: Vec<(usize, DVec3, f64)> = (0..side * side)
             .filter_map(|i| {
                 let (ring, step) = (i / side, i % side);
-                let (direction, solid_angle) = self.at_half_vector(part(ring), part(step) * TAU)?;
+                let (direction, solid_angle) = self.map_to_direction(part(ring), part(step) * TAU)?;
                 Some(((ring / fine * CELLS + step / fine) as usize, direction, solid_angle))
             })
             .collect();
         let directions: Vec<DVec3> = places.iter().map(|place| place.1).collect();
         let mut expected = vec![0.0; counts.len()];
-        for ((cell, _, solid_angle), (_, _, pdf)) in places.iter().zip(self.values(lobes, &directions)) {
+        for ((cell, _, solid_angle), (_, _, pdf)) in places.iter().zip(self.evaluate(lobes, &directions)) {
             expected[*cell] += pdf * solid_angle / f64::from(side * side) * total as f64;
         }
         let above: f64 = expected.iter().sum();
@@ -373,17 +379,20 @@ pub fn check_values<B: Bxdf>(
     let least = alphas[0].min(alphas[1]);
     let (reciprocity, error) = if least >= 0.05 { (1e-5, 2e-5) } else { (1e-3, 5e-3) };
     for _ in 0..300 {
-        let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
-        let there = Subject::<B>::new(point, alphas, to_eye);
-        let far = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU);
-        let near = there.at_half_vector(f64::from(0.98 * next()), f64::from(next()) * TAU);
+        let to_eye = spherical_direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU)
+            .as_vec3()
+            .as_dvec3();
+        let there = TestSurface::<B>::new(point, alphas, to_eye);
+        let far = spherical_direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU);
+        let near = there.map_to_direction(f64::from(0.98 * next()), f64::from(next()) * TAU);
         let near = near.map_or(far, |(near, _)| near);
         for light in [far, near].map(|light| light.as_vec3().as_dvec3()) {
             if light.z < 0.02 {
                 continue;
             }
-            let (f, _, _) = there.values(LobeSet::All, &[light])[0];
-            let (back, _, _) = Subject::<B>::new(point, alphas, light).values(LobeSet::All, &[to_eye])[0];
+            let (f, _, _) = there.evaluate(LobeSet::All, &[light])[0];
+            let (back, _, _) =
+                TestSurface::<B>::new(point, alphas, light).evaluate(LobeSet::All, &[to_eye])[0];
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
@@ -399,23 +408,23 @@ pub fn check_values<B: Bxdf>(
 }
 
 /// Checks that values, pdfs, and samples of a surface do not depend on the other lanes.
-pub fn check_neighbors<B: Bxdf>(points: &[B::Point]) {
-    check_neighbors_lit::<B>(points, LitFrom::Mirrored);
+pub fn check_lane_independence<B: Bxdf>(points: &[B::Point]) {
+    check_lane_independence_with::<B>(points, NarrowLightPath::Mirrored);
 }
 
-/// [`check_neighbors`] for the given kind of lighting.
-pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
+/// [`check_lane_independence`] for the given kind of lighting.
+pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
     check_shown_lobes::<B>(points, lit);
-    let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
+    let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.light_side_sign() as f32; PACKET_SIZE]];
     let mut next = random(31);
     for first in 0..points.len() {
         let to_eye: [Vec3; PACKET_SIZE] = std::array::from_fn(|_| {
-            direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3()
+            spherical_direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3()
         });
         let mut light = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
-            let way = direction(f64::from(next()), f64::from(next()) * TAU);
-            set_lane(&mut light, i, DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3());
+            let way = spherical_direction(f64::from(next()), f64::from(next()) * TAU);
+            set_lane(&mut light, i, DVec3::new(way.x, way.y, way.z * lit.light_side_sign()).as_vec3());
         }
         let (choices, u) =
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
@@ -424,11 +433,11 @@ pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
             row.reset();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place = SurfaceDirections {
-                    normal: Vec3::Z * lit.side() as f32,
+                    normal: Vec3::Z * lit.light_side_sign() as f32,
                     wo: to_eye[i],
                     tangent: TANGENT,
                 };
-                row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
+                row.set_bsdf(i, &points[(first + i) % points.len()], LobeFilter::ALL, &place);
             }
             row
         };
@@ -439,7 +448,7 @@ pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
                 // If there is no narrow lobe, its sample is never used.
-                if lobes == LobeSet::All || row.narrow_lobes() & 1 << i != 0 {
+                if lobes == LobeSet::All || row.narrow_lobe_mask() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }
@@ -461,25 +470,26 @@ pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
 /// Checks that each lobe is bit-identical whether or not the other lobes are shown, and that the lobes add up
 /// to f. Otherwise, the sum of the AOVs would differ from the beauty image, because rays in narrow lobes
 /// divide by small pdfs.
-pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
+pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
     let mut next = random(7);
     for point in points {
         for round in 0..400 {
-            let mut turn =
-                |least: f64| direction(least + (1.0 - least) * f64::from(next()), f64::from(next()) * TAU);
+            let mut turn = |least: f64| {
+                spherical_direction(least + (1.0 - least) * f64::from(next()), f64::from(next()) * TAU)
+            };
             let (to_eye, any) = (turn(0.05), turn(0.0));
             let near_mirror = DVec3::new(-to_eye.x, -to_eye.y, to_eye.z) + any * 0.1_f64.powi(round % 5);
             let way = if round % 2 == 0 { any } else { near_mirror.normalize() };
-            let way = DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3();
+            let way = DVec3::new(way.x, way.y, way.z * lit.light_side_sign()).as_vec3();
             let place = SurfaceDirections {
-                normal: Vec3::Z * lit.side() as f32,
+                normal: Vec3::Z * lit.light_side_sign() as f32,
                 wo: to_eye.as_vec3(),
                 tangent: TANGENT,
             };
             let shown = |diffuse: bool, specular: bool| {
                 let mut row = BxdfPacket::<B>::default();
                 row.reset();
-                row.put(0, point, ShownLobes::Of { diffuse, specular }, &place);
+                row.set_bsdf(0, point, LobeFilter::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);
                 let values = row.f(&light);

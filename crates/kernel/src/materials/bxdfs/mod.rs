@@ -12,18 +12,19 @@ pub use conductor::{Conductor, ConductorFresnel};
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
-pub use rough_dielectric::GlassPoint;
+pub use rough_dielectric::RoughDielectricPoint;
 
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, NarrowLobe, RoughMaterial, RoughPoint, ShownLobes, SideSamples, UvRow,
+    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobeFilter, LobeSet, NarrowLobe,
+    UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, SurfaceDirections, facing_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lookup::{PointLookup, TextureCollector, WhiteLookup};
-use crate::materials::texture::{Color, Texture};
+use crate::materials::texture::{ColorParameter, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
 use conductor::ConductorBxdf;
@@ -34,7 +35,7 @@ use rough_dielectric::DielectricBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for part of their
-/// light. `kept` is the type in which a [`BsdfRow`] stores a packet. The most common kind is stored inline.
+/// light. `kept` is the type in which a [`BsdfPacket`] stores a packet. The most common kind is stored inline.
 /// Others are boxed to keep packets small in scenes without them.
 macro_rules! kinds {
     (
@@ -43,20 +44,20 @@ macro_rules! kinds {
     ) => {
         /// The kind of a non-specular BSDF.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum RoughKind { $($(#[$doc])* $kind,)+ $($(#[$part_doc])* $part),+ }
+        pub enum BxdfKind { $($(#[$doc])* $kind,)+ $($(#[$part_doc])* $part),+ }
 
-        impl RoughKind {
+        impl BxdfKind {
             /// All kinds.
             pub const ALL: &[Self] = &[$(Self::$kind,)+ $(Self::$part),+];
         }
 
         /// A non-specular material of any kind.
         #[derive(Clone, Debug, PartialEq)]
-        pub enum Rough { $($(#[$doc])* $kind($material)),+ }
+        pub enum NonSpecular { $($(#[$doc])* $kind($material)),+ }
 
         /// A non-specular material of any kind at one point.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum RoughBsdf {
+        pub enum BxdfPoint {
             $($(#[$doc])* $kind(<$bxdf as Bxdf>::Point),)+
             $($(#[$part_doc])* $part(<$part_bxdf as Bxdf>::Point)),+
         }
@@ -65,26 +66,26 @@ macro_rules! kinds {
         /// would slow down every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
-        pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<BxdfPacket<$part_bxdf>>)),+ }
+        pub enum BsdfPacket { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<BxdfPacket<$part_bxdf>>)),+ }
 
-        impl Rough {
+        impl NonSpecular {
             /// The kind of the material.
             #[inline(always)]
-            pub fn kind(&self) -> RoughKind {
-                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+            pub fn kind(&self) -> BxdfKind {
+                match self { $(Self::$kind(_) => BxdfKind::$kind),+ }
             }
 
             /// Looks up the textures at a point. Counts texture lookups in `lookups`.
             #[inline(always)]
-            pub fn at(&self, point: &TexturePoint, lookups: &mut u64) -> RoughBsdf {
+            pub fn evaluate_textures(&self, point: &TexturePoint, lookups: &mut u64) -> BxdfPoint {
                 let lookup = &mut PointLookup { point, lookups };
-                match self { $(Self::$kind(material) => RoughBsdf::$kind(material.point(lookup))),+ }
+                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.point(lookup))),+ }
             }
 
             /// The material with white textures.
             #[inline]
-            pub fn with_white_textures(&self) -> RoughBsdf {
-                match self { $(Self::$kind(material) => RoughBsdf::$kind(material.point(&mut WhiteLookup))),+ }
+            pub fn with_white_textures(&self) -> BxdfPoint {
+                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.point(&mut WhiteLookup))),+ }
             }
 
             /// The material's main color. Counts texture lookups in `lookups`.
@@ -96,7 +97,7 @@ macro_rules! kinds {
 
             /// Reflectance for ambient light. Counts texture lookups in `lookups`.
             #[inline]
-            pub fn ambient_at(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
+            pub fn look_up_ambient(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
                 let lookup = &mut PointLookup { point, lookups };
                 match self { $(Self::$kind(material) => material.ambient(lookup)),+ }
             }
@@ -108,31 +109,31 @@ macro_rules! kinds {
                 textures
             }
 
-            /// [`RoughMaterial::packet_color`].
+            /// [`BxdfMaterial::packet_color`].
             #[inline]
-            fn packet_color(&self) -> Option<&Color> {
+            fn packet_color(&self) -> Option<&ColorParameter> {
                 match self { $(Self::$kind(material) => material.packet_color()),+ }
             }
 
-            /// [`RoughMaterial::has_direction`].
+            /// [`BxdfMaterial::is_anisotropic`].
             #[inline]
-            pub fn has_direction(&self) -> bool {
-                match self { $(Self::$kind(material) => material.has_direction()),+ }
+            pub fn is_anisotropic(&self) -> bool {
+                match self { $(Self::$kind(material) => material.is_anisotropic()),+ }
             }
 
-            /// [`RoughMaterial::is_transmissive`].
+            /// [`BxdfMaterial::is_transmissive`].
             pub fn is_transmissive(&self) -> bool {
                 match self { $(Self::$kind(material) => material.is_transmissive()),+ }
             }
         }
 
-        impl RoughBsdf {
+        impl BxdfPoint {
             /// The kind of the BSDF.
             #[inline(always)]
-            pub fn kind(&self) -> RoughKind {
+            pub fn kind(&self) -> BxdfKind {
                 match self {
-                    $(Self::$kind(_) => RoughKind::$kind,)+
-                    $(Self::$part(_) => RoughKind::$part),+
+                    $(Self::$kind(_) => BxdfKind::$kind,)+
+                    $(Self::$part(_) => BxdfKind::$part),+
                 }
             }
 
@@ -145,7 +146,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughPoint::is_black`].
+            /// [`BxdfParameters::is_black`].
             #[inline(always)]
             pub fn is_black(&self) -> bool {
                 match self {
@@ -154,16 +155,16 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughPoint::ambient`].
+            /// [`BxdfParameters::ambient_reflectance`].
             #[inline(always)]
-            pub fn ambient(&self) -> Vec3 {
+            pub fn ambient_reflectance(&self) -> Vec3 {
                 match self {
-                    $(Self::$kind(own) => own.ambient(),)+
-                    $(Self::$part(own) => own.ambient()),+
+                    $(Self::$kind(own) => own.ambient_reflectance(),)+
+                    $(Self::$part(own) => own.ambient_reflectance()),+
                 }
             }
 
-            /// [`RoughPoint::tinted`].
+            /// [`BxdfParameters::tinted`].
             pub fn tinted(self, color: Vec3) -> Self {
                 match self {
                     $(Self::$kind(own) => Self::$kind(own.tinted(color)),)+
@@ -172,19 +173,19 @@ macro_rules! kinds {
             }
         }
 
-        impl BsdfRow {
+        impl BsdfPacket {
             /// The kind of all surfaces in the packet.
             #[inline(always)]
-            pub fn kind(&self) -> RoughKind {
+            pub fn kind(&self) -> BxdfKind {
                 match self {
-                    $(Self::$kind(_) => RoughKind::$kind,)+
-                    $(Self::$part(_) => RoughKind::$part),+
+                    $(Self::$kind(_) => BxdfKind::$kind,)+
+                    $(Self::$part(_) => BxdfKind::$part),+
                 }
             }
 
             /// [`Bxdf::SENDS_RAYS`].
             #[inline(always)]
-            pub fn sends_rays(&self) -> bool {
+            pub fn extends_narrow_lobe_paths(&self) -> bool {
                 match self {
                     $(Self::$kind(_) => <$bxdf as Bxdf>::SENDS_RAYS,)+
                     $(Self::$part(_) => <$part_bxdf as Bxdf>::SENDS_RAYS),+
@@ -193,11 +194,11 @@ macro_rules! kinds {
 
             /// Changes the packet to a different kind. Its contents are then unspecified.
             #[inline(always)]
-            pub fn prepare(&mut self, kind: RoughKind) {
+            pub fn set_kind(&mut self, kind: BxdfKind) {
                 if self.kind() != kind {
                     *self = match kind {
-                        $(RoughKind::$kind => Self::$kind(<$kept>::default()),)+
-                        $(RoughKind::$part => Self::$part(Box::default())),+
+                        $(BxdfKind::$kind => Self::$kind(<$kept>::default()),)+
+                        $(BxdfKind::$part => Self::$part(Box::default())),+
                     };
                 }
             }
@@ -211,36 +212,36 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::put`] for a BSDF of the same kind as the packet.
+            /// [`BxdfPacket::set_bsdf`] for a BSDF of the same kind as the packet.
             #[inline(always)]
-            pub fn put(
+            pub fn set_bsdf(
                 &mut self,
                 i: usize,
-                bsdf: &RoughBsdf,
-                shown: ShownLobes,
+                bsdf: &BxdfPoint,
+                shown: LobeFilter,
                 directions: &SurfaceDirections,
             ) {
-                $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
-                    row.put(i, bsdf, shown, directions);
+                $(if let (Self::$kind(row), BxdfPoint::$kind(bsdf)) = (&mut *self, bsdf) {
+                    row.set_bsdf(i, bsdf, shown, directions);
                 })+
-                $(if let (Self::$part(row), RoughBsdf::$part(bsdf)) = (&mut *self, bsdf) {
-                    row.put(i, bsdf, shown, directions);
+                $(if let (Self::$part(row), BxdfPoint::$part(bsdf)) = (&mut *self, bsdf) {
+                    row.set_bsdf(i, bsdf, shown, directions);
                 })+
             }
 
-            /// [`BxdfPacket::fill`] for a material of the same kind as the packet.
+            /// [`BxdfPacket::fill_lanes`] for a material of the same kind as the packet.
             #[inline(always)]
-            pub fn fill(
+            pub fn fill_lanes(
                 &mut self,
-                material: &Rough,
-                uv: Option<&UvRow>,
-                shown: &[(u32, ShownLobes)],
+                material: &NonSpecular,
+                uv: Option<&UvPacket>,
+                shown: &[(u32, LobeFilter)],
                 simd: impl Simd,
             ) -> u32 {
-                $(if let (Self::$kind(row), Rough::$kind(material)) = (&mut *self, material) {
+                $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
                     let point = material.point(&mut WhiteLookup);
-                    let texture = material.packet_color().and_then(Color::texture);
-                    return row.fill(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
+                    let texture = material.packet_color().and_then(ColorParameter::texture);
+                    return row.fill_lanes(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0
             }
@@ -254,14 +255,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::copy`] from a packet of the same kind.
+            /// [`BxdfPacket::copy_lane`] from a packet of the same kind.
             #[inline(always)]
-            pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
+            pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
                 $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
-                    row.copy(i, other, from);
+                    row.copy_lane(i, other, from);
                 })+
                 $(if let (Self::$part(row), Self::$part(other)) = (&mut *self, other) {
-                    row.copy(i, other, from);
+                    row.copy_lane(i, other, from);
                 })+
             }
 
@@ -269,8 +270,8 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
                 match self {
-                    $(Self::$kind(row) => row.call_f(wi, simd),)+
-                    $(Self::$part(row) => row.call_f(wi, simd)),+
+                    $(Self::$kind(row) => row.dispatch_f(wi, simd),)+
+                    $(Self::$part(row) => row.dispatch_f(wi, simd)),+
                 }
             }
 
@@ -285,8 +286,8 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.call_pdf(lobes, normals, wi, values, simd),)+
-                    $(Self::$part(row) => row.call_pdf(lobes, normals, wi, values, simd)),+
+                    $(Self::$kind(row) => row.dispatch_pdf(lobes, normals, wi, values, simd),)+
+                    $(Self::$part(row) => row.dispatch_pdf(lobes, normals, wi, values, simd)),+
                 }
             }
 
@@ -301,8 +302,8 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> Vec3x16 {
                 match self {
-                    $(Self::$kind(row) => row.call_sample(lobes, normals, choices, u, simd),)+
-                    $(Self::$part(row) => row.call_sample(lobes, normals, choices, u, simd)),+
+                    $(Self::$kind(row) => row.dispatch_sample(lobes, normals, choices, u, simd),)+
+                    $(Self::$part(row) => row.dispatch_sample(lobes, normals, choices, u, simd)),+
                 }
             }
 
@@ -315,12 +316,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::narrow_lobes`].
+            /// [`BxdfPacket::narrow_lobe_mask`].
             #[inline(always)]
-            pub fn narrow_lobes(&self) -> u32 {
+            pub fn narrow_lobe_mask(&self) -> u32 {
                 match self {
-                    $(Self::$kind(row) => row.narrow_lobes(),)+
-                    $(Self::$part(row) => row.narrow_lobes()),+
+                    $(Self::$kind(row) => row.narrow_lobe_mask(),)+
+                    $(Self::$part(row) => row.narrow_lobe_mask()),+
                 }
             }
 
@@ -333,12 +334,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::narrower_than`].
+            /// [`BxdfPacket::mask_narrower_than`].
             #[inline(always)]
-            pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
+            pub fn mask_narrower_than(&self, of: u32, exponent: f32) -> u32 {
                 match self {
-                    $(Self::$kind(row) => row.narrower_than(of, exponent),)+
-                    $(Self::$part(row) => row.narrower_than(of, exponent)),+
+                    $(Self::$kind(row) => row.mask_narrower_than(of, exponent),)+
+                    $(Self::$part(row) => row.mask_narrower_than(of, exponent)),+
                 }
             }
 
@@ -351,12 +352,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::f_at`].
+            /// [`BxdfPacket::lane_f`].
             #[inline(always)]
-            pub fn f_at(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
+            pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
                 match self {
-                    $(Self::$kind(row) => row.f_at(i, wi),)+
-                    $(Self::$part(row) => row.f_at(i, wi)),+
+                    $(Self::$kind(row) => row.lane_f(i, wi),)+
+                    $(Self::$part(row) => row.lane_f(i, wi)),+
                 }
             }
         }
@@ -378,15 +379,15 @@ kinds! {
     }
     parts {
     /// Reflection from rough glass.
-    GlassReflection(DielectricBxdf<false>),
+    DielectricReflection(DielectricBxdf<false>),
     /// Transmission through rough glass.
-    GlassTransmission(DielectricBxdf<true>),
+    DielectricTransmission(DielectricBxdf<true>),
     /// Transmission through a principled material.
     PrincipledTransmission(PrincipledBxdf<true>),
     }
 }
 
-impl Rough {
+impl NonSpecular {
     /// All textures.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let TextureCollector { scattering, ambient } = self.collect_textures();
@@ -394,16 +395,16 @@ impl Rough {
     }
 
     /// The BSDF, if the material has no textures.
-    pub fn constant(&self) -> Option<RoughBsdf> {
+    pub fn as_constant(&self) -> Option<BxdfPoint> {
         self.textures().next().is_none().then(|| self.with_white_textures())
     }
 
     /// Whether packets can be filled with the material by looking up at most one texture,
-    /// [`Rough::row_texture`].
+    /// [`NonSpecular::packet_texture`].
     pub fn supports_packets(&self) -> bool {
-        let color = self.row_texture();
+        let color = self.packet_texture();
         // Packets are lit from only one side.
-        !self.has_direction()
+        !self.is_anisotropic()
             && !self.is_transmissive()
             && color.is_none_or(|color| color.mipmaps.is_none())
             && self.collect_textures().scattering.len() == usize::from(color.is_some())
@@ -411,42 +412,47 @@ impl Rough {
 
     /// The texture that packets look up. `None` if there is no such texture.
     #[inline]
-    pub fn row_texture(&self) -> Option<&Texture> {
+    pub fn packet_texture(&self) -> Option<&Texture> {
         self.packet_color()?.texture().map(|texture| &**texture)
     }
 }
 
-impl RoughBsdf {
+impl BxdfPoint {
     /// The BSDF for transmitted light. It has a different kind. `None` if no light is transmitted.
     #[inline(always)]
-    pub fn behind(&self) -> Option<Self> {
+    pub fn transmission(&self) -> Option<Self> {
         match self {
-            Self::GlassReflection(glass) => Some(Self::GlassTransmission(*glass)),
+            Self::DielectricReflection(glass) => Some(Self::DielectricTransmission(*glass)),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)
             | Self::Plastic(_)
-            | Self::GlassTransmission(_)
+            | Self::DielectricTransmission(_)
             | Self::PrincipledTransmission(_) => None,
         }
     }
 }
 
-impl Default for BsdfRow {
+impl Default for BsdfPacket {
     fn default() -> Self {
         Self::Phong(BxdfPacket::default())
     }
 }
 
-impl BsdfRow {
+impl BsdfPacket {
     /// Samples a direction on either side of each surface, using the same random numbers as
     /// [`BxdfPacket::sample`]. `None` for kinds that do not support this.
     #[inline(always)]
-    pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {
+    pub fn sample_either_side(
+        &self,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
+    ) -> Option<DielectricSamplePacket> {
         match self {
-            Self::GlassReflection(row) => Some(row.call_sample_sides(choices, u, simd)),
-            Self::GlassTransmission(row) => Some(row.call_sample_sides(choices, u, simd)),
+            Self::DielectricReflection(row) => Some(row.dispatch_sample_either_side(choices, u, simd)),
+            Self::DielectricTransmission(row) => Some(row.dispatch_sample_either_side(choices, u, simd)),
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)

@@ -21,7 +21,7 @@ pub(crate) struct CheckpointLock {
 impl CheckpointLock {
     /// Keeps a file open after this process has written and locked it.
     pub(super) fn keep_open(&mut self, path: &Path, file: Option<File>) {
-        (self.held, self.told) = (file, FileIdentity::of(path));
+        (self.held, self.told) = (file, FileIdentity::from_path(path));
     }
 
     /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
@@ -42,8 +42,9 @@ impl CheckpointLock {
 
     /// Whether this process holds the file at this path.
     pub(super) fn is_held_by_this_process(&self, path: &Path) -> bool {
-        let is_held = |identity: FileIdentity| self.held.as_ref().is_some_and(|file| identity.is_of(file));
-        FileIdentity::of(path).is_some_and(is_held)
+        let is_held =
+            |identity: FileIdentity| self.held.as_ref().is_some_and(|file| identity.matches_open_file(file));
+        FileIdentity::from_path(path).is_some_and(is_held)
     }
 
     /// Whether another running process holds the file at this path.
@@ -59,7 +60,7 @@ impl CheckpointLock {
 
     /// Records a file as reported. Returns whether it had not been reported before.
     pub(super) fn mark_reported(&mut self, path: &Path) -> bool {
-        let identity = FileIdentity::of(path);
+        let identity = FileIdentity::from_path(path);
         let is_news = self.told != identity;
         self.told = identity;
         is_news

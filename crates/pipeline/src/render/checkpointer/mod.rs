@@ -8,24 +8,25 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 pub(crate) use self::lock::CheckpointLock;
-use self::state::State;
+use self::state::CheckpointState;
 use super::film_state::FilmState;
 use super::share::Shard;
 use crate::control::CancelToken;
 use crate::engine::Interruption;
 use crate::film::Film;
-use crate::inputs::Inputs;
+use crate::inputs::ProtectedInputs;
 use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
-    self, Dependency, Head, ImageHeader, PartError, PartFile, PartKind, PartShare, differences,
+    self, Dependency, ImageHeader, PartError, PartFile, PartHeader, PartKind, PartShare,
+    dependency_differences,
 };
 use crate::output::write::{Durability, WritePolicy};
 use crate::output::{AttributeLossPolicy, DevelopSettings, OutputError};
 use crate::protocol::CheckpointUpdate;
-use crate::settings::{Checkpoints, Resume};
-use crate::sink::Sink;
-use crate::stages::Stop;
+use crate::settings::{CheckpointSettings, ResumeMode};
+use crate::sink::EventSink;
+use crate::stages::StopReason;
 
 /// Checkpointing may take at most `1/TIME_SHARE` of the render time.
 const TIME_SHARE: u32 = 100;
@@ -39,13 +40,13 @@ pub(crate) fn create_header(
     state: &FilmState,
     identity: Vec<Dependency>,
     finish: &DevelopSettings,
-) -> Head {
-    let share = share_head(state.share.as_ref());
+) -> PartHeader {
+    let share = shard_header(state.share.as_ref());
     let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
-    Head { kind, identity, share, picture, scene, references: Vec::new() }
+    PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
-fn share_head(share: Option<&Shard>) -> PartShare {
+fn shard_header(share: Option<&Shard>) -> PartShare {
     match share {
         Some(share) => PartShare {
             index: share.index,
@@ -71,8 +72,8 @@ pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
 #[derive(Clone, Copy)]
 pub(crate) struct CheckpointContext<'a> {
     pub(crate) finish: &'a DevelopSettings,
-    pub(crate) inputs: &'a Inputs,
-    pub(crate) sink: &'a Sink,
+    pub(crate) inputs: &'a ProtectedInputs,
+    pub(crate) sink: &'a EventSink,
     /// Computes the names and values of everything that affects the image. Slow.
     pub(crate) name: &'a dyn Fn() -> Vec<Dependency>,
     /// Returns why the render is interrupted.
@@ -85,7 +86,7 @@ pub(crate) struct CheckpointContext<'a> {
 pub(crate) struct Checkpointer<'a> {
     output: PathBuf,
     path: PathBuf,
-    settings: Checkpoints,
+    settings: CheckpointSettings,
     around: CheckpointContext<'a>,
     identity: OnceCell<Vec<Dependency>>,
     due: Cell<Instant>,
@@ -95,7 +96,7 @@ pub(crate) struct Checkpointer<'a> {
 
 impl<'a> Checkpointer<'a> {
     /// Creates a checkpointer for an output file.
-    pub(crate) fn new(output: &Path, settings: Checkpoints, around: CheckpointContext<'a>) -> Self {
+    pub(crate) fn new(output: &Path, settings: CheckpointSettings, around: CheckpointContext<'a>) -> Self {
         Self {
             output: output.to_owned(),
             path: checkpoint_path(output),
@@ -107,7 +108,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn identity(&self) -> &[Dependency] {
+    fn image_dependencies(&self) -> &[Dependency] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -118,27 +119,27 @@ impl<'a> Checkpointer<'a> {
     /// # Errors
     /// A requested checkpoint belongs to another image, is damaged or has too many samples, or the output
     /// file is a part of another render.
-    pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, Stop> {
+    pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, StopReason> {
         let resume = self.settings.resume;
         let is_there = self.path.symlink_metadata().is_ok();
-        if resume == Resume::Asked && self.restore_finished_part(state)? {
+        if resume == ResumeMode::Asked && self.restore_finished_part(state)? {
             return Ok(true);
         }
         match resume {
-            Resume::No | Resume::IfSame if !is_there => return Ok(true),
-            Resume::Asked if !is_there => {
+            ResumeMode::No | ResumeMode::IfSame if !is_there => return Ok(true),
+            ResumeMode::Asked if !is_there => {
                 self.send_update(CheckpointUpdate::Absent { path: self.path.clone() });
                 return Ok(true);
             }
-            Resume::No | Resume::Asked | Resume::IfSame => {}
+            ResumeMode::No | ResumeMode::Asked | ResumeMode::IfSame => {}
         }
-        if resume != Resume::Asked && !part::is_part(&self.path) {
+        if resume != ResumeMode::Asked && !part::is_part(&self.path) {
             self.report_failure(&format!("{} {}", self.path.display(), messages::NOT_A_CHECKPOINT));
             return Ok(true);
         }
-        if resume == Resume::No {
-            let is_same =
-                PartFile::head(&self.path).is_ok_and(|head| self.differences_from(&head, state).is_empty());
+        if resume == ResumeMode::No {
+            let is_same = PartFile::read_header(&self.path)
+                .is_ok_and(|head| self.differences_from(&head, state).is_empty());
             if is_same {
                 self.send_update(CheckpointUpdate::Ignored { path: self.path.clone() });
             }
@@ -147,12 +148,12 @@ impl<'a> Checkpointer<'a> {
         let Err(error) = self.restore(state, samples) else {
             self.around.lock.borrow_mut().lock_abandoned(&self.path);
             self.is_own.set(true);
-            let (path, samples) = (self.path.clone(), state.samples(samples));
+            let (path, samples) = (self.path.clone(), state.min_samples(samples));
             self.send_update(CheckpointUpdate::Resumed { path, samples });
             return Ok(true);
         };
-        if resume == Resume::Asked {
-            return Err(Stop::call_error(
+        if resume == ResumeMode::Asked {
+            return Err(StopReason::command_line_error(
                 format!("--resume: {error}"),
                 "remove --resume to start over, or name another file with -o",
             ));
@@ -171,7 +172,7 @@ impl<'a> Checkpointer<'a> {
     ///
     /// # Errors
     /// The output file is a part of another render.
-    fn restore_finished_part(&self, state: &mut FilmState) -> Result<bool, Stop> {
+    fn restore_finished_part(&self, state: &mut FilmState) -> Result<bool, StopReason> {
         if state.share.is_none() || !part::is_part(&self.output) {
             return Ok(false);
         }
@@ -186,14 +187,14 @@ impl<'a> Checkpointer<'a> {
             }
         };
         let mut differences = self.differences_from(&file.head, state);
-        let Head { scene, references, .. } = file.head.clone();
-        let head = Head { scene, references, ..self.create_header(PartKind::Part, state) };
+        let PartHeader { scene, references, .. } = file.head.clone();
+        let head = PartHeader { scene, references, ..self.create_header(PartKind::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }
         let refused = |error: PartError| {
             let remedy = "remove --resume to replace it, or name another file with -o";
-            Err(Stop::call_error(format!("--resume: {error}"), remedy))
+            Err(StopReason::command_line_error(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
@@ -221,7 +222,7 @@ impl<'a> Checkpointer<'a> {
             return Err(held_by_another_message(&self.path));
         }
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
-            return match PartFile::head(&self.path) {
+            return match PartFile::read_header(&self.path) {
                 Err(PartError::Version { .. }) => self.move_aside(|_| false),
                 Ok(head) if head.kind == PartKind::Part => Err(finished_part_message(&self.path)),
                 Ok(_)
@@ -272,7 +273,13 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Whether a checkpoint belongs to this image and contains no more work than this render.
-    fn is_superseded(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
+    fn is_superseded(
+        &self,
+        head: &PartHeader,
+        there: &CheckpointState,
+        state: &FilmState,
+        rays: RayCounters,
+    ) -> bool {
         let has_rays = state.is_finished_part || there.camera_rays() <= rays.camera_rays;
         self.differences_from(head, state).is_empty() && has_rays
     }
@@ -281,7 +288,7 @@ impl<'a> Checkpointer<'a> {
         let path = self.path.clone();
         let other =
             |differences| PartError::Other { path: path.clone(), other: "this call".to_owned(), differences };
-        let unlike = self.differences_from(&PartFile::head(&self.path)?, state);
+        let unlike = self.differences_from(&PartFile::read_header(&self.path)?, state);
         if !unlike.is_empty() {
             return Err(other(unlike));
         }
@@ -289,31 +296,31 @@ impl<'a> Checkpointer<'a> {
         file.check_kind(PartKind::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
-        let read: State =
+        let read: CheckpointState =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
         if !read.is_plausible() {
             return Err(damaged("its state contains implausible numbers"));
         }
-        if !read.fits(state) {
+        if !read.matches_film_size(state) {
             return Err(damaged("its state does not match the film"));
         }
         file.restore(&state.film)?;
         read.restore_into(state).ok_or_else(|| damaged("its state does not match the film"))?;
         state.recount_samples();
-        if !state.has_at_most(samples) {
+        if !state.has_at_most_samples(samples) {
             return Err(other(vec![messages::too_many_samples_message(samples)]));
         }
         Ok(())
     }
 
-    fn create_header(&self, kind: PartKind, state: &FilmState) -> Head {
-        create_header(kind, state, self.identity().to_vec(), self.around.finish)
+    fn create_header(&self, kind: PartKind, state: &FilmState) -> PartHeader {
+        create_header(kind, state, self.image_dependencies().to_vec(), self.around.finish)
     }
 
     /// Returns the differences between a file header and this render.
-    fn differences_from(&self, head: &Head, state: &FilmState) -> Vec<String> {
-        let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
-        let share = share_head(state.share.as_ref());
+    fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
+        let mut unlike = dependency_differences(&head.identity, self.image_dependencies(), ("there", "here"));
+        let share = shard_header(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
@@ -325,7 +332,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Saves a checkpoint if one is due.
-    pub(crate) fn tick(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
+    pub(crate) fn save_if_due(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
         if Instant::now() < self.due.get() {
             return;
         }
@@ -352,7 +359,8 @@ impl<'a> Checkpointer<'a> {
     pub(crate) fn check_already_saved(&self, state: &FilmState) {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         let is_own = is_held
-            && PartFile::head(&self.path).is_ok_and(|head| self.differences_from(&head, state).is_empty());
+            && PartFile::read_header(&self.path)
+                .is_ok_and(|head| self.differences_from(&head, state).is_empty());
         self.is_own.set(is_own);
     }
 
@@ -400,7 +408,7 @@ impl<'a> Checkpointer<'a> {
             return false;
         }
         let head = self.create_header(PartKind::Checkpoint, state);
-        let written = serde_json::to_value(State::from_film(state, rays, seconds))
+        let written = serde_json::to_value(CheckpointState::from_film(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save(&head, &state.film, &value, durability));
         match &written {
@@ -416,7 +424,7 @@ impl<'a> Checkpointer<'a> {
     /// Saves a checkpoint and keeps it locked. Never replaces other kinds of files.
     fn save(
         &self,
-        head: &Head,
+        head: &PartHeader,
         film: &Film,
         state: &serde_json::Value,
         durability: Durability,
@@ -430,7 +438,7 @@ impl<'a> Checkpointer<'a> {
                     path.display(),
                     messages::NOT_A_CHECKPOINT
                 )),
-                Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == PartKind::Part) => {
+                Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartKind::Part) => {
                     Err(OutputError::Refused { reason: finished_part_message(path) })
                 }
                 // Another process may have locked the file since the last check.
@@ -460,7 +468,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn send_update(&self, news: CheckpointUpdate) {
-        self.around.sink.checkpoint(news);
+        self.around.sink.send_checkpoint_update(news);
     }
 }
 
@@ -493,9 +501,9 @@ fn rejection_reason(error: &PartError) -> String {
 }
 
 /// Reads the header and state of a valid checkpoint.
-fn read_valid_checkpoint(path: &Path) -> Option<(Head, State)> {
+fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, CheckpointState)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(PartKind::Checkpoint).ok()?;
-    let state: State = serde_json::from_value(file.state).ok()?;
+    let state: CheckpointState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))
 }

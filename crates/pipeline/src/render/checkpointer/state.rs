@@ -7,7 +7,7 @@ use crate::render::film_state::{EarlierWork, FilmState};
 
 /// Render state that is not part of the film.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct State {
+pub(super) struct CheckpointState {
     /// Sample goals decided for both halves of each cell.
     goals: Vec<[u32; 2]>,
     /// Sample count at which each tile's noise was last evaluated.
@@ -25,7 +25,7 @@ pub(super) struct State {
     processor_seconds: f64,
 }
 
-impl State {
+impl CheckpointState {
     pub(super) fn from_film(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
         let RayCounters {
             camera_rays,
@@ -69,7 +69,7 @@ impl State {
     }
 
     /// Whether the state matches the film's size.
-    pub(super) fn fits(&self, state: &FilmState) -> bool {
+    pub(super) fn matches_film_size(&self, state: &FilmState) -> bool {
         self.goals.len() == state.done.len()
             && self.cell_rays.len() == state.done.len()
             && self.judged.len() == state.film.tile_count()
@@ -77,7 +77,7 @@ impl State {
 
     /// Restores a film's state. If the size does not match, returns `None` without changing anything.
     pub(super) fn restore_into(self, state: &mut FilmState) -> Option<()> {
-        if !self.fits(state) {
+        if !self.matches_film_size(state) {
             return None;
         }
         let [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups] =
@@ -105,8 +105,8 @@ impl State {
 mod tests {
     use super::*;
 
-    fn state() -> State {
-        State {
+    fn state() -> CheckpointState {
+        CheckpointState {
             goals: vec![[4, 4]],
             judged: vec![2],
             brightness: Some(0.5),
@@ -121,13 +121,16 @@ mod tests {
     fn implausible_numbers_are_detected() {
         assert!(state().is_plausible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
-            assert!(!State { seconds, ..state() }.is_plausible(), "{seconds}");
-            assert!(!State { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!CheckpointState { seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!CheckpointState { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
         }
         for brightness in [-1.0, f64::NAN, f64::INFINITY] {
-            assert!(!State { brightness: Some(brightness), ..state() }.is_plausible(), "{brightness}");
+            assert!(
+                !CheckpointState { brightness: Some(brightness), ..state() }.is_plausible(),
+                "{brightness}"
+            );
         }
-        assert!(!State { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
-        assert!(!State { cell_rays: vec![1 << 57], ..state() }.is_plausible());
+        assert!(!CheckpointState { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
+        assert!(!CheckpointState { cell_rays: vec![1 << 57], ..state() }.is_plausible());
     }
 }

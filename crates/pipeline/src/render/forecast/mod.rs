@@ -20,12 +20,12 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use self::noise::NoiseForecast;
-use self::work_rate::{Work, WorkRate};
+use self::work_rate::{WorkAmount, WorkRate};
 use super::film_state::FilmState;
 use crate::film::Convergence;
-use crate::plan::Plan;
+use crate::plan::RenderPlan;
 use crate::protocol::RenderProgress;
-use crate::scene::description::Render;
+use crate::scene::description::RenderOptions;
 use crate::stages::photons::PhotonStore;
 use crate::trace::remaining_jobs;
 
@@ -61,7 +61,7 @@ pub(crate) struct Forecast {
 /// Snapshot of a render's state.
 pub(crate) struct RenderSnapshot<'a> {
     pub(crate) state: &'a FilmState,
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a RenderPlan,
     pub(crate) photons: Option<&'a PhotonStore>,
     /// Seconds since the render stage started, excluding pauses.
     pub(crate) elapsed_seconds: f64,
@@ -107,7 +107,7 @@ impl Forecast {
 
     /// Measures the film's noise if a measurement is due. `seconds` is the time since the stage started.
     pub(crate) fn measure_noise_if_due(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
-        let least = state.samples(u32::MAX);
+        let least = state.min_samples(u32::MAX);
         pool.install(|| self.noise.measure_if_due(&state.film, least, (state.cpu_seconds(), seconds)));
     }
 
@@ -116,7 +116,7 @@ impl Forecast {
         let elapsed_seconds = moment.elapsed_seconds;
         // Predict the end from the remaining work.
         let work = self.work(moment);
-        let (mut fraction, mut eta_seconds) = self.rate.at(elapsed_seconds, work);
+        let (mut fraction, mut eta_seconds) = self.rate.update_and_predict(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
@@ -144,7 +144,7 @@ impl Forecast {
 
     /// Returns the current and the total amount of work. With a noise target, the total is unknown until the
     /// noise has been evaluated.
-    fn work(&mut self, moment: &RenderSnapshot<'_>) -> Work {
+    fn work(&mut self, moment: &RenderSnapshot<'_>) -> WorkAmount {
         if Instant::now() >= self.expectation.due {
             self.expectation = estimate_work(moment);
         }
@@ -153,7 +153,7 @@ impl Forecast {
         let of_pass = moment.photons.map_or(0.0, PhotonStore::seconds_of_pass);
         let of_this = self.photons_since.map_or(0.0, |since| moment.elapsed_seconds - since);
         let to_come = f64::from(all_passes.saturating_sub(passes)) * of_pass - of_this;
-        Work {
+        WorkAmount {
             done,
             total: total.map(|total| total.max(done)),
             aside: [self.photon_seconds + of_this, to_come.max(0.0)],
@@ -183,13 +183,13 @@ fn can_predict_noise(moment: &RenderSnapshot<'_>) -> bool {
 /// Estimates the total work as a sum over all cells.
 fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let RenderSnapshot { state, plan, photons, .. } = moment;
-    let Render { samples: most, error, .. } = plan.settings.render;
+    let RenderOptions { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();
     let is_known = !(error > 0.0) || state.can_predict_samples();
     let pixels = state.film.crop().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
     let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
-    let passes = photons.map_or([0; 2], |_| state.photon_passes(most));
+    let passes = photons.map_or([0; 2], |_| state.photon_pass_counts(most));
     WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
 }

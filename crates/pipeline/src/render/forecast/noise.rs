@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::work_rate::Work;
+use super::work_rate::WorkAmount;
 use crate::film::{Film, ImageNoise};
 use crate::protocol::NoiseProgress;
 use crate::render::noise_goals::LEAST;
@@ -40,27 +40,39 @@ impl NoiseForecast {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
-        self.told = film.noise().map(|noise| NoiseMeasurement { noise, done, seconds });
+        self.told = film.image_noise().map(|noise| NoiseMeasurement { noise, done, seconds });
         self.due = Instant::now() + INTERVAL;
     }
 
     /// Returns the last measured noise and its predicted decrease. `rate` is the work done per second, and
     /// `left` is the number of seconds until the end. Returns `None` before the first measurement.
-    pub(crate) fn progress(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
+    pub(crate) fn progress(
+        &self,
+        work: WorkAmount,
+        rate: Option<f64>,
+        left: Option<f64>,
+    ) -> Option<NoiseProgress> {
         let NoiseMeasurement { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
         // Returns the fraction of the noise that remains with `times` times as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
-        let next = rate.zip(left).and_then(|(rate, left)| next_level(by_now, work, rate, power, left));
+        let next =
+            rate.zip(left).and_then(|(rate, left)| predict_next_noise_level(by_now, work, rate, power, left));
         Some(NoiseProgress { now: relative_error, seconds, next })
     }
 }
 
 /// Returns the next lower round noise level and the number of seconds until it is reached. Returns `None` if
 /// the render ends before that.
-fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Option<(f64, f64)> {
-    let Work { done, aside: [aside, _], .. } = work;
-    let level = level_below(by_now / STEP);
+fn predict_next_noise_level(
+    by_now: f64,
+    work: WorkAmount,
+    rate: f64,
+    power: f64,
+    left: f64,
+) -> Option<(f64, f64)> {
+    let WorkAmount { done, aside: [aside, _], .. } = work;
+    let level = round_down_to_1_2_5_series(by_now / STEP);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
     // Assume that other activities keep taking the same fraction of the time.
     let seconds = more / rate * (1.0 + aside * rate / done);
@@ -68,7 +80,7 @@ fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Opti
 }
 
 /// Returns the largest value in the series …, 1, 2, 5, 10, … % that does not exceed `most`.
-fn level_below(most: f64) -> f64 {
+fn round_down_to_1_2_5_series(most: f64) -> f64 {
     if !(most > 0.0) {
         return 0.0;
     }
@@ -83,9 +95,13 @@ mod tests {
     #[test]
     fn levels_are_round_numbers() {
         for (most, level) in [(0.02, 0.02), (0.0199, 0.01), (0.07, 0.05), (0.0049, 0.002), (3.0, 2.0)] {
-            assert!((level_below(most) / level - 1.0).abs() < 1e-9, "{most}: {}", level_below(most));
+            assert!(
+                (round_down_to_1_2_5_series(most) / level - 1.0).abs() < 1e-9,
+                "{most}: {}",
+                round_down_to_1_2_5_series(most)
+            );
         }
-        assert_eq!(level_below(0.0), 0.0);
+        assert_eq!(round_down_to_1_2_5_series(0.0), 0.0);
     }
 
     /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
@@ -100,13 +116,13 @@ mod tests {
     #[test]
     fn next_level_is_predicted_from_sample_count() {
         // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
-        let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
+        let work = WorkAmount { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().progress(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
-        let half = Work { aside: [10.0, 10.0], ..work };
+        let half = WorkAmount { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
             measured().progress(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
         assert!((seconds - 68.2).abs() < 1e-6, "{seconds}");
@@ -114,7 +130,7 @@ mod tests {
 
     #[test]
     fn prediction_accounts_for_work_since_measurement() {
-        let work = Work { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
+        let work = WorkAmount { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().progress(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
@@ -124,7 +140,7 @@ mod tests {
 
     #[test]
     fn no_level_is_predicted_after_render_end() {
-        let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
+        let work = WorkAmount { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(measured().progress(work, Some(10.0), left).expect("noise").next, None, "{left:?}");
         }

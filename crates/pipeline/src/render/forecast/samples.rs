@@ -21,7 +21,7 @@ impl ExpectedSamples {
     }
 
     /// Returns the expected number of samples for a half without a goal, or [`u32::MAX`] if unknown.
-    pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
+    pub(crate) fn get(&self, cell: usize, half: usize) -> u32 {
         self.0[cell][half]
     }
 
@@ -41,7 +41,7 @@ impl ExpectedSamples {
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
-        let law = NoiseDecay::of(aim.convergence, falls, *samples);
+        let law = NoiseDecay::fit(aim.convergence, falls, *samples);
         for (tile, TileNoise { halves, fall }) in tiles {
             // Average the noise of both halves of the tile.
             let squares = halves.iter().flatten().map(|half| {
@@ -56,7 +56,7 @@ impl ExpectedSamples {
             let wanted = law.samples_to_reach(AIM * aim.error, mean.sqrt(), fall);
             let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
             for (cell, (expected, done)) in cells {
-                for half in (0..2).filter(|half| goals.of(cell, *half) == u32::MAX) {
+                for half in (0..2).filter(|half| goals.get(cell, *half) == u32::MAX) {
                     expected[half] = wanted.max(done[half]).max(LEAST);
                 }
             }
@@ -82,27 +82,27 @@ struct NoiseDecay {
 
 impl NoiseDecay {
     /// Fits the model to each tile's ratio of variances before and after the last doubling of samples.
-    fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
+    fn fit(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == Convergence::Photons {
             return Self {
                 samples,
                 doublings,
-                fall: Some(libm::exp2(convergence.typical_exponent())),
-                power: convergence.typical_exponent(),
+                fall: Some(libm::exp2(convergence.typical_variance_exponent())),
+                power: convergence.typical_variance_exponent(),
             };
         }
         if samples < LEAST {
-            return Self { samples, doublings, fall: None, power: convergence.typical_exponent() };
+            return Self { samples, doublings, fall: None, power: convergence.typical_variance_exponent() };
         }
         falls.sort_by(f64::total_cmp);
-        let usual = libm::exp2(convergence.typical_exponent());
+        let usual = libm::exp2(convergence.typical_variance_exponent());
         let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
         Self {
             samples,
             doublings,
             fall: Some(fall),
-            power: libm::log2(fall).min(convergence.typical_exponent()),
+            power: libm::log2(fall).min(convergence.typical_variance_exponent()),
         }
     }
 
@@ -132,7 +132,7 @@ mod tests {
     use crate::render::noise_goals::tests::film;
 
     fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (SampleGoals, ExpectedSamples) {
-        let (mut goals, mut expected) = (SampleGoals::none(1), ExpectedSamples::unknown(1));
+        let (mut goals, mut expected) = (SampleGoals::undecided(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
         let judgement = goals.decide_goals(&film(halves, samples), &done, samples, error).expect("samples");
         expected.predict(&judgement, &goals, &done);
@@ -143,8 +143,8 @@ mod tests {
     fn noise_of_both_halves_predicts_samples() {
         // The first half is smooth, but the second is noisy.
         let (goals, expected) = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.of(0, 0), u32::MAX, "no goal should be decided");
-        assert!((64..1000).contains(&expected.of(0, 0)), "{}", expected.of(0, 0));
+        assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
+        assert!((64..1000).contains(&expected.get(0, 0)), "{}", expected.get(0, 0));
     }
 
     #[test]
@@ -154,16 +154,17 @@ mod tests {
         // The expected predictions are 80, 190 and 260. With 64 pixels, their error is about 20 %.
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
             let (goals, expected_samples) = judged([(1.0, 1.0); 2], samples, 0.01);
-            assert_eq!(goals.of(0, 0), u32::MAX, "no goal should be decided");
-            let ratio = f64::from(expected_samples.of(0, 0)) / expected;
-            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.of(0, 0));
+            assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
+            let ratio = f64::from(expected_samples.get(0, 0)) / expected;
+            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.get(0, 0));
         }
     }
 
     #[test]
     fn recent_noise_decrease_is_extrapolated() {
-        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.typical_exponent());
-        let of = |falls: &[f64]| NoiseDecay::of(stratified, falls.to_vec(), 64);
+        let (stratified, usual) =
+            (Convergence::Stratified, Convergence::Stratified.typical_variance_exponent());
+        let of = |falls: &[f64]| NoiseDecay::fit(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
             (vec![], libm::exp2(usual), usual),
             (vec![2.0, 1.0, 2.0], 2.0, 1.0),
@@ -184,7 +185,7 @@ mod tests {
         assert!(near(of(&[4.0]).samples_to_reach(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
         assert!(near(of(&[1.0]).samples_to_reach(0.25, 1.0, None), 16.0 * 64.0));
         assert!(near(
-            NoiseDecay::of(Convergence::Photons, vec![9.0], 4).samples_to_reach(0.25, 1.0, Some(9.0)),
+            NoiseDecay::fit(Convergence::Photons, vec![9.0], 4).samples_to_reach(0.25, 1.0, Some(9.0)),
             64.0
         ));
     }
@@ -193,13 +194,13 @@ mod tests {
     fn huge_predictions_differ_from_unknown() {
         for samples in [2, 16, 64] {
             let (goals, expected) = judged([(1.0, 1.0); 2], samples, 1e-12);
-            assert_eq!((goals.of(0, 0), expected.of(0, 0)), (u32::MAX, MOST), "{samples}");
+            assert_eq!((goals.get(0, 0), expected.get(0, 0)), (u32::MAX, MOST), "{samples}");
         }
     }
 
     #[test]
     fn smooth_tiles_need_few_samples() {
-        let law = NoiseDecay::of(Convergence::Stratified, vec![], 4);
+        let law = NoiseDecay::fit(Convergence::Stratified, vec![], 4);
         assert_eq!((law.doublings, law.fall), (2, None));
         let [smooth, unknown, rough] =
             [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to_reach(0.2, 1.0, fall));

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::super::super::description::{ColorSource, EmissionSource};
-use super::super::super::keys::{color_bytes, color_names, hex_digits};
-use super::super::super::nearest::nearest;
+use super::super::super::keys::{color_names, hex_digits, parse_color_bytes};
+use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
@@ -49,8 +49,8 @@ impl TableKey<'_> {
     /// Reads the texture in `{ texture = "name" }`.
     fn texture_reference(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
-        let texture = table.required("texture", "\"name\"").index_by_name(textures);
-        table.finish();
+        let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
+        table.report_invalid_keys();
         texture
     }
 
@@ -58,10 +58,10 @@ impl TableKey<'_> {
     pub(in super::super) fn emission(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
-            let texture = table.required("texture", "\"name\"").index_by_name(textures);
-            let scale = table.optional("scale");
+            let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
+            let scale = table.optional_key("scale");
             let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
-            table.finish();
+            table.report_invalid_keys();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::constant(scale?) });
         }
         self.reject_texture_name(textures, EMISSION)?;
@@ -71,13 +71,13 @@ impl TableKey<'_> {
 
     /// Returns `None` and reports an error if the value is a bare texture name.
     fn reject_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
-        if let TomlValue::String(text) = self.value?.item()
-            && color_bytes(text).is_none()
+        if let TomlValue::String(text) = self.value?.decode()
+            && parse_color_bytes(text).is_none()
             && textures.find(text).is_some()
         {
             let issue = Issue::error(self.span()?, format!("`{}` must be {expected}", self.name))
-                .label("found the name of a texture")
-                .help(format!("write {{ texture = {} }}", self.context.text(&self.span()?)));
+                .with_label("found the name of a texture")
+                .with_help(format!("write {{ texture = {} }}", self.context.span_text(&self.span()?)));
             self.context.report(issue);
             return None;
         }
@@ -87,11 +87,11 @@ impl TableKey<'_> {
     fn color_in_limits(&self, limits: Limits, expected: &str) -> Option<DVec3> {
         let value = self.value?;
         if let Limits::Between(..) = limits
-            && self.rejects_byte_color(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
+            && self.report_byte_color(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
         {
             return None;
         }
-        match value.item() {
+        match value.decode() {
             TomlValue::String(text) => return self.parse_color(text).map(Vec3::as_dvec3),
             TomlValue::Integer { .. } | TomlValue::Float(_) => {
                 return number_within(self.context, self.name, value, limits, expected).map(DVec3::splat);
@@ -108,17 +108,17 @@ impl TableKey<'_> {
 
     /// If the value looks like a color with components from 0 to 255, reports `issue` at the value's span and
     /// suggests the equivalent `#rrggbb`. Returns whether it does.
-    pub(in super::super) fn rejects_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
+    pub(in super::super) fn report_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
         let (Some(span), Some(color)) = (self.span(), self.suggested_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
-        self.context.report(issue(span).label("this looks like 0–255").help(help));
+        self.context.report(issue(span).with_label("this looks like 0–255").with_help(help));
         true
     }
 
     /// Converts one or three integers up to 255 to `#rrggbb`, if any of them is too large for a linear
     /// component.
     fn suggested_hex(&self) -> Option<String> {
-        let byte = |value: Value<'_>| match value.item() {
+        let byte = |value: Value<'_>| match value.decode() {
             TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),
             TomlValue::String(_)
             | TomlValue::Float(_)
@@ -138,20 +138,20 @@ impl TableKey<'_> {
 
     /// Converts `#rrggbb` or a case-insensitive color name from sRGB to linear.
     fn parse_color(&self, text: &str) -> Option<Vec3> {
-        if let Some(bytes) = color_bytes(text) {
+        if let Some(bytes) = parse_color_bytes(text) {
             return Some(srgb8_to_linear(bytes));
         }
         let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
         let small = text.to_ascii_lowercase();
-        let issue = match (complete_hex(text), nearest(&small, color_names())) {
-            (Some(long), _) => {
-                issue.label("not of the form #rrggbb").help(format!("write all six digits: \"{long}\""))
-            }
+        let issue = match (normalize_hex_color(text), nearest_name(&small, color_names())) {
+            (Some(long), _) => issue
+                .with_label("not of the form #rrggbb")
+                .with_help(format!("write all six digits: \"{long}\"")),
             (None, _) if text.starts_with('#') => issue
-                .label("not of the form #rrggbb")
-                .help("write six hexadecimal digits after the #, such as \"#ffcc00\""),
-            (None, Some(near)) => issue.label(format!("did you mean \"{near}\"?")),
-            (None, None) => issue.label("unknown color name").help("use a CSS color name"),
+                .with_label("not of the form #rrggbb")
+                .with_help("write six hexadecimal digits after the #, such as \"#ffcc00\""),
+            (None, Some(near)) => issue.with_label(format!("did you mean \"{near}\"?")),
+            (None, None) => issue.with_label("unknown color name").with_help("use a CSS color name"),
         };
         self.context.report(issue);
         None
@@ -159,7 +159,7 @@ impl TableKey<'_> {
 }
 
 /// Converts `#rgb` and `rrggbb` to `#rrggbb`.
-fn complete_hex(text: &str) -> Option<String> {
+fn normalize_hex_color(text: &str) -> Option<String> {
     match hex_digits(text) {
         Some(digits) if digits.len() == 3 => {
             Some(digits.chars().fold("#".to_owned(), |long, digit| format!("{long}{digit}{digit}")))
@@ -175,8 +175,8 @@ mod tests {
 
     #[test]
     fn short_and_bare_hex_colors_are_completed() {
-        assert_eq!(complete_hex("#f80").as_deref(), Some("#ff8800"));
-        assert_eq!(complete_hex("ff8000").as_deref(), Some("#ff8000"));
-        assert_eq!(complete_hex("red"), None);
+        assert_eq!(normalize_hex_color("#f80").as_deref(), Some("#ff8800"));
+        assert_eq!(normalize_hex_color("ff8000").as_deref(), Some("#ff8000"));
+        assert_eq!(normalize_hex_color("red"), None);
     }
 }

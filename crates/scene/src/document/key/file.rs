@@ -3,10 +3,10 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::super::super::description::Located;
-use super::super::super::nearest::nearest;
+use super::super::super::description::Spanned;
+use super::super::super::nearest::nearest_name;
 use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
-use super::super::super::sanitize::{shortened, visible};
+use super::super::super::sanitize::{escape_invisible_chars, shortened};
 use super::super::context::Issue;
 use super::TableKey;
 use crate::system::describe_error;
@@ -15,8 +15,8 @@ use crate::system::file::{self, FileKind};
 impl TableKey<'_> {
     /// Reads the path of an existing file and resolves it against the scene's folder. The file must have one
     /// of the extensions `endings`, unless the list is empty.
-    pub(in super::super) fn file(&self, endings: &[&str]) -> Option<Located<PathBuf>> {
-        let text = self.text("a file path")?;
+    pub(in super::super) fn existing_file(&self, endings: &[&str]) -> Option<Spanned<PathBuf>> {
+        let text = self.string("a file path")?;
         let span = self.span()?;
         if text.is_empty() {
             self.context
@@ -26,7 +26,7 @@ impl TableKey<'_> {
         if !endings.is_empty() && !self.check_extension(text, endings) {
             return None;
         }
-        let path = self.context.resolve(text);
+        let path = self.context.resolve_path(text);
         let may_be_meant = |found: &Path| {
             endings.is_empty() || endings.contains(&lowercase_extension(&found.to_string_lossy()).as_str())
         };
@@ -34,14 +34,16 @@ impl TableKey<'_> {
             let help = is_missing.then(|| {
                 match self.context.search_similar_name(MAX_FOLDER_FILES, || similar_file(&path, may_be_meant))
                 {
-                    Some(near) => format!("did you mean {}?", visible(&relative_to_scene(text, &near))),
+                    Some(near) => {
+                        format!("did you mean {}?", escape_invisible_chars(&relative_to_scene(text, &near)))
+                    }
                     None => "paths are relative to the scene file".to_owned(),
                 }
             });
-            self.context.report(Issue::error(span, message).maybe_help(help));
+            self.context.report(Issue::error(span, message).with_optional_help(help));
             return None;
         }
-        Some(Located { value: path, span })
+        Some(Spanned { value: path, span })
     }
 
     /// Checks a path's extension and reports an error if it is wrong.
@@ -57,9 +59,9 @@ impl TableKey<'_> {
             "" => format!("`{}` needs a file extension", self.name),
             _ => format!("`{}`: unknown file extension .{shown}", self.name),
         };
-        let mut issue = Issue::error(span, message).help(format!("expected one of {list}"));
-        if let Some(near) = nearest(&ending, endings.iter().copied()) {
-            issue = issue.label(format!("did you mean .{near}?"));
+        let mut issue = Issue::error(span, message).with_help(format!("expected one of {list}"));
+        if let Some(near) = nearest_name(&ending, endings.iter().copied()) {
+            issue = issue.with_label(format!("did you mean .{near}?"));
         }
         self.context.report(issue);
         false
@@ -81,9 +83,9 @@ fn lowercase_extension(text: &str) -> String {
 /// missing.
 fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
-    match file::kind(path) {
+    match file::file_kind(path) {
         Ok((FileKind::Regular, _)) => Ok(()),
-        Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.words()), false)),
+        Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.description()), false)),
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_symlink(path) => {
             Err((format!("{shown} is a symbolic link to a file that does not exist"), false))
         }

@@ -22,12 +22,12 @@ impl TableKey<'_> {
             return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
-        if let TomlValue::String(text) = value.item()
+        if let TomlValue::String(text) = value.decode()
             && textures.find(text).is_some()
         {
             let issue = Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.name))
-                .label("found the name of a texture")
-                .help(format!("write {{ texture = {} }}", self.context.text(&value.span())));
+                .with_label("found the name of a texture")
+                .with_help(format!("write {{ texture = {} }}", self.context.span_text(&value.span())));
             self.context.report(issue);
             return None;
         }
@@ -36,24 +36,24 @@ impl TableKey<'_> {
     }
 
     /// Reads the name of a texture, or `{ texture = "name", channel = "r" }`.
-    pub(in super::super) fn texture_of_numbers(
+    pub(in super::super) fn number_texture(
         &self,
         textures: &DefinedNames,
     ) -> Option<(usize, Option<Channel>)> {
         if self.is_table() {
             return self.texture_with_channel(textures);
         }
-        let name = self.text_described_by(|| NAME_OR_TEXTURE.to_owned())?;
-        Some((self.find(textures, name)?, None))
+        let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
+        Some((self.find_defined_name(textures, name)?, None))
     }
 
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.
     fn texture_with_channel(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
-        let texture = table.required("texture", "\"name\"").index_by_name(textures);
-        let key = table.optional("channel");
+        let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
+        let key = table.optional_key("channel");
         let channel = if key.is_present() { key.choice().map(Some) } else { Some(None) };
-        table.finish();
+        table.report_invalid_keys();
         Some((texture?, channel?))
     }
 }

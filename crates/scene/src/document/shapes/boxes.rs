@@ -6,8 +6,8 @@ use super::super::table::TableReader;
 use crate::math::DVec3;
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let center = table.optional("center").vector_or(Limits::Any, DVec3::new(0.0, 0.5, 0.0));
-    let size = table.optional("size").vector(table.limits("size")).unwrap_or(DVec3::ONE);
-    let rotate = table.optional("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    let center = table.optional_key("center").vector_or(Limits::Any, DVec3::new(0.0, 0.5, 0.0));
+    let size = table.optional_key("size").vector(table.key_limits("size")).unwrap_or(DVec3::ONE);
+    let rotate = table.optional_key("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     Some(Shape::Box { center: center?, size, rotate })
 }

@@ -7,7 +7,7 @@ use super::{read_axis_ends, read_length};
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let ends = read_axis_ends(table, ["base", "tip"], "cone");
     let radius = read_length(table, "radius", 0.5);
-    let cap = table.optional("cap").boolean().unwrap_or(true);
+    let cap = table.optional_key("cap").boolean().unwrap_or(true);
     let [base, tip] = ends?;
     Some(Shape::Cone { base, tip, radius: radius?, cap })
 }

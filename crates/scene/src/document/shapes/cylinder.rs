@@ -7,7 +7,7 @@ use super::{read_axis_ends, read_length};
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let ends = read_axis_ends(table, ["a", "b"], "cylinder");
     let radius = read_length(table, "radius", 0.5);
-    let caps = table.optional("caps").boolean().unwrap_or(true);
+    let caps = table.optional_key("caps").boolean().unwrap_or(true);
     let [a, b] = ends?;
     Some(Shape::Cylinder { a, b, radius: radius?, caps })
 }

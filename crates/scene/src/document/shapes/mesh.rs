@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::super::super::description::{Located, Mesh, MeshFile, MeshTransform, Shape};
+use super::super::super::description::{MeshFile, MeshReference, MeshTransform, Shape, Spanned};
 use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
 use super::super::key::TableKey;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
 use crate::math::DVec3;
-use crate::math::limits::{SHORTEST, is_too_short, length};
+use crate::math::limits::{SHORTEST, is_too_short, robust_length};
 
 /// The mesh files referenced so far. A file referenced through different paths is listed once.
 #[derive(Default)]
@@ -20,10 +20,10 @@ pub(super) struct MeshFiles {
 }
 
 impl MeshFiles {
-    fn add_file(&mut self, file: Located<PathBuf>, part: Option<u32>) -> usize {
+    fn add_file(&mut self, file: Spanned<PathBuf>, part: Option<u32>) -> usize {
         let identity = file.value.canonicalize().unwrap_or_else(|_| file.value.clone());
         *self.indices.entry((identity, part)).or_insert_with(|| {
-            let Located { value, span } = file;
+            let Spanned { value, span } = file;
             self.list.push(MeshFile { value, span, part });
             self.list.len() - 1
         })
@@ -35,19 +35,24 @@ impl MeshFiles {
 }
 
 pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Shape> {
-    let file = table.required("file", "\"mesh.obj\"").file(MESHES);
+    let file = table.required_key("file", "\"mesh.obj\"").existing_file(MESHES);
     let part = read_part_index(table, file.as_ref());
     let placed = read_placement(table);
-    let smooth = table.optional("smooth").boolean().unwrap_or(true);
-    let vertex_colors = table.optional("vertex_colors").boolean().unwrap_or(false);
-    Some(Shape::Mesh(Mesh { file: files.add_file(file?, part?), placed: placed?, smooth, vertex_colors }))
+    let smooth = table.optional_key("smooth").boolean().unwrap_or(true);
+    let vertex_colors = table.optional_key("vertex_colors").boolean().unwrap_or(false);
+    Some(Shape::Mesh(MeshReference {
+        file: files.add_file(file?, part?),
+        placed: placed?,
+        smooth,
+        vertex_colors,
+    }))
 }
 
 /// Reads the index of a glTF part.
-fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
-    let key = table.optional("part");
+fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> Option<Option<u32>> {
+    let key = table.optional_key("part");
     let Some(span) = key.span() else { return Some(None) };
-    let number = key.integer(table.range("part")).map(Some);
+    let number = key.integer(table.integer_range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
@@ -59,7 +64,7 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> 
 /// Reads either `matrix`, or `scale`, `rotate` and `translate`.
 fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     let (matrix, steps) =
-        (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
+        (table.optional_key("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional_key(name)));
     if matrix.is_present() {
         for key in &steps {
             if let Some(span) = key.key_span() {
@@ -71,7 +76,7 @@ fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     }
     let [scale, rotate, translate] = steps;
     Some(MeshTransform::Steps {
-        scale: scale.scale(table.limits("scale")).unwrap_or(DVec3::ONE),
+        scale: scale.scale_factors(table.key_limits("scale")).unwrap_or(DVec3::ONE),
         rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
         translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
     })
@@ -87,7 +92,7 @@ fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
     let wrong = |message: &str, label: String| {
-        key.context.report(Issue::error(key.span().unwrap_or_default(), message).label(label));
+        key.context.report(Issue::error(key.span().unwrap_or_default(), message).with_label(label));
         None
     };
     if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
@@ -98,7 +103,7 @@ fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
     if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
         return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
     }
-    if [x, y, z].iter().any(|axis| is_too_short(length(*axis))) {
+    if [x, y, z].iter().any(|axis| is_too_short(robust_length(*axis))) {
         return wrong(
             "`matrix` makes the mesh too small",
             format!("its columns must be more than {SHORTEST:e} long"),

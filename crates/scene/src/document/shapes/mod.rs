@@ -70,16 +70,16 @@ fn read_object(
 ) -> Option<Object> {
     let shape = reader(table, files);
     let key = match kind {
-        "mesh" => table.optional("material"),
-        _ => table.required("material", "\"name\""),
+        "mesh" => table.optional_key("material"),
+        _ => table.required_key("material", "\"name\""),
     };
     let material = key.index_by_name(&materials.names);
-    let name = table.optional("name").shape_name();
-    table.finish();
+    let name = table.optional_key("name").shape_name();
+    table.report_invalid_keys();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
         let issue = Issue::error(key.span()?, "an infinite plane cannot emit light")
-            .label("this material has `emission`")
-            .help("use a [[quad]] or a material without emission");
+            .with_label("this material has `emission`")
+            .with_help("use a [[quad]] or a material without emission");
         table.context.report(issue);
         return None;
     }
@@ -97,15 +97,15 @@ pub(super) fn read_direction(
     what: &str,
     default: DVec3,
 ) -> Option<DVec3> {
-    let key = table.optional(name);
+    let key = table.optional_key(name);
     let direction = key.vector_or(Limits::Any, default)?;
     if !key.check_vector_length(direction) {
         return None;
     }
     if direction == DVec3::ZERO {
         let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
-            .label(format!("`{name}` has length 0"))
-            .help("use any nonzero vector, such as [0, 1, 0] for up");
+            .with_label(format!("`{name}` has length 0"))
+            .with_help("use any nonzero vector, such as [0, 1, 0] for up");
         table.context.report(issue);
         return None;
     }
@@ -114,7 +114,7 @@ pub(super) fn read_direction(
 
 /// Reads both ends of an axis. The defaults are (0, 0, 0) and (0, 1, 0).
 fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
-    let keys = names.map(|name| table.optional(name));
+    let keys = names.map(|name| table.optional_key(name));
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
     let (first, second) = (first?, second?);
@@ -125,8 +125,8 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
         let span = keys[1].span().or_else(|| keys[0].span())?;
         let [from, to] = names;
         let issue = Issue::error(span, format!("the {what} has no length"))
-            .label(format!("`{from}` and `{to}` are the same point"))
-            .help(format!("the defaults are `{from} = [0, 0, 0]` and `{to} = [0, 1, 0]`"));
+            .with_label(format!("`{from}` and `{to}` are the same point"))
+            .with_help(format!("the defaults are `{from} = [0, 0, 0]` and `{to} = [0, 1, 0]`"));
         table.context.report(issue);
         return None;
     }
@@ -135,8 +135,8 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
 
 /// Reads a length, or returns the default.
 fn read_length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f64> {
-    let key = table.optional(name);
-    if key.is_present() { key.number(table.limits(name)) } else { Some(default) }
+    let key = table.optional_key(name);
+    if key.is_present() { key.number(table.key_limits(name)) } else { Some(default) }
 }
 
 /// Whether two edges span an area: both are nonzero, and the sine of the angle between them is larger than

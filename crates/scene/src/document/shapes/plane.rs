@@ -7,6 +7,6 @@ use super::read_direction;
 use crate::math::DVec3;
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let point = table.optional("point").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    let point = table.optional_key("point").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     Some(Shape::Plane { point, normal: read_direction(table, "normal", "plane", DVec3::Y)? })
 }

@@ -9,8 +9,8 @@ use super::edges_span_area;
 use crate::math::DVec3;
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let (u_key, v_key) = (table.optional("u"), table.optional("v"));
-    let corner = table.optional("corner").vector_or(Limits::Any, DVec3::new(-1.0, 0.0, 1.0));
+    let (u_key, v_key) = (table.optional_key("u"), table.optional_key("v"));
+    let corner = table.optional_key("corner").vector_or(Limits::Any, DVec3::new(-1.0, 0.0, 1.0));
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
     let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
     let (corner, u, v) = (corner?, u?, v?);
@@ -21,8 +21,8 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
         let wrong = if u == DVec3::ZERO { u_key.span() } else { v_key.span() };
         let span = wrong.or(u_key.span())?;
         let issue = Issue::error(span, format!("the quad {NO_AREA}"))
-            .label("`u` and `v` are parallel, or one of them is 0")
-            .help("use two edges in different directions");
+            .with_label("`u` and `v` are parallel, or one of them is 0")
+            .with_help("use two edges in different directions");
         table.context.report(issue);
         return None;
     }

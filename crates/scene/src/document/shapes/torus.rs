@@ -9,15 +9,17 @@ use crate::math::DVec3;
 
 /// Reads a torus. Rejects self-intersecting tori, whose surface has no consistent front side.
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let center = table.optional("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    let center = table.optional_key("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let axis = read_direction(table, "axis", "torus", DVec3::Y);
     let radius = read_length(table, "radius", 0.5);
     let tube = read_length(table, "tube", radius.unwrap_or(0.5) / 4.0);
     let (radius, tube) = (radius?, tube?);
     if tube >= radius {
-        let issue = Issue::error(table.optional("tube").span()?, "the torus intersects itself")
-            .label(format!("`tube` must be less than `radius` = {radius}"))
-            .help("`radius` is measured to the middle of the tube, and `tube` from there to the surface");
+        let issue = Issue::error(table.optional_key("tube").span()?, "the torus intersects itself")
+            .with_label(format!("`tube` must be less than `radius` = {radius}"))
+            .with_help(
+                "`radius` is measured to the middle of the tube, and `tube` from there to the surface",
+            );
         table.context.report(issue);
         return None;
     }

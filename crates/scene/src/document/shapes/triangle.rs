@@ -13,7 +13,7 @@ use crate::math::DVec3;
 const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let keys = ["a", "b", "c"].map(|name| table.optional(name));
+    let keys = ["a", "b", "c"].map(|name| table.optional_key(name));
     let [a, b, c] = [0, 1, 2].map(|i| keys[i].vector_or(Limits::Any, CORNERS[i]));
     let (a, b, c) = (a?, b?, c?);
     let [a_key, b_key, c_key] = &keys;
@@ -26,8 +26,8 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     if !edges_span_area(b - a, c - a) {
         let span = keys.iter().rev().find_map(TableKey::span)?;
         let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
-            .label("`a`, `b` and `c` are collinear")
-            .help("use three points that are not collinear");
+            .with_label("`a`, `b` and `c` are collinear")
+            .with_help("use three points that are not collinear");
         table.context.report(issue);
         return None;
     }

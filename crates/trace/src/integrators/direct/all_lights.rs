@@ -2,19 +2,19 @@
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
-use crate::geometry::packet::{F32x16, RayPacket, lanes};
+use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
 use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{
-    EmissionTexture, Light, LightCenter, LightGeometry, LightObjectPacket, LightSamplePacket,
+    EmissionTexture, Light, LightCenter, LightGeometry, LightGeometryPacket, LightSamplePacket,
 };
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
 use crate::sampling::Dimension;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::SimdKernel;
 
 /// Samples all lights at the vertices in `used`. `MIS` is false if lights are found only by light samples, in
@@ -122,9 +122,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             // ray is traced.
             let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
-                Shadows::Soft => false,
-                Shadows::Hard => light.center().is_some(),
-                Shadows::Off => true,
+                ShadowMode::Soft => false,
+                ShadowMode::Hard => light.center().is_some(),
+                ShadowMode::Off => true,
             };
             // If only one sample is possible, take one. Otherwise, take the requested number.
             let is_single = light.is_single_direction();
@@ -155,7 +155,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     } else {
                         light.inverse_pdfs(&samples)
                     };
-                    let competing = self.competing.rays_per_sample(count);
+                    let competing = self.competing.bsdf_rays_per_light_sample(count);
                     values = self.competing.apply_mis_weights(
                         self.row,
                         (&samples, &response),
@@ -175,7 +175,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
             // Trace the single ray to the light's center.
             if pending.active != 0 {
-                self.add_pending(light.center(), &pending, sums, simd);
+                self.resolve_pending_light(light.center(), &pending, sums, simd);
             }
         }
     }
@@ -189,7 +189,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         samples: &LightSamplePacket,
         mut values: Vec3x16,
     ) -> Vec3x16 {
-        for i in lanes(self.used) {
+        for i in lane_indices(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
@@ -211,9 +211,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         active: u32,
         mut values: Vec3x16,
     ) -> Vec3x16 {
-        for i in lanes(active) {
+        for i in lane_indices(active) {
             let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
-            let color = pattern.at(target, samples.sources.part[i], direction);
+            let color = pattern.radiance_factor(target, samples.sources.part[i], direction);
             let color = match self.aov {
                 LightAov::Radiance(_) => color,
                 LightAov::LitFraction => Vec3::splat(luminance(color)),
@@ -246,7 +246,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         if let Some(pending) = pending {
             pending.active |= active;
-            add_where(active, values, &mut pending.light);
+            add_masked_lanes(active, values, &mut pending.light);
         } else {
             let traced = active & !self.row.below_horizon(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
@@ -256,20 +256,20 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Adds deferred light after tracing one shadow ray to the light's center.
     #[inline(always)]
-    fn add_pending(
+    fn resolve_pending_light(
         &self,
         middle: Option<(LightCenter, LightGeometry)>,
         pending: &PendingLight,
         sums: &mut LightSums,
         simd: impl Simd,
     ) {
-        let is_untraced = self.tile.settings.render.shadows == Shadows::Off;
+        let is_untraced = self.tile.settings.render.shadows == ShadowMode::Off;
         if is_untraced && self.aov == LightAov::TraversalCost {
             return;
         }
         // Without shadows, all light is unoccluded.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
-            return add_where(pending.active, &pending.light, &mut sums.light);
+            return add_masked_lanes(pending.active, &pending.light, &mut sums.light);
         };
         // Aim a ray at the light's center.
         let (mut direction, mut ends) = ([[0.0; PACKET_SIZE]; 3], [-1.0; PACKET_SIZE]);
@@ -286,11 +286,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
-        let rays =
-            RayPacket::from_soa(self.row.from, direction).with_start_triangle(self.row.starts(&direction));
+        let rays = RayPacket::from_soa(self.row.from, direction)
+            .with_start_triangle(self.row.start_triangles(&direction));
         self.add_unoccluded(
             (&rays, &ends, traced),
-            &LightObjectPacket::of(source),
+            &LightGeometryPacket::splat(source),
             &pending.light,
             sums,
             simd,
@@ -303,7 +303,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn add_unoccluded(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
         values: &Vec3x16,
         sums: &mut LightSums,
         simd: impl Simd,
@@ -316,7 +316,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             return self.add_attenuated((rays, ends, traced), sources, values, sums);
         }
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
-        add_where(traced & !occluded, values, &mut sums.light);
+        add_masked_lanes(traced & !occluded, values, &mut sums.light);
     }
 
     /// Like [`SampleAllLights::add_unoccluded`], for scenes with null interactions, where shadow rays have a
@@ -326,7 +326,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn add_attenuated(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
         values: &Vec3x16,
         sums: &mut LightSums,
     ) {
@@ -334,11 +334,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         sums.rays.lookups += weakened.lookups;
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
-        for i in lanes(arriving) {
+        for i in lane_indices(arriving) {
             let value = lane(&values, i) * null_transmittance(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
-        add_where(arriving, &values, &mut sums.light);
+        add_masked_lanes(arriving, &values, &mut sums.light);
     }
 
     /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
@@ -350,7 +350,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         share: f32,
         simd: impl Simd,
     ) -> (Vec3x16, u32, BsdfResponse) {
-        let response = self.row.response(&samples.directions, simd);
+        let response = self.row.evaluate_bsdf(&samples.directions, simd);
         let BsdfResponse { bsdf, cosines } = &response;
         let f = bsdf.f();
         let mut arriving = samples.weights;
@@ -382,11 +382,15 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = if active & 1 << i != 0 { ray.t_max } else { -1.0 };
         }
-        for i in lanes(samples.beyond & active) {
+        for i in lane_indices(samples.beyond & active) {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
-        (RayPacket::from_soa(self.row.from, direction).with_start_triangle(self.row.starts(&direction)), ends)
+        (
+            RayPacket::from_soa(self.row.from, direction)
+                .with_start_triangle(self.row.start_triangles(&direction)),
+            ends,
+        )
     }
 }
 
@@ -400,7 +404,7 @@ pub fn add_traversal_cost(
     traced: u32,
     sums: &mut Vec3x16,
 ) {
-    for i in lanes(traced) {
+    for i in lane_indices(traced) {
         let work = tile.world.geometry.traversal_cost(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);
         set_lane(sums, i, sum);
@@ -410,7 +414,7 @@ pub fn add_traversal_cost(
 /// Adds the values in the lanes set in `bits`, selecting them with bit masks as in
 /// [`select`](crate::math::lanes::select).
 #[inline(always)]
-pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
+pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     let of = mask_from_bits(bits);
     for axis in 0..3 {
         for i in 0..PACKET_SIZE {

@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
-use super::all_lights::{LightSums, SampleAllLights, add_where};
+use super::all_lights::{LightSums, SampleAllLights, add_masked_lanes};
 use super::shadow_rays::ShadowRayQueue;
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::integrators::view::LightAov;
 use crate::lights::{
     LightCenter, LightSamplePacket, LightSampler, LightSamplingEffort, LightTree, Receiver, ReceiverLobe,
@@ -15,7 +15,7 @@ use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::{Dimension, SamplerPacket};
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::SimdKernel;
 
 /// Samples lights picked from a tree at a packet of vertices.
@@ -66,7 +66,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
                 lighting.pick_lights(selection, &sampler, first..(first + PICK_BLOCK).min(samples), simd);
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
-                lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, simd);
+                lighting.sample_picked_lights(pick, &sampler, (k, samples * each), &mut sink, simd);
             }
         }
         sums
@@ -153,7 +153,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Pick lights with these numbers.
         let mut picks = vec![LightPicks::EMPTY; numbers.len()];
         if tree.is_single_node() {
-            self.pick_flat(tree, &numbers, &mut picks, simd);
+            self.pick_from_single_node(tree, &numbers, &mut picks, simd);
         } else {
             self.pick_with_tree_cuts(tree, way, &numbers, &mut picks);
         }
@@ -165,7 +165,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks lights from a tree with a single node, for all vertices at once.
     #[inline(always)]
-    fn pick_flat(
+    fn pick_from_single_node(
         &self,
         tree: &LightTree,
         numbers: &[[f64; PACKET_SIZE]],
@@ -176,7 +176,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Estimate the light from each source at each vertex, including glossy lobes.
         let plain = ReceiverPacket::without_lobe(&row.from, &row.normal);
         let mut glossy = plain.clone();
-        for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
+        for i in lane_indices(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.receiver_lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
@@ -214,13 +214,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         picks: &mut [LightPicks],
     ) {
         let (row, group) = (self.row, way.count as usize);
-        let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
-        for i in lanes(self.used) {
+        let (mut cut, mut without) = (way.new_tree_cut(tree), MIS.then(|| way.new_tree_cut(tree)));
+        for i in lane_indices(self.used) {
             let plain = Receiver::without_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
-            cut.move_to(&Receiver { lobe, ..plain });
+            cut.adapt_to_receiver(&Receiver { lobe, ..plain });
             let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {
-                without.move_to(&plain);
+                without.adapt_to_receiver(&plain);
                 &*without
             });
             for (numbers, picks) in numbers.chunks(group).zip(picks.chunks_mut(group)) {
@@ -251,7 +251,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Samples one picked light per vertex and adds its light, or queues its shadow rays.
     #[inline(always)]
-    fn sample_pick(
+    fn sample_picked_lights(
         &self,
         pick: &LightPicks,
         sampler: &SamplerPacket<PACKET_SIZE>,
@@ -278,8 +278,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let active = active & used;
         if MIS {
             // Each group of picks has its own pdf and competes with all requested BSDF samples.
-            let competing =
-                self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
+            let competing = self.competing.bsdf_rays_per_light_sample(render.shadow_samples)
+                * render.shadow_samples as f32;
             values = self.competing.apply_mis_weights(
                 row,
                 (&samples, &response),
@@ -297,10 +297,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         match render.shadows {
             // Nothing is traced, so there is no traversal cost.
-            Shadows::Off if self.aov == LightAov::TraversalCost => return,
-            Shadows::Off => return add_where(active, &values, &mut sums.light),
-            Shadows::Hard => self.aim_at_centers(&mut samples, &lights, active),
-            Shadows::Soft => {}
+            ShadowMode::Off if self.aov == LightAov::TraversalCost => return,
+            ShadowMode::Off => return add_masked_lanes(active, &values, &mut sums.light),
+            ShadowMode::Hard => self.aim_at_centers(&mut samples, &lights, active),
+            ShadowMode::Soft => {}
         }
         // Trace the shadow rays, or queue them with other rays to the same lights.
         let traced = active & !row.below_horizon(&samples.directions, simd);
@@ -310,7 +310,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 sums.rays.shadow += u64::from(traced.count_ones());
                 let mut places = [0; PACKET_SIZE];
                 for i in 0..PACKET_SIZE {
-                    places[i] = tree.position_of(lights[i]);
+                    places[i] = tree.leaf_position(lights[i]);
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
@@ -322,7 +322,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Aims rays at the centers of all lights that have a center.
     fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
-        for i in lanes(active) {
+        for i in lane_indices(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center() else { continue };
             let direction = match middle {
                 LightCenter::At(middle) => {
@@ -332,7 +332,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 LightCenter::Towards(direction) => direction,
             };
             set_lane(&mut samples.directions, i, direction);
-            samples.sources.set(i, source);
+            samples.sources.set_geometry(i, source);
         }
     }
 }

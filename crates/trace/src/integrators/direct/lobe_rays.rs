@@ -2,7 +2,7 @@
 
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
-use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::packet::{RayPacket, lane_indices};
 use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
@@ -11,12 +11,12 @@ use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::Dimension;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Hit, SimdKernel};
 
 /// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample. Light samples on a large
 /// light rarely fall into a narrow lobe.
-pub struct LobeRays<'a> {
+pub struct LobeRayKernel<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub sharp: u32,
@@ -27,7 +27,7 @@ pub struct LobeRays<'a> {
     pub arrived: ReflectedLight,
 }
 
-impl SimdKernel for LobeRays<'_> {
+impl SimdKernel for LobeRayKernel<'_> {
     type Output = ReflectedLight;
 
     #[inline(always)]
@@ -44,11 +44,11 @@ impl SimdKernel for LobeRays<'_> {
             // Sample a direction in each lobe.
             let u = sampler.pairs(&row.path, Dimension::Direction, repetition, count);
             let mut choices = [0.0; PACKET_SIZE];
-            if row.bsdf.sends_rays() {
+            if row.bsdf.extends_narrow_lobe_paths() {
                 [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
             let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
-            let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
+            let BsdfResponse { bsdf, cosines } = row.evaluate_bsdf(&wi, simd);
             let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, simd);
             let narrow = &bsdf.narrow;
             // Select the rays above the horizon.
@@ -59,14 +59,14 @@ impl SimdKernel for LobeRays<'_> {
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayPacket::from_soa(row.from, wi).with_start_triangle(row.starts(&wi));
+            let rays = RayPacket::from_soa(row.from, wi).with_start_triangle(row.start_triangles(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light from every emitter along the rays, even if the emitter is
             // occluded.
-            if tile.settings.render.shadows != Shadows::Soft {
+            if tile.settings.render.shadows != ShadowMode::Soft {
                 // Traversal cost is counted only for the rays to the lights' centers.
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };
-                for i in lanes(lit) {
+                for i in lane_indices(lit) {
                     let found = UnshadowedLobeRay { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
                     let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
                     let value = lane(narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
@@ -75,17 +75,17 @@ impl SimdKernel for LobeRays<'_> {
                 }
                 continue;
             }
-            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, simd);
+            let (hits, objects) = tile.world.geometry.closest_hit_packet_simd(&rays, &mut ends, sent, simd);
             // If the view shows the traversal cost, add the cost of the rays.
             if aov == LightAov::TraversalCost {
-                for i in lanes(sent) {
+                for i in lane_indices(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }
                 add_traversal_cost(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
             // Add the light found by the rays.
-            for i in lanes(sent) {
+            for i in lane_indices(sent) {
                 let pdf = pdfs[i];
                 let lookups = &mut arrived.rays.lookups;
                 let radiance = match hits.get(i) {
@@ -93,7 +93,7 @@ impl SimdKernel for LobeRays<'_> {
                         let hit = hit.map(|shape| Hit { shape, object: objects[i] });
                         let (ray, normal) = (rays.ray(i), lane(&row.normal, i));
                         let left = |distance| transmittance(i, distance);
-                        tile.radiance_through((&ray, hit), normal, pdf, left, lookups)
+                        tile.radiance_through_null_surfaces((&ray, hit), normal, pdf, left, lookups)
                     }
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };

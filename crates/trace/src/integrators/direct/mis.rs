@@ -27,7 +27,7 @@ pub enum CompetingTechnique {
 
 impl CompetingTechnique {
     /// Lobe rays at the vertices in `sharp`. No technique if the mask is 0.
-    pub fn lobes(sharp: u32) -> Self {
+    pub fn from_lobe_mask(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
@@ -41,7 +41,7 @@ impl CompetingTechnique {
 
     /// Number of BSDF samples per light sample, for a light with `count` samples.
     #[inline(always)]
-    pub fn rays_per_sample(self, count: u32) -> f32 {
+    pub fn bsdf_rays_per_light_sample(self, count: u32) -> f32 {
         match self {
             Self::Nothing => 0.0,
             Self::Paths | Self::NarrowPaths => 1.0 / count as f32,
@@ -85,7 +85,7 @@ impl CompetingTechnique {
             LobeSet::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = weight_narrow_part(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -98,7 +98,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
@@ -149,11 +149,17 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::emitter_radiance`], for a lobe ray that leaves the scene.
     pub fn infinite_radiance(&self, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
-        self.infinite_radiance_of(None, ray, normal, pdf)
+        self.radiance_from_infinite_light(None, ray, normal, pdf)
     }
 
     /// Like [`TileContext::infinite_radiance`], but restricted to light `number`, unless it is `None`.
-    pub fn infinite_radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
+    pub fn radiance_from_infinite_light(
+        &self,
+        number: Option<u32>,
+        ray: &Ray,
+        normal: Vec3,
+        pdf: f32,
+    ) -> Vec3 {
         let sky =
             self.world.lights.environment().map(|environment| environment.radiance_and_pdf(ray.direction));
         // If lobe rays account for the environment, light samples skip it, and its light-sampling pdf is 0.
@@ -175,9 +181,9 @@ impl TileContext<'_> {
         if !lights.has_infinite_lights() {
             return Vec3::ZERO;
         }
-        let samples = lights.samples_at(self.behavior.receivers, ray.origin, normal);
+        let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
         lights.radiance_from_infinity_with(sky, ray.direction, |number, pdf| {
-            if only.is_none_or(|only| only == number) { share(pdf * samples.of(number)) } else { 0.0 }
+            if only.is_none_or(|only| only == number) { share(pdf * samples.for_light(number)) } else { 0.0 }
         })
     }
 
@@ -190,7 +196,7 @@ impl TileContext<'_> {
         let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
         lights.light_at(hit.object, primitive, side).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
-                * lights.samples_at(self.behavior.receivers, ray.origin, normal).of(number)
+                * lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal).for_light(number)
         })
     }
 
@@ -216,9 +222,9 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
-        let mut radiance = emission.at(&at, normal.dot(ray.direction), lookups);
+        let mut radiance = emission.radiance(&at, normal.dot(ray.direction), lookups);
         if let Some(opacity) = &material.opacity {
-            radiance *= opacity.at(&at, lookups);
+            radiance *= opacity.evaluate(&at, lookups);
         }
         radiance * power_heuristic(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
     }
@@ -227,7 +233,7 @@ impl TileContext<'_> {
     /// `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
     #[inline(never)]
-    pub fn radiance_through(
+    pub fn radiance_through_null_surfaces(
         &self,
         (ray, first): (&Ray, Option<Hit>),
         from_normal: Vec3,
@@ -256,14 +262,14 @@ impl TileContext<'_> {
             if left == Vec3::ZERO {
                 return sum;
             }
-            next = self.world.geometry.closest(&along);
+            next = self.world.geometry.closest_hit(&along);
         }
         sum
     }
 
     /// Like [`TileContext::emitter_weight`], for an emitter that coincides with glass. Returns 1 if shadow
     /// rays cannot reach the hit point.
-    pub fn touching_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+    pub fn coincident_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0 && !self.world.is_fully_occluded(&shadow, LightGeometry::Object(hit.object)) {

@@ -2,14 +2,14 @@
 
 use arrayvec::ArrayVec;
 
-use super::all_lights::{LightRayCounts, LightSums, ReflectedLight, SampleAllLights, add_where};
+use super::all_lights::{LightRayCounts, LightSums, ReflectedLight, SampleAllLights, add_masked_lanes};
 use super::light_tree::SampleLightTree;
-use super::lobe_rays::LobeRays;
+use super::lobe_rays::LobeRayKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, active_lanes, lanes};
+use crate::geometry::packet::{RayPacket, active_lanes, lane_indices};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -19,12 +19,12 @@ use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
-use crate::lights::{LightGeometry, LightObjectPacket};
-use crate::materials::RoughKind;
+use crate::lights::{LightGeometry, LightGeometryPacket};
+use crate::materials::BxdfKind;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Geometry, SimdKernel};
 
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
@@ -36,7 +36,7 @@ pub struct DirectLightQueue {
     count: usize,
     /// Index of the packet to which single vertices are added, for each combination of BSDF kind, darkness,
     /// and number of sides. The packet may be full or unused.
-    open: [[usize; RoughKind::ALL.len()]; 4],
+    open: [[usize; BxdfKind::ALL.len()]; 4],
     /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
     /// Media at the vertices.
@@ -134,8 +134,8 @@ impl DirectLightQueue {
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.accepts(row.bsdf.kind(), (false, false))) {
-            for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
-                open.copy(open.used.trailing_ones() as usize, row, lane);
+            for lane in lane_indices(row.used).take((ALL & !open.used).count_ones() as usize) {
+                open.copy_vertex(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
             }
         }
@@ -167,7 +167,7 @@ impl DirectLightQueue {
             ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
             ShadingSides::TwoSides { is_dark, .. } => self.open_packet(lit.bsdf.kind(), (is_dark, true)),
         };
-        row.put(lane, tile, lit, aov, interiors);
+        row.set_vertex(lane, tile, lit, aov, interiors);
         if let Some((beyond, interiors)) = far_side {
             row.set_far_side(lane, beyond, interiors);
         }
@@ -175,7 +175,7 @@ impl DirectLightQueue {
 
     /// Returns a packet for this kind of BSDF and the index of a free lane in the packet. `which` specifies
     /// whether the vertex is dark and whether it is two-sided.
-    fn open_packet(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
+    fn open_packet(&mut self, kind: BxdfKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
@@ -183,7 +183,7 @@ impl DirectLightQueue {
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare_batch();
             row.reset();
-            row.bsdf.prepare(kind);
+            row.bsdf.set_kind(kind);
             (row.is_dark, row.has_two_sides) = which;
             number = self.count;
             self.open[table][kind as usize] = number;
@@ -218,10 +218,14 @@ impl DirectLightQueue {
         let together = if tile.world.lights.sampler(tile.behavior.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
-            && (!tile.behavior.gathers || tile.settings.render.shadows == Shadows::Soft);
+            && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
         let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
         let of_row = |row: &VertexBatch| {
-            let own = if row.bsdf.sends_rays() { continuation.or_else(mirrors) } else { continuation };
+            let own = if row.bsdf.extends_narrow_lobe_paths() {
+                continuation.or_else(mirrors)
+            } else {
+                continuation
+            };
             own.filter(|continuation| continuation.continues)
         };
         for first in (0..self.count).step_by(together) {
@@ -233,12 +237,12 @@ impl DirectLightQueue {
                 if row.may_lift != 0 {
                     tile.world
                         .geometry
-                        .instructions()
-                        .run(LiftOrigins { geometry: &tile.world.geometry, row });
+                        .instruction_set()
+                        .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
                 }
                 let request = DirectLightRequest {
                     number,
-                    used: row.used & shown_vertices(row, aov),
+                    used: row.used & contributing_vertex_mask(row, aov),
                     shares_with_paths,
                 };
                 let sums = self.sample_lights(request, tile, aov, group.len() as u32);
@@ -254,15 +258,15 @@ impl DirectLightQueue {
                 let row = &self.rows[number];
                 let request = DirectLightRequest {
                     number,
-                    used: row.used & shown_vertices(row, aov),
+                    used: row.used & contributing_vertex_mask(row, aov),
                     shares_with_paths,
                 };
                 let mut arrived = self.add_lobe_rays(request, tile, aov, sums);
                 if let Some(gathered) = gather(row) {
-                    add_where(row.used, &gathered, &mut arrived.light);
+                    add_masked_lanes(row.used, &gathered, &mut arrived.light);
                 }
                 rays += arrived.rays;
-                self.store(number, aov, &arrived.light);
+                self.store_reflected_light(number, aov, &arrived.light);
             }
             // Continue the paths.
             for row in &self.rows[first..end] {
@@ -286,17 +290,17 @@ impl DirectLightQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
     ) -> CompetingTechnique {
-        let is_soft = tile.settings.render.shadows == Shadows::Soft;
+        let is_soft = tile.settings.render.shadows == ShadowMode::Soft;
         let row = &self.rows[request.number];
         if request.shares_with_paths {
             CompetingTechnique::Paths
-        } else if row.bsdf.sends_rays() && is_soft && tile.behavior.mirrors {
+        } else if row.bsdf.extends_narrow_lobe_paths() && is_soft && tile.behavior.mirrors {
             CompetingTechnique::NarrowPaths
-        } else if row.bsdf.sends_rays() && !is_soft && aov != LightAov::LitFraction {
+        } else if row.bsdf.extends_narrow_lobe_paths() && !is_soft && aov != LightAov::LitFraction {
             // Paths in microfacet lobes do not account for lights.
-            CompetingTechnique::lobes(row.bsdf.narrow_lobes() & request.used)
+            CompetingTechnique::from_lobe_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
-            CompetingTechnique::lobes(row.sharp_lobes(tile, aov) & request.used)
+            CompetingTechnique::from_lobe_mask(row.sharp_lobes(tile, aov) & request.used)
         }
     }
 
@@ -320,7 +324,7 @@ impl DirectLightQueue {
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of(row));
-        let (instructions, used) = (tile.world.geometry.instructions(), request.used);
+        let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -360,8 +364,8 @@ impl DirectLightQueue {
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let interior_lists = self.interiors_of(row);
-                let lobes = LobeRays { tile, row, sharp, aov, interior_lists, arrived };
-                tile.world.geometry.instructions().run(lobes)
+                let lobes = LobeRayKernel { tile, row, sharp, aov, interior_lists, arrived };
+                tile.world.geometry.instruction_set().run(lobes)
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
                 arrived
@@ -370,13 +374,13 @@ impl DirectLightQueue {
     }
 
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    fn store(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
+    fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
         let row = &self.rows[number];
         let light = match aov {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
             LightAov::TraversalCost => *arrived,
         };
-        match row.consecutive_start() {
+        match row.first_consecutive_index() {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..PACKET_SIZE];
                 for (i, own) in own.iter_mut().enumerate() {
@@ -384,7 +388,7 @@ impl DirectLightQueue {
                 }
             }
             None => {
-                for i in lanes(row.used) {
+                for i in lane_indices(row.used) {
                     self.arrived[row.place[i] as usize] += lane(&light, i);
                 }
             }
@@ -393,7 +397,7 @@ impl DirectLightQueue {
 }
 
 /// Mask of vertices whose direct light is visible in the view and may be nonzero.
-fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
+fn contributing_vertex_mask(row: &VertexBatch, aov: LightAov) -> u32 {
     if row.is_dark {
         return 0;
     }
@@ -414,12 +418,12 @@ struct DirectLightRequest {
 }
 
 /// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
-struct LiftOrigins<'a> {
+struct LiftShadowOrigins<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,
 }
 
-impl SimdKernel for LiftOrigins<'_> {
+impl SimdKernel for LiftShadowOrigins<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -440,7 +444,7 @@ impl SimdKernel for LiftOrigins<'_> {
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) =
-                (active_lanes(&ends, simd), LightObjectPacket::of(LightGeometry::Nothing));
+                (active_lanes(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
             geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.

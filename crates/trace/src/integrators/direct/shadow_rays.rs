@@ -1,11 +1,11 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_where, null_transmittance};
-use crate::geometry::packet::{F32x16, RayPacket, lanes};
+use super::all_lights::{LightSums, add_masked_lanes, null_transmittance};
+use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::lights::{LightGeometry, LightObjectPacket};
+use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
@@ -18,7 +18,7 @@ struct QueuedShadowRays {
     ends: F32x16,
     /// Mask of rays to trace.
     traced: u32,
-    sources: LightObjectPacket,
+    sources: LightGeometryPacket,
     values: Vec3x16,
 }
 
@@ -51,12 +51,12 @@ impl ShadowRayQueue {
         &mut self,
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),
-        sources: &LightObjectPacket,
+        sources: &LightGeometryPacket,
         values: &Vec3x16,
         places: &[u32; PACKET_SIZE],
     ) {
         let number = self.rows.len() as u32 * PACKET_SIZE as u32;
-        self.order.extend(lanes(traced).map(|i| (places[i], number + i as u32)));
+        self.order.extend(lane_indices(traced).map(|i| (places[i], number + i as u32)));
         self.rows.push(QueuedShadowRays {
             row,
             rays,
@@ -72,18 +72,18 @@ impl ShadowRayQueue {
         if self.rows.is_empty() {
             return;
         }
-        self.sort();
+        self.group_by_tree_position();
         let Self { rows, sorted, .. } = self;
         let world = tile.world;
-        world.geometry.instructions().run(TraceShadowRays { world, aov, rows, rays: sorted });
+        world.geometry.instruction_set().run(TraceShadowRays { world, aov, rows, rays: sorted });
         for QueuedShadowRays { row, traced, values, .. } in &*rows {
-            add_where(*traced, values, &mut sums[*row as usize].light);
+            add_masked_lanes(*traced, values, &mut sums[*row as usize].light);
         }
         self.clear();
     }
 
     /// Groups rays by ranges of tree positions with a counting sort. Rays within a group keep their order.
-    fn sort(&mut self) {
+    fn group_by_tree_position(&mut self) {
         let Self { order, sorted, .. } = self;
         let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
         let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(GROUP_BITS);
@@ -127,7 +127,7 @@ impl SimdKernel for TraceShadowRays<'_> {
         for rays in rays.chunks(PACKET_SIZE) {
             let mut packet = RayPacket::from_soa([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
-            let mut sources = LightObjectPacket::of(LightGeometry::Nothing);
+            let mut sources = LightGeometryPacket::splat(LightGeometry::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
@@ -136,7 +136,7 @@ impl SimdKernel for TraceShadowRays<'_> {
                 }
                 packet.start[to] = row.rays.start[from];
                 ends[to] = row.ends[from];
-                sources.copy(to, &row.sources, from);
+                sources.copy_lane(to, &row.sources, from);
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
             let occluded = if world.has_see_through() {
@@ -144,7 +144,7 @@ impl SimdKernel for TraceShadowRays<'_> {
             } else {
                 world.geometry.occluded_ray_packet(&packet, &ends, traced, &sources, simd)
             };
-            for to in lanes(occluded) {
+            for to in lane_indices(occluded) {
                 let ray = rays[to] as usize;
                 rows[ray / PACKET_SIZE].traced &= !(1 << (ray % PACKET_SIZE));
             }
@@ -160,11 +160,11 @@ fn attenuate(
     world: &World,
     aov: LightAov,
     (packet, ends, traced): (&RayPacket, &F32x16, u32),
-    sources: &LightObjectPacket,
+    sources: &LightGeometryPacket,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);
-    for from in lanes(traced & !weakened.occluded) {
+    for from in lane_indices(traced & !weakened.occluded) {
         let left = null_transmittance(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;

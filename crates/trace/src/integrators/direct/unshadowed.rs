@@ -8,7 +8,7 @@ use crate::integrators::transport::tile::TileContext;
 use crate::lights::{Light, LightCenter, LightGeometry, Side};
 use crate::math::Vec3;
 use crate::math::lanes::lane;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
 use super::all_lights::LightRayCounts;
@@ -34,7 +34,8 @@ impl UnshadowedLobeRay<'_> {
         let (mut sum, mut along, mut passed) = (Vec3::ZERO, *ray, 0.0);
         // Add the emitters along the ray, front to back.
         for _ in 0..=MAX_NULL_INTERACTIONS {
-            let Some(hit) = world.geometry.closest_of(&along, |object| world.lights.has_object(object))
+            let Some(hit) =
+                world.geometry.closest_hit_among(&along, |object| world.lights.has_object(object))
             else {
                 break;
             };
@@ -52,7 +53,7 @@ impl UnshadowedLobeRay<'_> {
         }
         // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
-            let radiance = tile.infinite_radiance_of(Some(number), ray, normal, *pdf);
+            let radiance = tile.radiance_from_infinite_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
                 sum += radiance * transmittance(f32::MAX) * self.unoccluded_fraction(light, rays);
             }
@@ -63,8 +64,8 @@ impl UnshadowedLobeRay<'_> {
     /// Unoccluded fraction of a light.
     fn unoccluded_fraction(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
-            Shadows::Off => return Vec3::ONE,
-            Shadows::Hard | Shadows::Soft => {}
+            ShadowMode::Off => return Vec3::ONE,
+            ShadowMode::Hard | ShadowMode::Soft => {}
         }
         // An environment has no center, so test the ray itself.
         let (segment, source) = match light.center() {
@@ -76,7 +77,7 @@ impl UnshadowedLobeRay<'_> {
             return Vec3::ZERO;
         }
         rays.shadow += 1;
-        let segment = segment.with_start_triangle(self.row.start_of(self.lane, segment.direction));
+        let segment = segment.with_start_triangle(self.row.start_triangle(self.lane, segment.direction));
         self.tile.world.transmittance(&segment, source, &mut rays.lookups)
     }
 }

@@ -9,7 +9,7 @@ use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
 use crate::geometry::local_geometry::{Extent, FlatPolygon, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
-use crate::materials::{Material, Rough};
+use crate::materials::{Material, NonSpecular};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
@@ -60,7 +60,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let mut around = KernelNeighborhood::new(look, radius);
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
-    let is_exact = world.geometry.visit_box(&bounds, |id, object| match object {
+    let is_exact = world.geometry.visit_objects_in_box(&bounds, |id, object| match object {
         Object::Shape(shape) => around.add_shape(shape, || can_store_photons(material(world, id, 0))),
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
@@ -73,15 +73,15 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
 
 /// Material of an object's primitive.
 pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
-    let shape = ShapeHit { primitive, ..ShapeHit::at(0.0) };
+    let shape = ShapeHit { primitive, ..ShapeHit::from_t(0.0) };
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
 /// Whether photons are stored on a material.
 pub fn can_store_photons(material: &Material) -> bool {
-    let is_lit = |rough: &Rough| rough.constant().is_none_or(|bsdf| !bsdf.is_black());
-    let is_rough_glass = || material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
-    material.bsdf.rough().is_some_and(is_lit) || is_rough_glass()
+    let is_lit = |rough: &NonSpecular| rough.as_constant().is_none_or(|bsdf| !bsdf.is_black());
+    let is_rough_glass = || material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
+    material.bsdf.non_specular().is_some_and(is_lit) || is_rough_glass()
 }
 
 /// A wall perpendicular to the kernel's plane, represented as a half-plane containing the center. The dot
@@ -136,7 +136,7 @@ impl KernelNeighborhood {
     }
 
     /// A piece's corners, projected onto the plane relative to the center, in units of the radius.
-    fn project_piece(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
+    fn project_polygon(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
 
@@ -148,7 +148,7 @@ impl KernelNeighborhood {
         }
         let mut part = f64::from(self.whole);
         for piece in &self.pieces {
-            let corners = self.project_piece(piece);
+            let corners = self.project_polygon(piece);
             if !self.walls.iter().all(|wall| wall.has_all_on_inner_side(&corners)) {
                 return None;
             }
@@ -162,17 +162,17 @@ impl KernelNeighborhood {
         match shape.local_geometry(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon(number))
-                .all(|piece| self.add_piece(&piece, &receives)),
+                .all(|piece| self.add_polygon(&piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
-                    || ground.is_some_and(|ground| self.add_ground(&ground, receives))
+                    || ground.is_some_and(|ground| self.add_covering_surface(&ground, receives))
             }
         }
     }
 
     /// Adds a surface if it extends over the whole kernel and has the kernel's normal. Otherwise, returns
     /// false.
-    fn add_ground(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
+    fn add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
             Extent::Flat(reach) => reach > FAR * self.radius,
             Extent::Round(radius) => radius > WIDE * self.radius,
@@ -193,7 +193,7 @@ impl KernelNeighborhood {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
         // Trees may visit a triangle twice, and may also visit nearby triangles outside the box. Skip both so
         // that the result does not depend on the tree.
-        let is_exact = mesh.visit_box(bounds, |triangle| {
+        let is_exact = mesh.visit_triangles_in_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
                 || !Aabb::from_points_f64(mesh.world_corners(triangle)).overlaps(bounds)
@@ -206,12 +206,12 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_piece(&piece, || can_store_photons(material(world, id, triangle)))
+            self.add_polygon(&piece, || can_store_photons(material(world, id, triangle)))
         })
     }
 
     /// Adds a flat piece and returns whether the coverage still has a closed form.
-    fn add_piece(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
+    fn add_polygon(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
@@ -231,7 +231,7 @@ impl KernelNeighborhood {
         if high < -reach
             || low > reach
             || !rises && (is_steep || !receives())
-            || !overlaps_unit_disk(&self.project_piece(piece))
+            || !overlaps_unit_disk(&self.project_polygon(piece))
         {
             return true;
         }

@@ -8,7 +8,7 @@
 
 use super::map::Photon;
 use crate::control::Cancelled;
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
@@ -25,13 +25,14 @@ use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
 use crate::integrators::transport::walk::{
-    Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, OpaqueHit, PathStepper, opacity_at, walk,
+    Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, OpaqueHit, PathStepper, opacity_at,
+    walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource};
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, Rough, RoughBsdf, ThinDielectric};
+use crate::materials::{Bsdf, BxdfPoint, Coated, NonSpecular, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
@@ -41,7 +42,7 @@ use crate::world::{CompoundSolid, Hit, SimdKernel, World};
 const SAME: f32 = 1e-8;
 
 /// Context shared by all photons in one chunk of a pass.
-pub struct PhotonTracing<'a> {
+pub struct PhotonTracer<'a> {
     /// Tile context. Photons are numbered as samples of a single pixel, with slots starting at 0.
     pub tile: &'a TileContext<'a>,
     /// Photon source, which represents all lights.
@@ -67,7 +68,7 @@ pub struct PhotonChunk {
     pub lookups: u64,
 }
 
-impl PhotonTracing<'_> {
+impl PhotonTracer<'_> {
     /// Traces this chunk's photons.
     ///
     /// # Errors
@@ -109,16 +110,16 @@ impl PhotonTracing<'_> {
 
     /// Ray for a photon from an infinite light. Its origin is moved back past any transmissive infinite
     /// planes. `None` if an opaque surface blocks the ray.
-    fn skip_planes(&self, ray: Ray) -> Option<Ray> {
+    fn move_origin_before_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
         for _ in 0..MAX_PASSED_SURFACES {
             let back = Ray::new(start, -ray.direction);
-            let Some(hit) = world.geometry.closest(&back) else {
+            let Some(hit) = world.geometry.closest_hit(&back) else {
                 return Some(Ray::new(start, ray.direction));
             };
             let material = &world.materials[world.material_index(&hit)];
-            if material.bsdf.glass().is_none() && !material.has_null_interaction() {
+            if material.bsdf.as_dielectric().is_none() && !material.has_null_interaction() {
                 return None;
             }
             let SurfacePoint { point, error, normal, .. } = world.geometry.surface(&back, &hit);
@@ -147,7 +148,7 @@ impl PhotonTracing<'_> {
 
 /// The photons in flight.
 struct PhotonWavefront<'a> {
-    tracing: &'a PhotonTracing<'a>,
+    tracing: &'a PhotonTracer<'a>,
     /// Number of bounces so far.
     depth: u32,
     /// Largest component of each photon's initial flux, indexed by slot.
@@ -169,11 +170,11 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         self.tracing.tile
     }
 
-    fn crossing(&mut self) -> &mut CrossingMemory {
+    fn crossing_memory(&mut self) -> &mut CrossingMemory {
         &mut self.crossing
     }
 
-    fn record_pass(&mut self, _: &PathRay, _: Option<Hit>) {}
+    fn record_surface_crossing(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
@@ -188,17 +189,22 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
             // Direct light is found by light samples.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
             Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
-                self.store_and_scatter(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
+                self.store_and_scatter(
+                    path,
+                    vertex,
+                    BxdfPoint::DielectricReflection(rough),
+                    (far, Some(1.0)),
+                );
             }
             Interaction::Nothing | Interaction::Hidden => {}
         }
     }
 
-    fn texture_lookups(&mut self) -> &mut u64 {
+    fn texture_lookup_counter(&mut self) -> &mut u64 {
         &mut self.counters.texture_lookups
     }
 
-    fn hit_pane(
+    fn handle_pane(
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'a>,
@@ -213,7 +219,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         if !self.tracing.tile.chooses_reflection(path, reflectance) {
             return NullInteraction::Passed(tint);
         }
-        let shading = vertex.shading(&mut self.counters);
+        let shading = vertex.shading_normals(&mut self.counters);
         let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
         self.push(path, vertex, (shading.normal, 1.0), ray);
         NullInteraction::Ended
@@ -227,13 +233,16 @@ impl PhotonWavefront<'_> {
         let tile = tracing.tile;
         let has_planes = tile.world.geometry.has_unbounded();
         for begin in (0..count).step_by(PACKET_SIZE) {
-            let numbers = tile.world.geometry.instructions().run(EmissionNumbers { tile, first: begin });
+            let numbers =
+                tile.world.geometry.instruction_set().run(EmissionSampleKernel { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it in front of all infinite planes it may pass through.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_from_infinite_light(&emitted) && has_planes;
                 let ray = emitted.ray();
-                let Some(ray) = (if past_planes { tracing.skip_planes(ray) } else { Some(ray) }) else {
+                let Some(ray) =
+                    (if past_planes { tracing.move_origin_before_planes(ray) } else { Some(ray) })
+                else {
                     continue;
                 };
                 let offset = begin as usize + i;
@@ -264,21 +273,21 @@ impl PhotonWavefront<'_> {
         self.counters.texture_lookups += packet.lookups;
         // Direct light is found by light samples.
         if self.depth > 0 {
-            for i in lanes(row.used) {
-                let (point, normal) = row.surface_of(i);
+            for i in lane_indices(row.used) {
+                let (point, normal) = row.surface_point_and_normal(i);
                 self.store(&rays[i], point, normal);
             }
             row.retain_lanes(row.only_specular_before);
-            for i in lanes(row.used & row.has_facet) {
+            for i in lane_indices(row.used & row.has_facet) {
                 let counts = row.photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
             }
             self.scatter(row);
         }
         // Shade other surfaces one by one.
-        for i in lanes(packet.any & !packet.plain) {
+        for i in lane_indices(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                walk(self, &mut { rays[i] }, (hit, packet.surface(surfaces, i)));
+                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.surface(surfaces, i)));
             }
         }
     }
@@ -300,11 +309,11 @@ impl PhotonWavefront<'_> {
     ) {
         match &vertex.material.bsdf {
             // Direct light is found by light samples.
-            Bsdf::Rough(_) if lacks_photons => {}
-            Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
+            Bsdf::NonSpecular(_) if lacks_photons => {}
+            Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
             Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, (far, lacks_photons)),
             Bsdf::Mirror(mirror) if self.may_scatter() => {
-                let shading = vertex.shading(&mut self.counters);
+                let shading = vertex.shading_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected_path(path, vertex, &shading, reflectance);
                 self.push(path, vertex, (shading.normal, 1.0), ray);
@@ -323,7 +332,7 @@ impl PhotonWavefront<'_> {
         coated: &Coated,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
-        let shading = vertex.shading(&mut self.counters);
+        let shading = vertex.shading_normals(&mut self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
@@ -332,7 +341,7 @@ impl PhotonWavefront<'_> {
             self.shade_rough(path, vertex, &coated.base, (far, by_chance));
         }
         if is_reflected && self.may_scatter() {
-            let specular = coated.specular(&vertex.texture_point, &mut self.counters.texture_lookups);
+            let specular = coated.specular_factor(&vertex.texture_point, &mut self.counters.texture_lookups);
             let ray = reflected_path(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
             self.push(path, vertex, (shading.normal, 1.0), ray);
         }
@@ -344,10 +353,10 @@ impl PhotonWavefront<'_> {
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'_>,
-        rough: &Rough,
+        rough: &NonSpecular,
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
-        let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+        let mut bsdf = rough.evaluate_textures(&vertex.texture_point, &mut self.counters.texture_lookups);
         vertex.tint(&mut bsdf);
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
@@ -359,7 +368,7 @@ impl PhotonWavefront<'_> {
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'_>,
-        bsdf: RoughBsdf,
+        bsdf: BxdfPoint,
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let tile = self.tracing.tile;
@@ -372,21 +381,21 @@ impl PhotonWavefront<'_> {
             return;
         };
         // Queue the photon for scattering.
-        let shading = vertex.shading(&mut self.counters);
-        let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
+        let shading = vertex.shading_normals(&mut self.counters);
+        let behind = bsdf.transmission().map(|bsdf| (bsdf, shading.far_side()));
         let interiors = self.interior_lists.insert(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
-            self.open.bsdf.prepare(bsdf.kind());
+            self.open.bsdf.set_kind(bsdf.kind());
         }
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
-        self.open.put(i, tile, &lit, LightAov::ALL, interiors);
+        self.open.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
         let counts = self.open.photon_weight(i, vertex.wo) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
-        let part = if vertex.material.bsdf.glass().is_some() {
+        let part = if vertex.material.bsdf.as_dielectric().is_some() {
             let eta = medium_ior(tile.world, far) / medium_ior(tile.world, &path.interiors);
             1.0 / (eta * eta)
         } else {
@@ -396,12 +405,18 @@ impl PhotonWavefront<'_> {
         let interiors = self.interior_lists.insert(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
-            self.open_behind.bsdf.prepare(bsdf.kind());
+            self.open_behind.bsdf.set_kind(bsdf.kind());
         }
         let i = self.open_behind.used.trailing_ones() as usize;
-        let lit =
-            ShadingVertex { path, interiors: far, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
-        self.open_behind.put(i, tile, &lit, LightAov::ALL, interiors);
+        let lit = ShadingVertex {
+            path,
+            interiors: far,
+            place: 0,
+            vertex: &vertex.far_side(),
+            shading,
+            bsdf: &bsdf,
+        };
+        self.open_behind.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
@@ -410,7 +425,7 @@ impl PhotonWavefront<'_> {
             return;
         }
         let tile = self.tracing.tile;
-        let shading = vertex.shading(&mut self.counters);
+        let shading = vertex.shading_normals(&mut self.counters);
         let FresnelSplit { reflectance, refracted } = fresnel_split(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
@@ -463,7 +478,7 @@ impl PhotonWavefront<'_> {
         if !self.may_scatter() || row.used == 0 {
             return;
         }
-        for i in lanes(row.used & row.has_facet) {
+        for i in lane_indices(row.used & row.has_facet) {
             let facet = lane(&row.facet, i);
             set_lane(&mut row.normal, i, facet);
             row.shading_normal_cosine[i] = UNPERTURBED;
@@ -486,8 +501,8 @@ impl PhotonWavefront<'_> {
             let risks = tile
                 .world
                 .geometry
-                .instructions()
-                .run(RouletteNumbers { tile, rays: &self.next[begin..end] });
+                .instruction_set()
+                .run(RouletteSampleKernel { tile, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
                 let flux = max_flux_component(tile.world, &ray);
@@ -520,12 +535,12 @@ fn is_from_infinite_light(emitted: &EmittedPhoton) -> bool {
 }
 
 /// Draws the random numbers for photon emission.
-struct EmissionNumbers<'a> {
+struct EmissionSampleKernel<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
 }
 
-impl SimdKernel for EmissionNumbers<'_> {
+impl SimdKernel for EmissionSampleKernel<'_> {
     type Output = [PhotonRandomNumbers; PACKET_SIZE];
 
     #[inline(always)]
@@ -546,12 +561,12 @@ impl SimdKernel for EmissionNumbers<'_> {
 }
 
 /// Draws the random numbers for Russian roulette.
-struct RouletteNumbers<'a> {
+struct RouletteSampleKernel<'a> {
     tile: &'a TileContext<'a>,
     rays: &'a [PathRay],
 }
 
-impl SimdKernel for RouletteNumbers<'_> {
+impl SimdKernel for RouletteSampleKernel<'_> {
     type Output = [f32; PACKET_SIZE];
 
     #[inline(always)]

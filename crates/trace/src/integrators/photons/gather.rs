@@ -6,7 +6,7 @@ use super::map::{GatherPoint, PhotonMap};
 use super::occlusion::is_occluded;
 use super::reservoir::PhotonPosition;
 use super::trials::inverse_coverage;
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::integrators::PACKET_SIZE;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
@@ -49,12 +49,12 @@ impl SimdKernel for GatherPhotons<'_> {
         let [looks, choices] = row.sampler(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
-        let narrow = row.bsdf.narrow_lobes();
-        for i in lanes(row.used) {
+        let narrow = row.bsdf.narrow_lobe_mask();
+        for i in lane_indices(row.used) {
             let (_, _, sample) = tile.block.sample_of(row.slot[i]);
-            let pass = maps.pass(sample);
+            let pass = maps.pass_for_sample(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
-            let (point, normal) = row.surface_of(i);
+            let (point, normal) = row.surface_point_and_normal(i);
             // Select the maps that contribute at the vertex.
             let look = GatherPoint { point, normal, most_depth };
             // Without a glossy lobe, bounced photons account for light from caustics, and continuing paths
@@ -146,7 +146,7 @@ fn reflected_kernel_sum(
 ) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit_photons(look, simd, |photon, density| {
-        let [shown, all] = row.bsdf.f_at(i, photon.direction);
+        let [shown, all] = row.bsdf.lane_f(i, photon.direction);
         let scale = density * row.photon_weight(i, photon.direction);
         sum += shown * photon.flux * scale;
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.

@@ -68,7 +68,7 @@ pub fn sample(on_disk: Vec2) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
     use crate::sampling::warp;
 
     fn square(corner: DVec2, side: f64) -> [DVec2; 4] {
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn weights_of_a_tiling_sum_to_one() {
-        let mut next = unit(11);
+        let mut next = unit_generator(11);
         for _ in 0..200 {
             let side = 0.05 + 2.0 * f64::from(next());
             let corner = DVec2::new(f64::from(next()), f64::from(next())) * side;
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn samples_follow_the_kernel() {
-        let mut next = unit(3);
+        let mut next = unit_generator(3);
         let part = square(DVec2::new(-0.3, 0.1), 0.8);
         const DRAWS: u32 = 400_000;
         let mut inside = 0;

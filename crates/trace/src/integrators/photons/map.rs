@@ -1,11 +1,11 @@
 //! A photon map: photons sorted into the cells of a hashed grid. Because of the hashing, the cells can be as
 //! small as the radius requires. Lookups weight sixteen photons at a time.
 
-use super::packed::{self, Packed};
+use super::packed::{self, PackedDirections};
 use super::reservoir::{LaneReservoirs, PhotonPosition};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
-use crate::geometry::packet::lanes;
+use crate::geometry::packet::lane_indices;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 
@@ -32,8 +32,8 @@ const POLL_INTERVAL: usize = 1 << 16;
 #[repr(align(64))]
 struct PhotonBlock {
     point: Vec3x16,
-    normal: Packed,
-    direction: Packed,
+    normal: PackedDirections,
+    direction: PackedDirections,
     flux: Vec3x16,
 }
 
@@ -232,10 +232,10 @@ impl PhotonMap {
     ) -> (Vec3, Option<PhotonPosition>) {
         let mut sums = [[0.0; PACKET_SIZE]; 3];
         let mut choices = LaneReservoirs::new(random[0]);
-        let ranges = self.ranges(look);
+        let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
+            for block in blocks_in_range(*range) {
+                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
                 let flux = &self.blocks[block].flux;
                 let mut brought = [0.0; PACKET_SIZE];
                 for axis in 0..3 {
@@ -264,10 +264,10 @@ impl PhotonMap {
     #[inline(always)]
     pub fn count_near(&self, look: &GatherPoint, simd: impl Simd) -> u32 {
         let mut count = 0;
-        let ranges = self.ranges(look);
+        let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
+            for block in blocks_in_range(*range) {
+                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
                 count += positive_lanes(&weights, simd).count_ones();
             }
         }
@@ -280,11 +280,11 @@ impl PhotonMap {
     #[inline(always)]
     pub fn visit_photons(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak_weight();
-        let ranges = self.ranges(look);
+        let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
-                for i in lanes(positive_lanes(&weights, simd)) {
+            for block in blocks_in_range(*range) {
+                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
+                for i in lane_indices(positive_lanes(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -299,7 +299,7 @@ impl PhotonMap {
 
     /// Ranges that may contain photons within a kernel.
     #[inline(always)]
-    fn ranges(&self, look: &GatherPoint) -> PhotonRanges {
+    fn candidate_ranges(&self, look: &GatherPoint) -> PhotonRanges {
         let mut ranges = PhotonRanges { of: [[0; 2]; 8], count: 0 };
         if self.count == 0 {
             return ranges;
@@ -328,7 +328,13 @@ impl PhotonMap {
     /// Weights of a block's photons that are in a range and within the kernel, relative to the kernel's value
     /// at the center. `None` if there are no such photons.
     #[inline(always)]
-    fn weights(&self, look: &GatherPoint, range: [u32; 2], number: usize, simd: impl Simd) -> Option<F32x16> {
+    fn block_weights(
+        &self,
+        look: &GatherPoint,
+        range: [u32; 2],
+        number: usize,
+        simd: impl Simd,
+    ) -> Option<F32x16> {
         // Weight the photons within the kernel by their distance.
         let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
@@ -390,7 +396,7 @@ impl PhotonBlock {
 
 /// Blocks that contain a nonempty range of photons.
 #[inline(always)]
-fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
+fn blocks_in_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
 }
 
@@ -438,7 +444,7 @@ fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::math::lanes::PortableSimd;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     fn photon(point: Vec3, normal: Vec3) -> Photon {
         Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1 }

@@ -57,9 +57,9 @@ use crate::integrators::transport::interiors::Interior;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonSource};
 use crate::materials::{Dielectric, Material};
-use crate::scene::description::{Render, Shadows};
-use crate::world::{CompoundSolid, Hit, LightBox, World, photon_source};
-use emit::{PhotonChunk, PhotonTracing};
+use crate::scene::description::{RenderOptions, ShadowMode};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxes, World, photon_source};
+use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
@@ -78,7 +78,7 @@ const AIMED: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
-pub struct Photons {
+pub struct PhotonMapper {
     settings: PhotonSettings,
     /// Maximum number of bounces per photon before it is gathered.
     most_depth: u32,
@@ -107,7 +107,7 @@ pub struct PhotonPass {
 
 impl PhotonPass {
     /// Number of stored photons.
-    pub fn stored(&self) -> u64 {
+    pub fn photon_count(&self) -> u64 {
         (self.caustic.len() + self.bounced.len()) as u64
     }
 
@@ -128,12 +128,12 @@ pub struct PhotonMaps {
 
 impl PhotonMaps {
     /// Photon pass for a sample.
-    pub fn pass(&self, sample: u32) -> &PhotonPass {
+    pub fn pass_for_sample(&self, sample: u32) -> &PhotonPass {
         &self.passes[(sample - self.first) as usize]
     }
 }
 
-impl Photons {
+impl PhotonMapper {
     /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress`
     /// receives the number of photons traced so far and the total number.
     ///
@@ -147,10 +147,10 @@ impl Photons {
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
         // Aim photons at the mirrors and glass.
-        let specular = SpecularObjects::of(world);
-        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.is_present());
+        let specular = SpecularObjects::from_world(world);
+        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.has_any());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
-        let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
+        let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
         let (glasses, bodies) = glass_that_may_contain_lights(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
@@ -171,12 +171,12 @@ impl Photons {
     }
 
     /// First-pass kernel radii for caustic and bounced photons.
-    pub fn radii(&self) -> [f32; 2] {
+    pub fn initial_radii(&self) -> [f32; 2] {
         self.radii
     }
 
     /// Number of photons emitted per pass, which may be 0.
-    pub fn count(&self) -> u64 {
+    pub fn photons_per_pass(&self) -> u64 {
         if self.emits_photons() { self.settings.count.into() } else { 0 }
     }
 
@@ -189,7 +189,7 @@ impl Photons {
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn pass(
+    pub fn trace_pass(
         &self,
         world: &World,
         settings: &RenderSettings,
@@ -212,14 +212,19 @@ impl Photons {
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
         let (caustic, bounced) =
             rayon::join(|| map(&sent.caustic, of_caustic), || map(&sent.bounced, of_bounced));
-        Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted: self.count(), lookups: sent.lookups })
+        Ok(PhotonPass {
+            caustic: caustic?,
+            bounced: bounced?,
+            emitted: self.photons_per_pass(),
+            lookups: sent.lookups,
+        })
     }
 
     /// Traces the photon passes for a range of samples.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn maps(
+    pub fn trace_passes(
         &self,
         world: &World,
         settings: &RenderSettings,
@@ -227,7 +232,7 @@ impl Photons {
         token: &CancelToken,
     ) -> Result<PhotonMaps, Cancelled> {
         let first = samples.start;
-        let pass = |number| self.pass(world, settings, number, token).map(Arc::new);
+        let pass = |number| self.trace_pass(world, settings, number, token).map(Arc::new);
         Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
     }
 
@@ -243,12 +248,14 @@ impl Photons {
             return Ok(StoredPhotons::default());
         };
         // Photons always hit the facets and scatter from there, regardless of the shadow setting.
-        let settings =
-            RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
-        let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
+        let settings = RenderSettings {
+            render: RenderOptions { shadows: ShadowMode::Soft, ..settings.render },
+            ..*settings
+        };
+        let material = |object| world.material_index(&Hit { shape: ShapeHit::from_t(0.0), object }) as u32;
         let inside = |&body: &u32| Interior { body, material: material(body) };
         let glasses: &[Interior] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
-        let behavior = PathBehavior::of(&settings, false);
+        let behavior = PathBehavior::from_settings(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // The photons of consecutive passes are samples of a single sequence.
@@ -264,7 +271,7 @@ impl Photons {
             };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
             let stored =
-                PhotonTracing { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
+                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
                     .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
@@ -356,11 +363,11 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
         let bounds = world.geometry.objects()[*object as usize].bounds();
         bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
     };
-    let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
+    let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, lamp: &LightBox| {
-        lamp.points().any(|point| world.material_around(body, point, lamp.object).is_some())
+    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxes| {
+        lamp.center_and_corners().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
@@ -373,9 +380,9 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
 struct GlassObjects(Vec<(u32, Option<Aabb>, f32)>);
 
 impl GlassObjects {
-    fn of(world: &World) -> Self {
+    fn from_world(world: &World) -> Self {
         let each = (0..).zip(world.geometry.objects()).flat_map(|(id, object)| {
-            let glasses = world.materials_of(id).filter_map(|material| material.bsdf.glass());
+            let glasses = world.materials_of(id).filter_map(|material| material.bsdf.as_dielectric());
             glasses.map(move |glass| (id, object.bounds(), glass.ior))
         });
         Self(each.collect())
@@ -383,7 +390,7 @@ impl GlassObjects {
 
     /// Whether light may pass through an object's surface unchanged. True if its index of refraction is 1, or
     /// if it may touch or overlap glass with the same index.
-    fn may_have_no_effect(&self, id: u32, ior: f32) -> bool {
+    fn may_be_index_matched(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
         let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
@@ -405,15 +412,15 @@ struct SpecularObjects {
 }
 
 impl SpecularObjects {
-    fn of(world: &World) -> Self {
+    fn from_world(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
-        let glasses = GlassObjects::of(world);
+        let glasses = GlassObjects::from_world(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
             // Between equal indices of refraction, light passes through rough glass unchanged, but shadow
             // rays are blocked.
             let is_specular = |material: &Material| {
-                let is_passed = |glass: &Dielectric| glasses.may_have_no_effect(id, glass.ior);
-                material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
+                let is_passed = |glass: &Dielectric| glasses.may_be_index_matched(id, glass.ior);
+                material.bsdf.has_delta() || material.bsdf.as_dielectric().is_some_and(is_passed)
             };
             if world.materials_of(id).any(is_specular) {
                 own.balls.extend(object.bounding_sphere());
@@ -423,7 +430,7 @@ impl SpecularObjects {
         own
     }
 
-    fn is_present(&self) -> bool {
+    fn has_any(&self) -> bool {
         self.is_unbounded || !self.balls.is_empty()
     }
 }

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Vec3x16};
 
 /// Sixteen encoded directions.
-pub type Packed = [u32; PACKET_SIZE];
+pub type PackedDirections = [u32; PACKET_SIZE];
 
 /// Half the side length of the square onto which directions are mapped.
 const SIDE: f32 = 32767.0;
@@ -27,7 +27,7 @@ pub fn unpack_unit(packed: u32) -> Vec3 {
 
 /// Decodes vectors without normalizing them. Their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
-pub fn unpack_lanes(packed: &Packed) -> Vec3x16 {
+pub fn unpack_lanes(packed: &PackedDirections) -> Vec3x16 {
     let mut vectors = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         let [x, y, z] = unpack_vector(packed[i]);
@@ -48,7 +48,7 @@ fn unpack_vector(packed: u32) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     #[test]
     fn round_trip_error_is_below_7e_5() {

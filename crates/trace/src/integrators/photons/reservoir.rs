@@ -77,12 +77,12 @@ impl LaneReservoirs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     #[test]
     fn items_are_chosen_in_proportion_to_weight() {
         const ITEMS: usize = 5;
-        let mut next = unit(5);
+        let mut next = unit_generator(5);
         let mut weights = [[0.0; PACKET_SIZE]; ITEMS];
         weights.as_flattened_mut().iter_mut().for_each(|weight| *weight = (next() * 3.0 - 1.0).max(0.0));
         weights[1][3] = 9.0;

@@ -40,13 +40,13 @@ pub fn inverse_coverage(
     match clip {
         KernelCoverage::Fraction(part) => 1.0 / part,
         KernelCoverage::Clipped => mean_trials_per_success(&mut succeeds),
-        KernelCoverage::Crowded => reciprocal_estimate_if_first_fails(succeeds),
+        KernelCoverage::Crowded => estimate_reciprocal_probability(succeeds),
     }
 }
 
 /// Returns 1 if the first trial succeeds, which has probability p, and otherwise a value with expectation 1 +
 /// 1/p. The overall expectation is p + (1 − p)·(1 + 1/p) = 1/p.
-fn reciprocal_estimate_if_first_fails(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
+fn estimate_reciprocal_probability(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials_per_success(|number| succeeds(number + 1)) }
 }
 
@@ -77,7 +77,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
     for _ in 0..LAYERS {
         let ray = Ray::segment(start, end);
         // Find the next surface below that may receive photons.
-        let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
+        let Some(hit) = world.geometry.closest_hit_among(&ray, may_receive) else { return false };
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let surface = world.geometry.requested_surface(&ray, &hit, bare);
         // Succeed if the surface receives photons, has about the same normal, and is not occluded.
@@ -102,18 +102,18 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     #[test]
     fn reciprocal_estimate_is_unbiased() {
-        let mut next = unit(7);
+        let mut next = unit_generator(7);
         for chance in [0.03_f32, 0.1, 0.3, 0.5, 0.9, 1.0] {
             for is_crowded in [false, true] {
                 const RUNS: u32 = 100_000;
                 let mut value = || {
                     let succeeds = |_: u32| next() < chance;
                     f64::from(if is_crowded {
-                        reciprocal_estimate_if_first_fails(succeeds)
+                        estimate_reciprocal_probability(succeeds)
                     } else {
                         mean_trials_per_success(succeeds)
                     })

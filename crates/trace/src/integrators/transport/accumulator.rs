@@ -1,12 +1,12 @@
 //! Accumulates the light components visible in the view.
 
 use super::ray::PathRay;
-use crate::integrators::view::{Components, LightAov};
+use crate::integrators::view::{LightAov, RadianceComponents};
 use crate::math::Vec3;
 
 /// A contribution other than reflected light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LocalTerm {
+pub enum NonReflectedTerm {
     /// Emission of a surface, or the background.
     Emitted,
     /// The ambient term.
@@ -26,11 +26,11 @@ pub struct Accumulator<'a> {
 
 impl Accumulator<'_> {
     /// Adds emission or ambient light.
-    pub fn add(&mut self, slot: u32, part: LocalTerm, radiance: Vec3) {
+    pub fn add_non_reflected(&mut self, slot: u32, part: NonReflectedTerm, radiance: Vec3) {
         let parts = self.components();
         let is_taken = match part {
-            LocalTerm::Emitted => parts.emitted,
-            LocalTerm::Ambient => parts.ambient,
+            NonReflectedTerm::Emitted => parts.emitted,
+            NonReflectedTerm::Ambient => parts.ambient,
         };
         if is_taken {
             self.radiance[slot as usize] += radiance;
@@ -38,9 +38,9 @@ impl Accumulator<'_> {
     }
 
     /// Adds light from a source that a path hits after its first diffuse or glossy surface.
-    pub fn add_hit_light(&mut self, path: &PathRay, radiance: Vec3) {
+    pub fn add_emitter_hit(&mut self, path: &PathRay, radiance: Vec3) {
         match self.aov {
-            LightAov::Radiance(parts) if path.state.contributes(parts.paths) => {
+            LightAov::Radiance(parts) if path.state.contributes_to_view(parts.paths) => {
                 self.add_direct(path.slot, radiance, false);
             }
             LightAov::Radiance(_) | LightAov::LitFraction | LightAov::TraversalCost => {}
@@ -53,10 +53,10 @@ impl Accumulator<'_> {
     }
 
     /// Radiance components to accumulate.
-    fn components(&self) -> Components {
+    fn components(&self) -> RadianceComponents {
         match self.aov {
             LightAov::Radiance(parts) => parts,
-            LightAov::LitFraction | LightAov::TraversalCost => Components::NONE,
+            LightAov::LitFraction | LightAov::TraversalCost => RadianceComponents::NONE,
         }
     }
 
@@ -83,7 +83,7 @@ impl Accumulator<'_> {
     #[inline]
     pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
         if path.state.only_specular_before {
-            self.add(path.slot, LocalTerm::Ambient, radiance);
+            self.add_non_reflected(path.slot, NonReflectedTerm::Ambient, radiance);
         } else if self.accepts_ambient(path) {
             self.add_direct(path.slot, radiance, false);
         }

@@ -3,16 +3,16 @@
 use super::tile::TileContext;
 use super::vertex::ShadingVertex;
 use crate::geometry::Ray;
-use crate::geometry::packet::lanes;
-use crate::integrators::view::{Components, LightAov};
+use crate::geometry::packet::lane_indices;
+use crate::integrators::view::{LightAov, RadianceComponents};
 use crate::materials::bsdf::BsdfValues;
 use crate::materials::bxdf::SurfaceDirections;
-use crate::materials::{BsdfRow, RoughKind};
+use crate::materials::{BsdfPacket, BxdfKind};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
 use crate::math::soa::Soa;
 use crate::sampling::SamplerPacket;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use glimt_base::soa;
 
 soa! {
@@ -20,7 +20,7 @@ soa! {
     pub struct BatchVertex in VertexBatch {
         /// Origin of light samples and shadow rays.
         pub from: Vec3 = Vec3::ZERO,
-        /// Triangle at the origin; see [`VertexBatch::starts`].
+        /// Triangle at the origin; see [`VertexBatch::start_triangles`].
         pub start: u32 = Ray::NO_TRIANGLE,
         /// Horizon normal, if `has_horizon`. Light from behind it is occluded.
         pub horizon: Vec3 = Vec3::ZERO,
@@ -67,7 +67,7 @@ soa! {
         /// Mask of lanes with a vertex.
         pub used: u32 = 0,
         /// BSDFs, all of the same kind.
-        pub bsdf: BsdfRow = BsdfRow::default(),
+        pub bsdf: BsdfPacket = BsdfPacket::default(),
         /// Whether any vertex has a perturbed normal.
         pub is_perturbed: bool = false,
         /// Whether no light samples are visible from any of the vertices.
@@ -90,11 +90,11 @@ impl VertexBatch {
     /// Mask of vertices whose highlights are too narrow for reliable light sampling.
     pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
-            LightAov::Radiance(Components { specular, .. }) => specular,
+            LightAov::Radiance(RadianceComponents { specular, .. }) => specular,
             LightAov::LitFraction => false,
             LightAov::TraversalCost => true,
         };
-        let is_soft = tile.settings.render.shadows == Shadows::Soft;
+        let is_soft = tile.settings.render.shadows == ShadowMode::Soft;
         if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_hit()) {
             return 0;
         }
@@ -102,7 +102,7 @@ impl VertexBatch {
         let filled =
             Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.infinite_solid_angle() - 1.0;
         let least = filled.min(Self::MIN_SHARP_EXPONENT);
-        self.bsdf.narrower_than(self.used, least)
+        self.bsdf.mask_narrower_than(self.used, least)
     }
 
     /// Returns the vertices' samplers.
@@ -136,7 +136,7 @@ impl VertexBatch {
     /// Whether the packet accepts vertices with this kind of BSDF and these values of `is_dark` and
     /// `has_two_sides`.
     #[inline(always)]
-    pub fn accepts(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
+    pub fn accepts(&self, kind: BxdfKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
         self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
     }
 
@@ -149,15 +149,15 @@ impl VertexBatch {
     }
 
     /// Copies a vertex from another packet with the same kind of BSDF. Neither packet may be two-sided.
-    pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
+    pub fn copy_vertex(&mut self, i: usize, other: &Self, from: usize) {
         BatchVertex::get(other, from).set(self, i);
-        self.bsdf.copy(i, &other.bsdf, from);
+        self.bsdf.copy_lane(i, &other.bsdf, from);
         self.is_perturbed |= other.is_perturbed;
         self.used |= 1 << i;
     }
 
     /// Stores a vertex. Its BSDF must be of the packet's kind.
-    pub fn put(
+    pub fn set_vertex(
         &mut self,
         i: usize,
         tile: &TileContext<'_>,
@@ -194,7 +194,7 @@ impl VertexBatch {
         }
         .set(self, i);
         let directions = SurfaceDirections { normal, wo: vertex.wo, tangent: vertex.tangent() };
-        self.bsdf.put(i, bsdf, aov.lobes(), &directions);
+        self.bsdf.set_bsdf(i, bsdf, aov.lobes(), &directions);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;
     }
@@ -207,7 +207,7 @@ impl VertexBatch {
 
     /// Evaluates the BSDFs and cosines for light from the directions `wi`.
     #[inline(always)]
-    pub fn response(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfResponse {
+    pub fn evaluate_bsdf(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfResponse {
         let mut cosines = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             cosines[i] = lane(&self.normal, i).dot(lane(wi, i));
@@ -241,7 +241,7 @@ impl VertexBatch {
     /// [`Ray::start`] values for rays from the vertices in the directions `wi`. [`Ray::NO_TRIANGLE`] for rays
     /// directed behind their facet.
     #[inline(always)]
-    pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
+    pub fn start_triangles(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
@@ -259,8 +259,8 @@ impl VertexBatch {
         starts
     }
 
-    /// Like [`VertexBatch::starts`], for a single vertex.
-    pub fn start_of(&self, i: usize, direction: Vec3) -> u32 {
+    /// Like [`VertexBatch::start_triangles`], for a single vertex.
+    pub fn start_triangle(&self, i: usize, direction: Vec3) -> u32 {
         let normal = if self.has_facet & 1 << i != 0 { &self.facet } else { &self.normal };
         if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }
     }
@@ -272,7 +272,7 @@ impl VertexBatch {
 
     /// Surface point of a vertex, and its geometric normal on the viewer's side.
     #[inline(always)]
-    pub fn surface_of(&self, i: usize) -> (Vec3, Vec3) {
+    pub fn surface_point_and_normal(&self, i: usize) -> (Vec3, Vec3) {
         if self.has_facet & 1 << i != 0 {
             (lane(&self.point, i), lane(&self.facet, i))
         } else {
@@ -309,7 +309,7 @@ impl VertexBatch {
     /// Returns the first queue index if every lane has a vertex and the indices are consecutive, and
     /// otherwise `None`.
     #[inline(always)]
-    pub fn consecutive_start(&self) -> Option<u32> {
+    pub fn first_consecutive_index(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
         for i in 0..PACKET_SIZE {
             is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);
@@ -319,7 +319,7 @@ impl VertexBatch {
 
     /// Whether any vertex is in glass.
     pub fn is_in_glass(&self) -> bool {
-        lanes(self.used).any(|i| self.interiors[i] != 0)
+        lane_indices(self.used).any(|i| self.interiors[i] != 0)
     }
 
     /// Mask of lanes whose direction is below the vertex's horizon.
@@ -381,8 +381,8 @@ mod tests {
         let plain = VertexBatch { used: ALL, ..VertexBatch::empty() };
         let mut row = noisy;
         row.retain_lanes(0b11);
-        row.copy(2, &plain, 7);
-        row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
+        row.copy_vertex(2, &plain, 7);
+        row.copy_vertex(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
         let bits = [
             row.used,
             row.has_horizon,

@@ -51,7 +51,7 @@ impl TileContext<'_> {
     pub fn camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
-        self.world.geometry.instructions().run(GenerateCameraRays {
+        self.world.geometry.instruction_set().run(GenerateCameraRays {
             tile: self,
             first: slots.start,
             count,
@@ -76,7 +76,8 @@ impl TileContext<'_> {
     #[cold]
     #[inline(never)]
     fn camera_interiors(&self, point: Vec3) -> InteriorList {
-        let around = self.world.glass_around(point).map(|(body, material)| Interior { body, material });
+        let around =
+            self.world.glass_around_lens_point(point).map(|(body, material)| Interior { body, material });
         around.fold(InteriorList::default(), InteriorList::entered)
     }
 
@@ -91,7 +92,7 @@ impl TileContext<'_> {
         // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Dimension::Pixel, 0, 1);
         let mut negative = 0;
-        settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
+        settings.render.filter.sample_packet(&mut in_pixel, |lane, sample: FilterSample| {
             negative |= u32::from(sample.is_negative) << lane;
         });
         let mut places = [[0.0; PACKET_SIZE]; 2];

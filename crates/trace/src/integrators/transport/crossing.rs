@@ -39,7 +39,7 @@ pub struct CrossingMemory {
 
 impl TileContext<'_> {
     /// Finds all surfaces that a ray crosses at a hit on glass.
-    pub fn crossing(
+    pub fn find_crossing(
         &self,
         path: &PathRay,
         vertex: &Vertex<'_>,
@@ -52,7 +52,7 @@ impl TileContext<'_> {
         let meeting = CoincidenceQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.find_coincident_surfaces(&meeting, around, |near| found.push(near));
         let (before, far) = self.crossing_interiors(&path.interiors, found);
-        let opaque = found.iter().filter_map(|near| self.opaque(near));
+        let opaque = found.iter().filter_map(|near| self.opaque_hit(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         Crossing { sides, before, far, opaque }
     }
@@ -68,7 +68,7 @@ impl TileContext<'_> {
         known: &InteriorList,
         found: &[CoincidentSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
-        let is_told_by_record = |glass: Interior| !self.world.is_closed(glass.body);
+        let is_told_by_record = |glass: Interior| !self.world.is_closed_shape(glass.body);
         // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
@@ -87,7 +87,7 @@ impl TileContext<'_> {
             found.iter().filter_map(move |thing| match *thing {
                 CoincidentSurface::Surface { hit, material, is_front } if is_front == as_front => {
                     let glass = Interior { body: self.world.solid_id(hit.object), material };
-                    self.world.is_glass(material).then_some(glass)
+                    self.world.is_glass_material(material).then_some(glass)
                 }
                 CoincidentSurface::Surface { .. } | CoincidentSurface::Around { .. } => None,
             })
@@ -98,7 +98,7 @@ impl TileContext<'_> {
         });
         // Leave the solids whose back faces are hit.
         for glass in crossed(false) {
-            if self.world.is_open(glass.body) {
+            if self.world.is_open_solid(glass.body) {
                 near = near.entered(glass);
                 arrived = if arrived.exited(glass).is_none() { arrived.entered(glass) } else { arrived };
                 continue;
@@ -113,7 +113,7 @@ impl TileContext<'_> {
         (Some([arrived, near]), far)
     }
 
-    /// The surface that separates two media at a hit. Requires the result of [`TileContext::crossing`].
+    /// The surface that separates two media at a hit. Requires the result of [`TileContext::find_crossing`].
     /// `None` if both media are air.
     pub fn boundary(
         &self,
@@ -123,13 +123,14 @@ impl TileContext<'_> {
     ) -> Option<GlassBoundary> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
-        if self.world.solid_id(hit.object) == later.body && self.world.is_glass(own) {
+        if self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(own) {
             return Some(GlassBoundary { material: own, hit: None });
         }
         // The path hits a different coincident surface.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
             CoincidentSurface::Surface { hit, material, .. } => {
-                let is_later = self.world.solid_id(hit.object) == later.body && self.world.is_glass(material);
+                let is_later =
+                    self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(material);
                 is_later.then_some(GlassBoundary { material, hit: Some(hit) })
             }
             CoincidentSurface::Around { .. } => None,
@@ -140,16 +141,16 @@ impl TileContext<'_> {
     /// Removes the open solids from a medium.
     pub fn without_open_glass(&self, interiors: InteriorList) -> InteriorList {
         if self.world.has_open_glass() {
-            return interiors.retained(|glass| !self.world.is_open(glass.body));
+            return interiors.retained(|glass| !self.world.is_open_solid(glass.body));
         }
         interiors
     }
 
-    fn opaque(&self, thing: &CoincidentSurface) -> Option<Hit> {
+    fn opaque_hit(&self, thing: &CoincidentSurface) -> Option<Hit> {
         match *thing {
             CoincidentSurface::Around { .. } => None,
             CoincidentSurface::Surface { hit, material, .. } => {
-                (!self.world.is_glass(material)).then_some(hit)
+                (!self.world.is_glass_material(material)).then_some(hit)
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::cone::SpecularEvent;
 use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
-use super::vertex::{Shading, Vertex};
+use super::vertex::{ShadingNormals, Vertex};
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
@@ -19,7 +19,12 @@ pub const PASSED: u32 = 4;
 
 /// Path after specular reflection. If the shading normal would reflect the path below the surface, the
 /// geometric normal is used.
-pub fn reflected_path(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
+pub fn reflected_path(
+    path: &PathRay,
+    vertex: &Vertex<'_>,
+    shading: &ShadingNormals,
+    reflectance: Vec3,
+) -> PathRay {
     let incident = path.ray.direction;
     let side = -incident.dot(vertex.normal);
     let mut direction = reflect(incident, shading.normal);
@@ -58,7 +63,7 @@ pub fn fresnel_split(
     world: &World,
     path: &PathRay,
     vertex: &Vertex<'_>,
-    shading: &Shading,
+    shading: &ShadingNormals,
     far: &InteriorList,
 ) -> FresnelSplit {
     let eta = medium_ior(world, far) / medium_ior(world, &path.interiors);
@@ -78,7 +83,12 @@ pub fn fresnel_split(
 /// Computes the reflectance and refracted direction with the shading normal. If this normal faces away from
 /// the ray or would refract the ray to the incident side, the geometric normal is used, because the ray must
 /// be inside its medium.
-fn refract_at(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
+fn refract_at(
+    vertex: &Vertex<'_>,
+    shading: &ShadingNormals,
+    incident: Vec3,
+    eta: f32,
+) -> (f32, Option<Vec3>) {
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
     let by = |normal: Vec3| {

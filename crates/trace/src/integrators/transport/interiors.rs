@@ -133,7 +133,7 @@ pub fn medium_ior(world: &World, interiors: &InteriorList) -> f32 {
 }
 
 fn glass_of(world: &World, inside: Interior) -> Option<&Dielectric> {
-    world.materials[inside.material as usize].bsdf.glass()
+    world.materials[inside.material as usize].bsdf.as_dielectric()
 }
 
 #[cfg(test)]

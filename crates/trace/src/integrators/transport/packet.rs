@@ -7,18 +7,18 @@ use super::batch::{UNPERTURBED, VertexBatch};
 use super::camera::CameraRayPacket;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::lift_segment;
+use super::vertex::shadow_lift_segment;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::view::LightAov;
-use crate::materials::Rough;
-use crate::materials::bsdf::ShownLobes;
+use crate::materials::NonSpecular;
+use crate::materials::bsdf::LobeFilter;
 use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
 
 /// Source of a packet's rays.
@@ -138,7 +138,7 @@ impl TileContext<'_> {
         are_lit: bool,
         (row, surface): (&mut VertexBatch, &mut SurfacePacket),
     ) -> PacketHits {
-        self.world.geometry.instructions().run(PacketIntersection {
+        self.world.geometry.instruction_set().run(PacketIntersection {
             tile: self,
             rays,
             aov,
@@ -158,7 +158,7 @@ impl TileContext<'_> {
 
     /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
     #[inline(always)]
-    pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
+    pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let (plain, rough) = self.world.packet_material(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
@@ -176,7 +176,7 @@ struct PacketIntersection<'a> {
 }
 
 /// Masks of a packet's plain surfaces.
-struct PlainSurfaces {
+struct PlainSurfaceMasks {
     /// All plain surfaces.
     all: u32,
     /// Surfaces that emit on either side.
@@ -221,9 +221,9 @@ impl SimdKernel for PacketIntersection<'_> {
         // Intersect the rays, or use the hits found earlier.
         let (hits, object) = match rays {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
-                world.geometry.closest_rows(rows, &mut ends, traced, simd)
+                world.geometry.closest_hit_packet_simd(rows, &mut ends, traced, simd)
             }
-            PacketSource::Traced(_, known, places) => known_hits(known, places),
+            PacketSource::Traced(_, known, places) => gather_known_hits(known, places),
         };
         // Select the rays in air, whose surfaces may be plain.
         *self.surface = SurfacePacket::EMPTY;
@@ -242,16 +242,17 @@ impl SimdKernel for PacketIntersection<'_> {
         }
         // Compute the plain surfaces and their BSDFs.
         (self.row.only_specular_before, self.row.after_gloss) = (only_specular_before, after_gloss);
-        let plain = self.fill_plain(rows, (&hits, &object), in_air, simd);
+        let plain = self.fill_plain_surfaces(rows, (&hits, &object), in_air, simd);
         // Set the positions and normals of the plain vertices.
         let lifts = match tile.settings.render.shadows {
-            Shadows::Off => LiftMode::All,
-            Shadows::Hard | Shadows::Soft => LiftMode::IfFree(only_specular_before),
+            ShadowMode::Off => ShadowLiftMode::All,
+            ShadowMode::Hard | ShadowMode::Soft => ShadowLiftMode::IfFree(only_specular_before),
         };
         let front =
             if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, simd) };
         // Compute the other surfaces, and the environment for rays that leave the scene.
-        let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
+        let found =
+            tile.fill_non_plain_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.radiance_and_pdf_packet(&rows.direction),
@@ -266,32 +267,32 @@ impl PacketIntersection<'_> {
     /// Stores the plain surfaces among the hits in `left` in the surface packet, and their BSDFs in the
     /// vertex packet.
     #[inline(always)]
-    fn fill_plain(
+    fn fill_plain_surfaces(
         &mut self,
         rows: &RayPacket,
         (hits, object): (&HitPacket, &[u32; PACKET_SIZE]),
         mut left: u32,
         simd: impl Simd,
-    ) -> PlainSurfaces {
+    ) -> PlainSurfaceMasks {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
-        let mut plain = PlainSurfaces { all: 0, shining: 0, two_sided: 0, lookups: 0 };
+        let mut plain = PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = first_group(object, left, simd);
+            let (id, of_object) = lanes_with_same_index(object, left, simd);
             left &= !of_object;
-            if tile.world.is_colored(id) {
+            if tile.world.has_vertex_colors(id) {
                 continue;
             }
             // Skip materials that are not plain. The first plain material determines the kind of all BSDFs.
             let materials = tile.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
-            let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET_SIZE>::new();
+            let mut groups = ArrayVec::<(&NonSpecular, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = first_group(&materials, waiting, simd);
+                let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
                 waiting &= !alike;
                 let Some((material, rough)) = tile.plain_material(material as usize) else { continue };
                 if plain.all | of == 0 {
-                    row.bsdf.prepare(material.kind);
+                    row.bsdf.set_kind(material.kind);
                 } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
@@ -312,7 +313,7 @@ impl PacketIntersection<'_> {
             // Compute the surfaces.
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
-                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
+                    row.set_start_triangles(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
                     if !surface.fill(shape, rows, hits, of) {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
@@ -322,7 +323,7 @@ impl PacketIntersection<'_> {
                     }
                 }
                 Object::Mesh(mesh) => {
-                    row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
+                    row.set_start_triangles(of, &mesh.scene_triangle_numbers(&hits.primitive));
                     mesh.fill_surfaces(surface, rows, hits, of, asked_uvs, simd);
                 }
             }
@@ -330,9 +331,9 @@ impl PacketIntersection<'_> {
             // Evaluate the materials. At vertices that the camera does not see, all lobes are used.
             for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
-                let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
+                let shown = [(of, aov.lobes()), (of & !row.only_specular_before, LobeFilter::ALL)];
                 let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
-                let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, simd);
+                let black = row.bsdf.fill_lanes(rough, has_uv.then_some(&surface.uv), shown, simd);
                 row.used |= of & !black;
             }
         }
@@ -343,7 +344,7 @@ impl PacketIntersection<'_> {
 /// Returns the index stored in the first lane in `left`, and the mask of lanes in `left` that have the same
 /// index.
 #[inline(always)]
-fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+fn lanes_with_same_index(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
     let mut of = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
@@ -354,7 +355,7 @@ fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32
 
 /// Gathers the previously found hits at these queue indices into a packet.
 #[inline(always)]
-fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
+fn gather_known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
     let (mut hits, mut object) = (HitPacket::without_hits(), [u32::MAX; PACKET_SIZE]);
     for (lane, &place) in places.iter().enumerate().take(PACKET_SIZE) {
         if let Some(hit) = &known[place as usize] {
@@ -368,7 +369,7 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET
 impl TileContext<'_> {
     /// Stores the surfaces of non-plain hits in the surface packet and returns the mask of stored surfaces.
     #[inline(always)]
-    fn fill_other_surfaces(
+    fn fill_non_plain_surfaces(
         &self,
         surface: &mut SurfacePacket,
         rows: &RayPacket,
@@ -378,7 +379,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = first_group(object, left, simd);
+            let (id, of_object) = lanes_with_same_index(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
@@ -388,7 +389,7 @@ impl TileContext<'_> {
             let materials = self.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = first_group(&materials, waiting, simd);
+                let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
                 waiting &= !alike;
                 of |= if self.supports_surface_packet(material as usize) { alike } else { 0 };
             }
@@ -410,7 +411,7 @@ impl TileContext<'_> {
 
 /// Selects the vertices on smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
-enum LiftMode {
+enum ShadowLiftMode {
     /// All vertices.
     All,
     /// Only the vertices whose bits are set, and only if the segment to the vertex's lifted point is
@@ -421,7 +422,7 @@ enum LiftMode {
 impl VertexBatch {
     /// Sets [`VertexBatch::start`] for the lanes in `of`.
     #[inline(always)]
-    fn set_starts(&mut self, of: u32, starts: &[u32; PACKET_SIZE]) {
+    fn set_start_triangles(&mut self, of: u32, starts: &[u32; PACKET_SIZE]) {
         select_u32(&mask_from_bits(of), starts, &mut self.start);
     }
 
@@ -431,7 +432,7 @@ impl VertexBatch {
         &mut self,
         rays: &RayPacket,
         surface: &SurfacePacket,
-        lifts: LiftMode,
+        lifts: ShadowLiftMode,
         simd: impl Simd,
     ) {
         // Turn both normals toward the viewer.
@@ -450,7 +451,7 @@ impl VertexBatch {
         // Compute the lifted points above the facets.
         for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
-            let (is_above, end) = lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
+            let (is_above, end) = shadow_lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
@@ -458,8 +459,8 @@ impl VertexBatch {
         let of = mask_from_bits(surface.smooth);
         let above = simd.movemask(&above) & surface.smooth;
         let rises = match lifts {
-            LiftMode::All => mask_from_bits(above),
-            LiftMode::IfFree(only_specular_before) => {
+            ShadowLiftMode::All => mask_from_bits(above),
+            ShadowLiftMode::IfFree(only_specular_before) => {
                 self.has_horizon |= simd.movemask(&bent) & surface.smooth;
                 self.may_lift |= above & only_specular_before;
                 [0; PACKET_SIZE]
@@ -489,7 +490,7 @@ impl VertexBatch {
         paths: &PacketSource<'_>,
         rays: &RayPacket,
         surface: &SurfacePacket,
-        lifts: LiftMode,
+        lifts: ShadowLiftMode,
         simd: impl Simd,
     ) -> u32 {
         // Place the vertices on the facets, on the viewer's side.

@@ -66,7 +66,7 @@ impl PathState {
     }
 
     /// Whether the view shows light that arrives along this path at its first diffuse or glossy vertex.
-    pub fn contributes(&self, paths: PathClasses) -> bool {
+    pub fn contributes_to_view(&self, paths: PathClasses) -> bool {
         match (self.one_diffuse_before, self.pdf > 0.0) {
             (true, true) => paths.direct,
             (true, false) => paths.caustic,

@@ -7,8 +7,8 @@ use super::interiors::InteriorLists;
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
-use crate::geometry::packet::lanes;
-use crate::materials::bsdf::{LobeSet, SideSamples};
+use crate::geometry::packet::lane_indices;
+use crate::materials::bsdf::{DielectricSamplePacket, LobeSet};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::sampling::Dimension;
@@ -102,10 +102,10 @@ impl SampleBsdf<'_> {
     pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
         // Sample the BSDFs of all vertices in the packet.
         let row = self.row;
-        let scattered = self.tile.world.geometry.instructions().run(self);
+        let scattered = self.tile.world.geometry.instruction_set().run(self);
         let of_lobe = |pdf: f32| move |cone: &RayCone| cone.scattered(pdf);
         // Queue the paths that continue.
-        next.extend(lanes(scattered.alive).map(|i| {
+        next.extend(lane_indices(scattered.alive).map(|i| {
             let (from, interiors, normal) = if scattered.beyond & 1 << i == 0 {
                 (&row.from, row.interiors[i], lane(&row.normal, i))
             } else {
@@ -148,7 +148,7 @@ impl SimdKernel for SampleBsdf<'_> {
         } else {
             [[0.0; PACKET_SIZE]; 2]
         };
-        let sides = if row.has_two_sides { row.bsdf.sample_sides(&lobe, &u, simd) } else { None };
+        let sides = if row.has_two_sides { row.bsdf.sample_either_side(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
             Some(sides) => self.sample_both_sides(&sides, simd),
             None => self.sample_one_side(&lobe, &u, simd),
@@ -177,7 +177,7 @@ impl SampleBsdf<'_> {
         let Self { row, continuation, .. } = *self;
         let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.
-        let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
+        let BsdfResponse { bsdf, cosines } = row.evaluate_bsdf(&wi, simd);
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
@@ -197,16 +197,16 @@ impl SampleBsdf<'_> {
         }
         // Drop directions below the horizon.
         alive &= !row.below_horizon(&wi, simd);
-        let starts = row.starts(&wi);
-        let narrow = row.bsdf.narrow_lobes();
+        let starts = row.start_triangles(&wi);
+        let narrow = row.bsdf.narrow_lobe_mask();
         ScatteredDirections { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
     }
 
     /// Scatters paths in directions sampled on both sides of the surfaces.
     #[inline(always)]
-    fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> ScatteredDirections {
+    fn sample_both_sides(&self, samples: &DielectricSamplePacket, simd: impl Simd) -> ScatteredDirections {
         let row = self.row;
-        let SideSamples { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
+        let DielectricSamplePacket { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors for perturbed normals, each on its direction's side.
         let mut sides = [1.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
@@ -235,7 +235,7 @@ impl SampleBsdf<'_> {
             wi: *wi,
             starts: [Ray::NO_TRIANGLE; PACKET_SIZE],
             beyond: simd.movemask(beyond),
-            narrow: row.bsdf.narrow_lobes(),
+            narrow: row.bsdf.narrow_lobe_mask(),
             pdfs: *pdfs,
             factors,
             roulette_throughput,

@@ -20,18 +20,18 @@ pub struct TraceBuffers {
     /// Hits of this bounce's rays.
     pub hits: Vec<Option<Hit>>,
     /// Queue indices of the rays, ordered by the object hit.
-    pub object_order: ObjectOrder,
+    pub object_order: HitsByObject,
     /// Buffers for the search for coincident surfaces.
     pub crossing: CrossingMemory,
 }
 
 /// Queue indices grouped by the object hit, so that shading a packet takes few loop iterations.
 #[derive(Default)]
-pub struct ObjectOrder {
+pub struct HitsByObject {
     places: Vec<u32>,
 }
 
-impl ObjectOrder {
+impl HitsByObject {
     /// Number of groups. The low bits of an object's index select its group.
     const GROUPS: usize = 64;
 
@@ -68,9 +68,9 @@ mod tests {
 
     #[test]
     fn indices_are_grouped_by_object_in_order() {
-        let hit = |object: u32| (object != 9).then_some(Hit { shape: ShapeHit::at(1.0), object });
+        let hit = |object: u32| (object != 9).then_some(Hit { shape: ShapeHit::from_t(1.0), object });
         let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
-        let mut object_order = ObjectOrder::default();
+        let mut object_order = HitsByObject::default();
         for _ in 0..2 {
             object_order.sort(&hits);
             assert_eq!(object_order.indices(), [2, 6, 0, 3, 7, 4, 1, 5]);

@@ -7,10 +7,10 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, Pixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::SamplingMode;
+use crate::lights::LightSamplingPurpose;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{PACKET_SIZE, World};
 
 /// Tile context: the world, the settings, and the samples to render.
@@ -53,10 +53,10 @@ impl<'a> TileContext<'a> {
         let paths_find_sky = is_constant
             && behavior.scatters
             && !behavior.gathers
-            && render.shadows == Shadows::Soft
+            && render.shadows == ShadowMode::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_constant && world.lights.sampler(SamplingMode::Eye).is_none();
+        let lobes_find_sky = is_constant && world.lights.sampler(LightSamplingPurpose::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 

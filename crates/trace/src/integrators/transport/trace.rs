@@ -19,7 +19,7 @@ impl TileContext<'_> {
             for (paths, hits) in paths.chunks(PACKET_SIZE).zip(hits.chunks_mut(PACKET_SIZE)) {
                 let rays: [Ray; PACKET_SIZE] =
                     std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
-                self.world.geometry.closest_packet(&rays[..paths.len()], hits);
+                self.world.geometry.closest_hit_packet(&rays[..paths.len()], hits);
             }
         }
         Ok(())

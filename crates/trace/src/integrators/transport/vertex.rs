@@ -9,9 +9,9 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
-use crate::materials::{Coated, Footprint, Material, Mirror, RoughBsdf, TexturePoint, ThinDielectric};
+use crate::materials::{BxdfPoint, Coated, Footprint, Material, Mirror, TexturePoint, ThinDielectric};
 use crate::math::Vec3;
-use crate::scene::description::Shadows;
+use crate::scene::description::ShadowMode;
 use crate::world::{Hit, OffsetPoints};
 
 /// A path vertex on a surface.
@@ -53,7 +53,7 @@ impl<'a> Vertex<'a> {
 
     /// Creates the vertex at a hit, computing only what the material needs.
     pub fn for_shading(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::shaded(tile, path, (&path.ray, hit), hit.shape.t)
+        Self::from_ray_hit(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
     /// Creates the vertex at a hit whose surface has already been computed.
@@ -69,10 +69,10 @@ impl<'a> Vertex<'a> {
         (sides, hit): (OffsetPoints, &Hit),
         distance: f32,
     ) -> Self {
-        Self { sides: Some(sides), ..Self::shaded(tile, path, (&sides.ray(), hit), distance) }
+        Self { sides: Some(sides), ..Self::from_ray_hit(tile, path, (&sides.ray(), hit), distance) }
     }
 
-    fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
+    fn from_ray_hit(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.has_non_delta_lobes();
         let asked = SurfaceRequest { uv: tile.world.is_textured(index), shadow_point: is_lit };
@@ -98,7 +98,7 @@ impl<'a> Vertex<'a> {
         // Compute the footprint and curvature for ray cones, if used.
         let has_beam = tile.pixel_spread > 0.0;
         let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
-            true => Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
+            true => Footprint::from_ray_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
             false => Footprint::POINT,
         };
         let curvature = match has_beam && material.bsdf.has_delta() {
@@ -132,7 +132,7 @@ impl<'a> Vertex<'a> {
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
-        self.material.emission.at(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
+        self.material.emission.radiance(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
     }
 
     /// Point for texture lookups, without the footprint if light samples compete with the path.
@@ -154,24 +154,24 @@ impl<'a> Vertex<'a> {
     pub fn pane_transmittance(&self, path: &PathRay, pane: &ThinDielectric, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
-        self.times_vertex_color(pane.tint.at(&at, lookups).min(Vec3::ONE))
+        self.times_vertex_color(pane.tint.evaluate(&at, lookups).min(Vec3::ONE))
     }
 
     /// Multiplies a BSDF by the vertex color.
     #[inline(always)]
-    pub fn tint(&self, bsdf: &mut RoughBsdf) {
+    pub fn tint(&self, bsdf: &mut BxdfPoint) {
         if let Some(color) = self.color {
             *bsdf = bsdf.tinted(color);
         }
     }
 
     /// Sets the origins for rays on either side.
-    pub fn set_sides(&mut self, sides: OffsetPoints) {
+    pub fn set_offset_points(&mut self, sides: OffsetPoints) {
         self.sides = Some(sides);
     }
 
     /// Vertex for transmitted light, on the side facing away from the viewer.
-    pub fn behind(&self) -> Self {
+    pub fn far_side(&self) -> Self {
         let turned =
             |OffsetPoints { before, beyond }: OffsetPoints| OffsetPoints { before: beyond, beyond: before };
         Self {
@@ -194,11 +194,11 @@ impl<'a> Vertex<'a> {
     }
 
     /// The shading normals on the viewer's side.
-    pub fn shading(&self, counters: &mut RayCounters) -> Shading {
+    pub fn shading_normals(&self, counters: &mut RayCounters) -> ShadingNormals {
         let normal = self.front_shading_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
         let shading_normal_cosine = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
-        Shading { normal, smooth_normal, shading_normal_cosine }
+        ShadingNormals { normal, smooth_normal, shading_normal_cosine }
     }
 
     /// Ray cone after specular reflection or refraction.
@@ -211,7 +211,7 @@ impl<'a> Vertex<'a> {
     pub fn mirror_reflectance(
         &self,
         mirror: &Mirror,
-        shading: &Shading,
+        shading: &ShadingNormals,
         is_colored: bool,
         counters: &mut RayCounters,
     ) -> Vec3 {
@@ -219,12 +219,12 @@ impl<'a> Vertex<'a> {
         if is_colored {
             mirror.reflectance(cosine, self.color, &self.texture_point, &mut counters.texture_lookups)
         } else {
-            mirror.with_white_textures(cosine)
+            mirror.untextured_reflectance(cosine)
         }
     }
 
     /// Fresnel reflectance of a smooth coat at this vertex, using the shading normal.
-    pub fn coat_reflectance(&self, coated: &Coated, shading: &Shading) -> f32 {
+    pub fn coat_reflectance(&self, coated: &Coated, shading: &ShadingNormals) -> f32 {
         coated.fresnel(shading.normal.dot(self.wo).abs().min(1.0))
     }
 
@@ -259,18 +259,18 @@ impl<'a> Vertex<'a> {
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         if let Some(sides) = self.sides {
             // Rays from rough glass must not pass through their own facet.
-            let is_perturbed = shading_normal != normal && self.material.bsdf.glass().is_some();
+            let is_perturbed = shading_normal != normal && self.material.bsdf.as_dielectric().is_some();
             let horizon = is_perturbed.then_some(self.normal);
             return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon, lift: None };
         }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
-        let is_traced = tile.settings.render.shadows != Shadows::Off;
-        let (is_above, end) = lift_segment(on_facet, shadow_point, self.normal, error);
+        let is_traced = tile.settings.render.shadows != ShadowMode::Off;
+        let (is_above, end) = shadow_lift_segment(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        let lift = (is_above && only_specular_before).then_some(Lift { to: shadow_point, end });
+        let lift = (is_above && only_specular_before).then_some(ShadowOriginLift { to: shadow_point, end });
         ShadowOrigin { point: on_facet, start: self.start, horizon, lift }
     }
 }
@@ -278,7 +278,7 @@ impl<'a> Vertex<'a> {
 /// Returns whether the distance from a facet to the lifted point `to` is significant. Also returns the
 /// segment's `t_max`: 1 at the point, plus a margin for the error.
 #[inline(always)]
-pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
+pub fn shadow_lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
     (is_above, lift.extended_by(error).t_max)
@@ -299,21 +299,21 @@ pub struct ShadowOrigin {
     pub horizon: Option<Vec3>,
     /// A point above the facet. If the segment to this point is unoccluded, it is used as the origin for
     /// lights in all directions.
-    pub lift: Option<Lift>,
+    pub lift: Option<ShadowOriginLift>,
 }
 
 /// A segment from a facet to a point above it.
 #[derive(Clone, Copy, Debug)]
-pub struct Lift {
+pub struct ShadowOriginLift {
     /// The lifted point.
     pub to: Vec3,
     /// The segment's `t_max`: 1 at the point, plus a margin for the error.
     pub end: f32,
 }
 
-impl Shading {
+impl ShadingNormals {
     /// Returns the normals on the other side.
-    pub fn behind(&self) -> Self {
+    pub fn far_side(&self) -> Self {
         Self {
             normal: -self.normal,
             smooth_normal: -self.smooth_normal,
@@ -323,7 +323,7 @@ impl Shading {
 }
 
 /// Shading normals on the viewer's side.
-pub struct Shading {
+pub struct ShadingNormals {
     /// The interpolated normal, perturbed by the normal or bump map.
     pub normal: Vec3,
     /// The interpolated normal.
@@ -343,7 +343,7 @@ pub struct ShadingVertex<'a> {
     /// The vertex to shade.
     pub vertex: &'a Vertex<'a>,
     /// Shading normals of the vertex.
-    pub shading: Shading,
+    pub shading: ShadingNormals,
     /// BSDF of the vertex.
-    pub bsdf: &'a RoughBsdf,
+    pub bsdf: &'a BxdfPoint,
 }

@@ -12,7 +12,7 @@ use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Bsdf, GlassPoint, ThinDielectric};
+use crate::materials::{Bsdf, RoughDielectricPoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
@@ -38,7 +38,7 @@ pub struct Interface<'v> {
     /// The medium on the far side.
     pub far: &'v InteriorList,
     /// Parameters of a rough boundary. `None` if the boundary is smooth.
-    pub rough: Option<GlassPoint>,
+    pub rough: Option<RoughDielectricPoint>,
 }
 
 /// Handles the interactions of paths. Implemented by the camera path and photon wavefronts.
@@ -47,10 +47,10 @@ pub trait PathStepper<'a> {
     fn tile(&self) -> &'a TileContext<'a>;
 
     /// Buffers for the search for coincident surfaces.
-    fn crossing(&mut self) -> &mut CrossingMemory;
+    fn crossing_memory(&mut self) -> &mut CrossingMemory;
 
     /// Records that the path crossed a surface. `next` is the next hit behind the surface.
-    fn record_pass(&mut self, path: &PathRay, next: Option<Hit>);
+    fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>);
 
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
     /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
@@ -58,10 +58,10 @@ pub trait PathStepper<'a> {
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
-    fn texture_lookups(&mut self) -> &mut u64;
+    fn texture_lookup_counter(&mut self) -> &mut u64;
 
     /// Handles a thin pane. The path has the same state as in [`PathStepper::interact`].
-    fn hit_pane(
+    fn handle_pane(
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'a>,
@@ -126,7 +126,7 @@ pub enum OpaqueHit {
 /// Walks a path from its ray's hit to the next interaction, updating the path. `surface` is the surface at
 /// the hit, if known. Paths and vertices are large, so they are not moved.
 #[inline(always)]
-pub fn walk<'a, W: PathStepper<'a>>(
+pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &mut PathRay,
     (mut hit, mut surface): (Hit, Option<SurfacePoint>),
@@ -140,7 +140,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             None => Vertex::for_shading(tile, path, &hit),
         };
         // Stop if the surface is opaque. Otherwise, cross it as a null interaction.
-        if vertex.material.bsdf.glass().is_none() {
+        if vertex.material.bsdf.as_dielectric().is_none() {
             path.throughput *= medium_transmittance(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
                 match null_interaction(stepper, path, &vertex, (way, hit)) {
@@ -148,14 +148,14 @@ pub fn walk<'a, W: PathStepper<'a>>(
                     NullInteraction::Passed(part) => {
                         way = way.extended(path, hit.shape.t);
                         *path = path_past_surface(*path, &vertex, part);
-                        match tile.world.geometry.closest(&path.ray) {
+                        match tile.world.geometry.closest_hit(&path.ray) {
                             Some(next) => {
-                                stepper.record_pass(path, Some(next));
+                                stepper.record_surface_crossing(path, Some(next));
                                 hit = next;
                                 continue;
                             }
                             None => {
-                                stepper.record_pass(path, None);
+                                stepper.record_surface_crossing(path, None);
                                 path.ray.origin = way.origin;
                                 return stepper.interact(path, Interaction::Nothing, has_passed);
                             }
@@ -171,12 +171,12 @@ pub fn walk<'a, W: PathStepper<'a>>(
             let mut far = path.interiors;
             if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
                 // The path may be inside glass that touches the surface.
-                let crossing = tile.crossing(path, &vertex, &hit, stepper.crossing());
+                let crossing = tile.find_crossing(path, &vertex, &hit, stepper.crossing_memory());
                 if let Some([_, near]) = crossing.before {
                     path.interiors = near;
                 }
                 far = crossing.far;
-                vertex.set_sides(crossing.sides);
+                vertex.set_offset_points(crossing.sides);
             }
             let hit = way.measure_from_last_vertex(path, hit);
             return stepper.interact(
@@ -186,7 +186,8 @@ pub fn walk<'a, W: PathStepper<'a>>(
             );
         }
         // At glass, find all coincident surfaces.
-        let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, stepper.crossing());
+        let Crossing { sides, before, far, opaque } =
+            tile.find_crossing(path, &vertex, &hit, stepper.crossing_memory());
         let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
         path.throughput *= medium_transmittance(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
@@ -207,7 +208,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
         // Stop at a boundary between media with different indices of refraction.
         let near = &path.interiors;
         if near.glass() != far.glass() && medium_ior(tile.world, near) != medium_ior(tile.world, &far) {
-            vertex.set_sides(sides);
+            vertex.set_offset_points(sides);
             let rough = if tile.world.has_rough_glass() {
                 rough_boundary(stepper, path, (&vertex, &hit), (sides, &far))
             } else {
@@ -225,8 +226,8 @@ pub fn walk<'a, W: PathStepper<'a>>(
         path.state = path.state.hidden_from_lights();
         path.cone = path.cone.at_distance(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
-        let next = tile.world.geometry.closest(&path.ray);
-        stepper.record_pass(path, next);
+        let next = tile.world.geometry.closest_hit(&path.ray);
+        stepper.record_surface_crossing(path, next);
         match next {
             Some(next) => hit = next,
             None => return stepper.interact(path, Interaction::Nothing, true),
@@ -243,18 +244,18 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
     (sides, far): (OffsetPoints, &InteriorList),
-) -> Option<GlassPoint> {
+) -> Option<RoughDielectricPoint> {
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
-    let boundary = tile.boundary(hit, interior_lists, stepper.crossing())?;
-    let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
+    let boundary = tile.boundary(hit, interior_lists, stepper.crossing_memory())?;
+    let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
         touching.map(|other| Vertex::at_coincident_surface(tile, path, (sides, &other), hit.shape.t));
     let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
-    let alpha = glass.alpha(at, stepper.texture_lookups())?;
-    Some(GlassPoint { near: indices[0], far: indices[1], alpha })
+    let alpha = glass.alpha(at, stepper.texture_lookup_counter())?;
+    Some(RoughDielectricPoint { near: indices[0], far: indices[1], alpha })
 }
 
 /// Determines whether a path passes straight through a surface that may be a null interaction.
@@ -266,7 +267,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     vertex: &Vertex<'a>,
     (way, hit): (Segment, Hit),
 ) -> NullInteraction {
-    if !is_opaque(stepper.tile(), path, vertex, stepper.texture_lookups()) {
+    if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
         return NullInteraction::Passed(Vec3::ONE);
     }
     match &vertex.material.bsdf {
@@ -274,9 +275,11 @@ fn null_interaction<'a, W: PathStepper<'a>>(
             let mut whole = *path;
             let hit = way.measure_from_last_vertex(&mut whole, hit);
             whole.interiors = stepper.tile().without_open_glass(whole.interiors);
-            stepper.hit_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
+            stepper.handle_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => NullInteraction::Opaque,
+        Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
+            NullInteraction::Opaque
+        }
     }
 }
 
@@ -291,8 +294,8 @@ fn has_opaque_coincident_surface<'a, W: PathStepper<'a>>(
 ) -> bool {
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(_) => false,
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
-            is_opaque(stepper.tile(), path, vertex, stepper.texture_lookups())
+        Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
+            stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter())
         }
     }
 }
@@ -303,11 +306,16 @@ pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.pdf > 0.0;
     let at = vertex.lookup_point(is_shared);
-    opacity.at(&at, lookups)
+    opacity.evaluate(&at, lookups)
 }
 
 /// Randomly decides whether the surface is opaque at this vertex, with a probability equal to its opacity.
-fn is_opaque(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
+fn stochastic_opacity_test(
+    tile: &TileContext<'_>,
+    path: &PathRay,
+    vertex: &Vertex<'_>,
+    lookups: &mut u64,
+) -> bool {
     let chance = opacity_at(path, vertex, lookups);
     chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Dimension::Opacity).x < chance
 }
@@ -336,11 +344,11 @@ impl TileContext<'_> {
         let (mut path, mut hit) = (*path, *hit);
         for _ in 0..=MAX_NULL_INTERACTIONS {
             let vertex = Vertex::for_shading(self, &path, &hit);
-            if is_opaque(self, &path, &vertex, &mut counters.texture_lookups) {
+            if stochastic_opacity_test(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }
             path = path_past_surface(path, &vertex, Vec3::ONE);
-            hit = self.world.geometry.closest(&path.ray)?;
+            hit = self.world.geometry.closest_hit(&path.ray)?;
         }
         None
     }

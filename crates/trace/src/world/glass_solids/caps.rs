@@ -1,12 +1,12 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassParts, MeshGlass, RimEdge, glass_of};
+use super::parts::{GlassParts, MeshGlass, RimEdge, object_glass_triangles};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
-use crate::scene::description::{LoweredShape, Mesh, Scene};
+use crate::scene::description::{LoweredShape, MeshReference, Scene};
 
 /// Maximum number of edges examined per hole.
 const MAX_RIM_EDGES: usize = 64;
@@ -39,11 +39,11 @@ pub(super) fn covered_rim_fractions(
     token: &CancelToken,
 ) -> Result<Vec<f64>, Cancelled> {
     let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| select_rim_edges(rims)).collect();
-    let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| queries(parts, rims)).collect();
+    let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
         return Ok(vec![0.0; holes.len()]);
     }
-    let answers = evaluate(scene, meshes, parts.origin, &queries, token)?;
+    let answers = evaluate_queries(scene, meshes, parts.origin, &queries, token)?;
     let mut answers = answers.chunks(QUERIES);
     let part = |rims: Vec<&RimEdge>| {
         let (mut covered, mut total) = (0.0, 0.0);
@@ -64,7 +64,10 @@ fn select_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
 }
 
 /// Returns the queries for a hole's edges, [`QUERIES`] per edge.
-fn queries<'a>(parts: &'a GlassParts, rims: &'a [&RimEdge]) -> impl Iterator<Item = OpaqueQuery> + 'a {
+fn rim_edge_queries<'a>(
+    parts: &'a GlassParts,
+    rims: &'a [&RimEdge],
+) -> impl Iterator<Item = OpaqueQuery> + 'a {
     let middle_of = |rim: &RimEdge| (rim.ends[0] + rim.ends[1]) * 0.5;
     let center = rims.iter().map(|rim| middle_of(rim)).sum::<DVec3>() / rims.len().max(1) as f64;
     rims.iter().flat_map(move |rim| {
@@ -94,8 +97,8 @@ impl OpaqueQuery {
     /// Whether a triangle satisfies the query.
     fn meets_triangle(&self, corners: [DVec3; 3]) -> bool {
         match *self {
-            Self::Way(way) => crosses(&way, corners),
-            Self::Point(point, reach) => distance_squared(point, corners) <= reach * reach,
+            Self::Way(way) => ray_hits_triangle(&way, corners),
+            Self::Point(point, reach) => squared_distance_to_triangle(point, corners) <= reach * reach,
         }
     }
 
@@ -114,7 +117,7 @@ impl OpaqueQuery {
 }
 
 /// Evaluates each query against the scene's opaque surfaces.
-fn evaluate(
+fn evaluate_queries(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     origin: DVec3,
@@ -127,7 +130,7 @@ fn evaluate(
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if glass_of(scene, meshes, object) == Some(MeshGlass::All) {
+        if object_glass_triangles(scene, meshes, object) == Some(MeshGlass::All) {
             continue;
         }
         token.check()?;
@@ -140,7 +143,7 @@ fn evaluate(
                 });
             }
             LoweredShape::Mesh(placed) => {
-                for corners in triangles(placed, meshes[placed.file], origin) {
+                for corners in placed_triangles(placed, meshes[placed.file], origin) {
                     let around = Aabb::from_points_f64(corners);
                     if around.overlaps(&all) {
                         tree.visit_overlapping(&around, |id| {
@@ -156,20 +159,20 @@ fn evaluate(
 }
 
 /// Returns the triangles of a placed mesh, in coordinates relative to `origin`.
-pub(super) fn triangles<'a>(
-    placed: &Mesh,
+pub(super) fn placed_triangles<'a>(
+    placed: &MeshReference,
     loaded: &'a LoadedMesh,
     origin: DVec3,
 ) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     let own = &loaded.mesh;
-    let place = placed.placed.transform().between(own.origin, origin);
+    let place = placed.placed.transform().relative_to_origins(own.origin, origin);
     let corners = move |number: u32| own.corners(number).map(|corner| place.point(corner.as_dvec3()));
     (0..own.triangles.len() as u32).map(corners)
 }
 
 /// Whether a ray hits a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*,
 /// 1997).
-fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
+fn ray_hits_triangle(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let p = way.direction.cross(ac);
     let determinant = ab.dot(p);
@@ -181,7 +184,7 @@ fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
 }
 
 /// Squared distance between a point and a triangle.
-fn distance_squared(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+fn squared_distance_to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let normal = (b - a).cross(c - a);
     let sides = [[a, b], [b, c], [c, a]];
     let is_over = |[from, to]: [DVec3; 2]| (to - from).cross(point - from).dot(normal) >= 0.0;
@@ -201,11 +204,11 @@ fn distance_squared(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::unit;
+    use crate::math::random::unit_generator;
 
     #[test]
     fn triangle_distance_uses_the_nearest_point() {
-        let mut next = unit(3);
+        let mut next = unit_generator(3);
         let mut place = || DVec3::from_array(std::array::from_fn(|_| f64::from(next()) * 2.0 - 1.0));
         for _ in 0..300 {
             let (corners, point) = ([place(), place(), place()], place() * 1.5);
@@ -218,7 +221,7 @@ mod tests {
                     least = least.min(point.distance(a + (b - a) * u + (c - a) * v));
                 }
             }
-            let distance = distance_squared(point, corners).sqrt();
+            let distance = squared_distance_to_triangle(point, corners).sqrt();
             assert!(
                 (distance - 1e-9..distance + 0.02).contains(&least),
                 "{corners:?} {point}: {distance} {least}"

@@ -1,6 +1,6 @@
 //! Cavities: closed meshes with inward-facing fronts inside another solid of the same glass.
 
-use super::caps::triangles;
+use super::caps::placed_triangles;
 use super::parts::GlassId;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -38,7 +38,7 @@ pub(super) fn cavities(
 ) -> Result<Vec<(usize, usize)>, Cancelled> {
     let corners_of = |object: u32| {
         let mesh = scene.objects[object as usize].shape.mesh();
-        mesh.into_iter().flat_map(|mesh| triangles(mesh, meshes[mesh.file], origin))
+        mesh.into_iter().flat_map(|mesh| placed_triangles(mesh, meshes[mesh.file], origin))
     };
     let order = |holds: fn(f64) -> bool| {
         let mut order: Vec<usize> = (0..closed.len()).filter(|&i| holds(closed[i].volume)).collect();
@@ -74,7 +74,7 @@ fn are_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> 
     let mut hits = vec![0_u32; points.len()];
     for corners in triangles {
         for (hits, &point) in hits.iter_mut().zip(points) {
-            *hits += u32::from(is_ahead(point, corners));
+            *hits += u32::from(parity_ray_hits_triangle(point, corners));
         }
     }
     !hits.is_empty() && hits.iter().all(|hits| hits % 2 == 1)
@@ -83,7 +83,7 @@ fn are_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> 
 /// Whether the ray from a point along [`PARITY_DIRECTION`] hits a triangle. At a shared edge, exactly one
 /// triangle is hit because the edge's product is computed from the endpoints in the same order for both
 /// triangles.
-fn is_ahead(point: DVec3, corners: [DVec3; 3]) -> bool {
+fn parity_ray_hits_triangle(point: DVec3, corners: [DVec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner - point);
     let side = |p: DVec3, q: DVec3| {
         let is_first = p.to_array() <= q.to_array();

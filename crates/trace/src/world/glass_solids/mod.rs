@@ -84,12 +84,12 @@ impl GlassSolids {
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
     pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
-        let parts = GlassParts::of(scene, meshes, token)?;
+        let parts = GlassParts::find(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
         }
-        let mut shared_edges = SharedEdges::between(&parts.list, &parts.rims, token)?;
-        let groups = PartGroups::of(&parts, &shared_edges);
+        let mut shared_edges = SharedEdges::match_rims(&parts.list, &parts.rims, token)?;
+        let groups = PartGroups::from_shared_edges(&parts, &shared_edges);
         // Reopen edges where the relative orientation of two parts differs from the rest of their common
         // border.
         let is_odd = |seam: &&SharedEdge| groups.have_opposite_orientations(seam.parts()) != seam.disagrees;
@@ -99,8 +99,8 @@ impl GlassSolids {
         let mut solids = Self::default();
         let alone = |place| ObjectRole { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
-        let all = groups.members();
-        let holes = Hole::of_all(&parts, &groups, &all, &shared_edges);
+        let all = groups.parts_by_solid();
+        let holes = Hole::find_all(&parts, &groups, &all, &shared_edges);
         let covered = are_holes_covered(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
@@ -113,16 +113,16 @@ impl GlassSolids {
                 let is_inside_out = is_first_part_flipped != groups.flips[part as usize];
                 solids.parts[object as usize] =
                     ObjectRole { place: place.unwrap_or(object), is_inside_out, is_open };
-                solids.open.extend(hole.at(part, object, is_covered));
+                solids.open.extend(hole.open_glass_at_part(part, object, is_covered));
             }
             if hole.part <= NO_HOLE && groups.are_flat(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
             } else if hole.part <= SMALL_HOLE {
-                closed.extend(groups.closed(scene, &parts, members));
+                closed.extend(groups.closed_solid(scene, &parts, members));
             }
         }
         for (cavity, around) in cavities(scene, meshes, parts.origin, &closed, token)? {
-            solids.join(&closed[cavity].objects, &closed[around].objects);
+            solids.merge_cavity(&closed[cavity].objects, &closed[around].objects);
         }
         solids.open.sort_by_key(|open| open.object);
         let is_plain = |(object, part): (u32, &ObjectRole)| *part == alone(object);
@@ -134,7 +134,7 @@ impl GlassSolids {
 
     /// Merges a cavity into the solid around it. The cavity's front remains the outside of the glass, facing
     /// the empty space.
-    fn join(&mut self, cavity: &[u32], around: &[u32]) {
+    fn merge_cavity(&mut self, cavity: &[u32], around: &[u32]) {
         let objects = || cavity.iter().chain(around).map(|&object| object as usize);
         let place = objects().map(|object| self.parts[object].place).max().unwrap_or_default();
         // Cavities merged earlier are already identified with the solid.
@@ -169,12 +169,12 @@ impl GlassSolids {
 
     /// Objects of closed solids that enclose no volume because every face is duplicated with the opposite
     /// orientation.
-    pub fn flat(&self) -> &[u32] {
+    pub fn flat_objects(&self) -> &[u32] {
         &self.flat
     }
 
     /// The objects with holes in their surface, in file order.
-    pub fn open(&self) -> &[OpenGlass] {
+    pub fn open_objects(&self) -> &[OpenGlass] {
         &self.open
     }
 }
@@ -203,7 +203,7 @@ struct PartGroups {
 }
 
 impl PartGroups {
-    fn of(parts: &GlassParts, shared_edges: &SharedEdges) -> Self {
+    fn from_shared_edges(parts: &GlassParts, shared_edges: &SharedEdges) -> Self {
         let mut same: Vec<u32> = (0..parts.list.len() as u32).collect();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts().map(|part| find_set_root(&mut same, part));
@@ -268,7 +268,7 @@ impl PartGroups {
 
     /// Returns the solid if it may be a cavity or contain one. `None` unless it consists only of consistently
     /// oriented meshes.
-    fn closed(&self, scene: &Scene, parts: &GlassParts, members: &[u32]) -> Option<ClosedSolid> {
+    fn closed_solid(&self, scene: &Scene, parts: &GlassParts, members: &[u32]) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
         let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
         let do_agree = members.iter().all(|&part| !self.flips[part as usize]);
@@ -278,7 +278,7 @@ impl PartGroups {
     }
 
     /// Returns the parts of each solid.
-    fn members(&self) -> Vec<Vec<u32>> {
+    fn parts_by_solid(&self) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.roots.len()];
         for (part, &root) in (0..).zip(&self.roots) {
             members[root as usize].push(part);
@@ -312,7 +312,7 @@ struct Hole {
 
 impl Hole {
     /// Returns the holes of all solids.
-    fn of_all(
+    fn find_all(
         parts: &GlassParts,
         groups: &PartGroups,
         all: &[Vec<u32>],
@@ -323,13 +323,18 @@ impl Hole {
             own.entry(groups.roots[open.0.part as usize]).or_default().push(*open);
         }
         let hole = |members: &Vec<u32>| {
-            Self::of(parts, groups, members, own.remove(&members[0]).unwrap_or_default())
+            Self::from_open_edges(parts, groups, members, own.remove(&members[0]).unwrap_or_default())
         };
         all.iter().map(hole).collect()
     }
 
     /// Returns the hole formed by a solid's open edges.
-    fn of(parts: &GlassParts, groups: &PartGroups, members: &[u32], mut own: Vec<OpenEdge>) -> Self {
+    fn from_open_edges(
+        parts: &GlassParts,
+        groups: &PartGroups,
+        members: &[u32],
+        mut own: Vec<OpenEdge>,
+    ) -> Self {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
         }
@@ -367,7 +372,7 @@ impl Hole {
 
     /// Describes the hole where it borders one part. `None` if the part does not border the hole, or if the
     /// hole is attributed to rounding.
-    fn at(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+    fn open_glass_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();
         let disagrees = own().all(|(_, disagrees)| *disagrees);

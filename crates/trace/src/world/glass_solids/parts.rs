@@ -3,12 +3,14 @@
 
 use std::collections::HashMap;
 
-use super::super::lower::file_glass;
+use super::super::lower::file_glass_properties;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
-use crate::scene::description::{MaterialKind, Mesh, NumberSource, Object, Scene, Shape, Sheet};
+use crate::scene::description::{
+    MaterialKind, MeshReference, NumberSource, Object, OpenSurface, Scene, Shape,
+};
 
 /// Chords per circular rim. All rims on one circle use the same points.
 const CHORDS: usize = 32;
@@ -58,11 +60,11 @@ pub(super) struct GlassParts {
 
 impl GlassParts {
     /// Finds all parts in a scene.
-    pub fn of(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = glass_of(scene, meshes, object) else { continue };
+            let Some(glass) = object_glass_triangles(scene, meshes, object) else { continue };
             token.check()?;
             if parts.list.is_empty() {
                 parts.origin = reference_point(&object.shape, meshes);
@@ -72,7 +74,7 @@ impl GlassParts {
                 let loaded = meshes[mesh.file];
                 let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
                 parts.add_mesh(number, mesh, loaded, glass, open);
-            } else if let Some(sheet) = object.shape.sheet() {
+            } else if let Some(sheet) = object.shape.as_open_surface() {
                 parts.add_sheet(number, &sheet);
             }
             for part in &mut parts.list[first..] {
@@ -83,25 +85,25 @@ impl GlassParts {
     }
 
     /// Adds an open shape.
-    fn add_sheet(&mut self, number: u32, sheet: &Sheet) {
+    fn add_sheet(&mut self, number: u32, sheet: &OpenSurface) {
         match *sheet {
-            Sheet::Quad(corners) => self.add_polygon(number, &corners),
-            Sheet::Triangle(corners) => self.add_polygon(number, &corners),
-            Sheet::Disk { center, normal, radius } => {
+            OpenSurface::Quad(corners) => self.add_polygon(number, &corners),
+            OpenSurface::Triangle(corners) => self.add_polygon(number, &corners),
+            OpenSurface::Disk { center, normal, radius } => {
                 let normal = normal.normalize();
                 let area = std::f64::consts::PI * radius * radius;
                 let volume = area * (center - self.origin).dot(normal) / 3.0;
                 self.begin_part(number, (area, volume), radius);
                 self.add_circle(center, normal, radius, center);
             }
-            Sheet::Cylinder { a, b, radius } => {
+            OpenSurface::Cylinder { a, b, radius } => {
                 let axis = (b - a).normalize();
                 let area = std::f64::consts::TAU * radius * a.distance(b);
                 self.begin_part(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
                 self.add_circle(b, -axis, radius, a);
                 self.add_circle(a, axis, radius, b);
             }
-            Sheet::Cone { base, tip, radius } => {
+            OpenSurface::Cone { base, tip, radius } => {
                 let axis = (tip - base).normalize();
                 let area =
                     std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
@@ -155,13 +157,13 @@ impl GlassParts {
     fn add_mesh(
         &mut self,
         object: u32,
-        placed: &Mesh,
+        placed: &MeshReference,
         loaded: &LoadedMesh,
         glass: MeshGlass,
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
-        let place = placed.placed.transform().between(mesh.origin, self.origin);
+        let place = placed.placed.transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
             MeshGlass::All => true,
@@ -201,12 +203,12 @@ impl GlassParts {
 
 /// Returns a point on or inside a shape.
 fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
-    let of_mesh = |placed: &Mesh| {
+    let of_mesh = |placed: &MeshReference| {
         let mesh = &meshes[placed.file].mesh;
         let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
         placed.placed.transform().point(mesh.origin + first)
     };
-    shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
+    shape.representative_point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
 /// Which of an object's triangles are glass.
@@ -219,7 +221,11 @@ pub(super) enum MeshGlass {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
+pub(super) fn object_glass_triangles(
+    scene: &Scene,
+    meshes: &[&LoadedMesh],
+    object: &Object,
+) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
         (None, Some(mesh)) => {
@@ -236,7 +242,8 @@ fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassI
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);
             let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_key();
-            let mut each = meshes[mesh.file].materials.iter().filter_map(file_glass).filter_map(of);
+            let mut each =
+                meshes[mesh.file].materials.iter().filter_map(file_glass_properties).filter_map(of);
             let first = each.next()?;
             each.all(|other| other == first).then_some(first)
         }

@@ -42,7 +42,7 @@ struct HalfEdge {
 }
 
 impl HalfEdge {
-    fn open(&self) -> OpenEdge {
+    fn open_edge(&self) -> OpenEdge {
         let [low, high] = self.places;
         (self.rim, if self.is_back { [high, low] } else { [low, high] })
     }
@@ -58,21 +58,21 @@ impl SharedEdge {
 impl SharedEdges {
     /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them are
     /// paired.
-    pub fn between(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn match_rims(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut edges = Self::default();
-        let sites = EdgeEndpoints::of(parts, rims, token)?;
+        let sites = EdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
-        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
-        let open = edges.join(parts, halves.collect());
+        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.rim_endpoint_ids(i)));
+        let open = edges.match_equal_edges(parts, halves.collect());
         token.check()?;
         // Split the remaining edges at the endpoints of other edges, and match again.
         let split = sites.split_at_endpoints(parts, &open, token)?;
-        edges.open = edges.join(parts, split);
+        edges.open = edges.match_equal_edges(parts, split);
         Ok(edges)
     }
 
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
-    fn join(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
+    fn match_equal_edges(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
         let half = |(rim, [from, to]): OpenEdge| HalfEdge {
             places: [from.min(to), from.max(to)],
             is_back: from > to,
@@ -89,7 +89,8 @@ impl SharedEdges {
         for same in halves.chunk_by(is_same) {
             let mut is_closed = vec![false; same.len()];
             let mut close = |i: usize, j: usize, disagrees: bool| {
-                self.joined.push(SharedEdge { rims: [same[i], same[j]].map(|half| half.open()), disagrees });
+                self.joined
+                    .push(SharedEdge { rims: [same[i], same[j]].map(|half| half.open_edge()), disagrees });
                 (is_closed[i], is_closed[j]) = (true, true);
             };
             match *same {
@@ -99,7 +100,7 @@ impl SharedEdges {
                 _ => pairs_with_glass_between(same).for_each(|[i, j]| close(i, j, false)),
             }
             let left = same.iter().zip(is_closed).filter(|(_, is_closed)| !is_closed);
-            open.extend(left.map(|(half, _)| half.open()));
+            open.extend(left.map(|(half, _)| half.open_edge()));
         }
         open
     }
@@ -147,7 +148,7 @@ struct EdgeEndpoints {
 }
 
 impl EdgeEndpoints {
-    fn of(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+    fn from_rims(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];
         let mut order: Vec<usize> = (0..2 * rims.len()).collect();
@@ -173,7 +174,7 @@ impl EdgeEndpoints {
         let mut same: Vec<u32> = (0..points.len() as u32).collect();
         let tree = Bvh::build(&endpoint_boxes(&points, &tolerances), token)?;
         for (i, (own, tolerance)) in points.iter().zip(&tolerances).enumerate() {
-            tree.visit_overlapping(&around_point(*own, *tolerance), |j| {
+            tree.visit_overlapping(&box_around_point(*own, *tolerance), |j| {
                 let reach = tolerance + tolerances[j as usize];
                 if (j as usize) < i && own.distance_squared(points[j as usize]) <= reach * reach {
                     let (one, other) = (find_set_root(&mut same, i as u32), find_set_root(&mut same, j));
@@ -186,7 +187,7 @@ impl EdgeEndpoints {
         Ok(Self { points, tolerances, ends })
     }
 
-    fn of_rim(&self, rim: usize) -> [u32; 2] {
+    fn rim_endpoint_ids(&self, rim: usize) -> [u32; 2] {
         self.ends[rim]
     }
 
@@ -234,10 +235,10 @@ impl EdgeEndpoints {
 }
 
 fn endpoint_boxes(points: &[DVec3], tolerances: &[f64]) -> Vec<Aabb> {
-    points.iter().zip(tolerances).map(|(&point, &tolerance)| around_point(point, tolerance)).collect()
+    points.iter().zip(tolerances).map(|(&point, &tolerance)| box_around_point(point, tolerance)).collect()
 }
 
-fn around_point(point: DVec3, tolerance: f64) -> Aabb {
+fn box_around_point(point: DVec3, tolerance: f64) -> Aabb {
     Aabb::from_points_f64([point - tolerance, point + tolerance])
 }
 

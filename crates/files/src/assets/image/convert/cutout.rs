@@ -2,7 +2,7 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha, is_channel_constant, linearize_pixel, rgb, sanitize, with_samples};
+use super::{Sample, alpha_sample_index, is_channel_constant, linearize_pixel, rgb, sanitize, with_samples};
 use crate::assets::image::metadata::{AlphaUsage, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorCurve, ImageEncoding};
@@ -16,17 +16,18 @@ pub(super) fn alpha_weighted_texels(
     curve: ColorCurve,
     metadata: &ImageMetadata,
 ) -> Texels {
-    let Some(alpha) = alpha(&image, metadata).filter(|alpha| !is_channel_constant(&image, *alpha, 1.0))
+    let Some(alpha) =
+        alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_constant(&image, *alpha, 1.0))
     else {
         return super::texels(image, curve.encoding(), metadata);
     };
     let (width, height) = (image.width(), image.height());
-    let space = ImageEncoding::CutOut(curve).space(metadata);
+    let space = ImageEncoding::CutOut(curve).color_space(metadata);
     let is_direct = space.is_default() && metadata.alpha != AlphaUsage::Premultiplied;
     let mut unusable = 0;
     let data = match &image {
-        DynamicImage::ImageLumaA8(pixels) if is_direct => bytes(pixels, alpha, curve),
-        DynamicImage::ImageRgba8(pixels) if is_direct => bytes(pixels, alpha, curve),
+        DynamicImage::ImageLumaA8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
+        DynamicImage::ImageRgba8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
         image => {
             let options = CutoutOptions {
                 alpha,
@@ -40,7 +41,7 @@ pub(super) fn alpha_weighted_texels(
     Texels { width, height, data, unusable }
 }
 
-fn bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
+fn rgba_texels_from_bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     let texel = |pixel: &[u8]| {
         let [red, green, blue] = rgb(pixel);
         [red, green, blue, pixel[alpha]]
@@ -70,8 +71,8 @@ enum Linearization {
 }
 
 impl CutoutOptions {
-    fn decoding<T: Sample>(&self) -> Linearization {
-        match (self.curve, T::tables(&self.space)) {
+    fn linearization<T: Sample>(&self) -> Linearization {
+        match (self.curve, T::linearization_tables(&self.space)) {
             (ColorCurve::Linear, _) | (ColorCurve::Auto, None) => Linearization::Linear,
             (ColorCurve::Auto | ColorCurve::Srgb, Some(tables)) if !self.is_premultiplied => {
                 Linearization::Tables(tables)
@@ -83,7 +84,7 @@ impl CutoutOptions {
 
 /// Converts samples to linear colors multiplied by alpha.
 fn alpha_weighted_floats<T: Sample>(samples: &[T], options: &CutoutOptions, unusable: &mut u64) -> TexelData {
-    let decoding = options.decoding::<T>();
+    let decoding = options.linearization::<T>();
     let texel = |pixel: &[T]| {
         let alpha = sanitize(pixel[options.alpha].to_unit_float()).min(1.0);
         let encoded = rgb(pixel).map(T::to_unit_float);

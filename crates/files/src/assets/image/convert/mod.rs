@@ -8,7 +8,7 @@ use ::image::{ColorType, DynamicImage};
 use super::ImageEncoding;
 use super::metadata::{AlphaUsage, ImageMetadata};
 use super::space::ColorSpace;
-use crate::materials::PixelValue;
+use crate::materials::ChannelSelector;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
@@ -44,12 +44,12 @@ trait Sample: Copy + PartialEq {
     fn to_unit_float(self) -> f32;
 
     /// Tables that map every integer to its linear value. `None` for floats, which are already linear.
-    fn tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
+    fn linearization_tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
         None
     }
 
     /// Index of an integer sample in the table.
-    fn index(self) -> usize {
+    fn table_index(self) -> usize {
         0
     }
 }
@@ -59,11 +59,11 @@ impl Sample for u8 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
-    fn tables(space: &ColorSpace) -> Option<[Vec<f32>; 3]> {
-        Some(space.tables(u16::from(Self::MAX)))
+    fn linearization_tables(space: &ColorSpace) -> Option<[Vec<f32>; 3]> {
+        Some(space.linearization_tables(u16::from(Self::MAX)))
     }
 
-    fn index(self) -> usize {
+    fn table_index(self) -> usize {
         usize::from(self)
     }
 }
@@ -73,11 +73,11 @@ impl Sample for u16 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
-    fn tables(space: &ColorSpace) -> Option<[Vec<f32>; 3]> {
-        Some(space.tables(Self::MAX))
+    fn linearization_tables(space: &ColorSpace) -> Option<[Vec<f32>; 3]> {
+        Some(space.linearization_tables(Self::MAX))
     }
 
-    fn index(self) -> usize {
+    fn table_index(self) -> usize {
         usize::from(self)
     }
 }
@@ -94,7 +94,7 @@ fn channel_count(image: &DynamicImage) -> usize {
 }
 
 /// Index of the alpha sample, if the image has alpha.
-fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
+fn alpha_sample_index(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
     let index = match channel_count(image) {
         2 => 1,
         4 => 3,
@@ -109,10 +109,10 @@ fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
 
 /// Whether channel `index` equals `value` in every pixel.
 fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
-    fn all<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
+    fn all_samples_equal<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
         samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)
     }
-    with_samples!(image, samples => all(samples, (channel_count(image), index), value))
+    with_samples!(image, samples => all_samples_equal(samples, (channel_count(image), index), value))
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
@@ -121,21 +121,22 @@ pub(super) fn alpha_warning(
     encoding: ImageEncoding,
     metadata: &ImageMetadata,
 ) -> Option<&'static str> {
-    let ImageEncoding::Number { of: PixelValue::Opacity | PixelValue::Mask { .. }, .. } = encoding else {
+    let ImageEncoding::Number { of: ChannelSelector::Opacity | ChannelSelector::Mask { .. }, .. } = encoding
+    else {
         return None;
     };
     if metadata.alpha == AlphaUsage::Dropped {
         return Some(ALPHA_BIT_IGNORED);
     }
-    let alpha = alpha(image, metadata)?;
+    let alpha = alpha_sample_index(image, metadata)?;
     if is_channel_constant(image, alpha, 0.0) {
         return Some(INVISIBLE);
     }
     match encoding {
-        ImageEncoding::Number { of: PixelValue::Mask { of_any_color }, .. }
+        ImageEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
             if is_channel_constant(image, alpha, 1.0) =>
         {
-            Some(if scalars::is_gray_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
+            Some(if scalars::uses_luminance_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
         }
         _ => None,
     }
@@ -168,23 +169,23 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
     let (width, height) = (image.width(), image.height());
     let channels = channel_count(&image);
     let mut unusable = 0;
-    if !encoding.space(metadata).is_default() {
+    if !encoding.color_space(metadata).is_default() {
         let data = convert_colors(&image, encoding, metadata, &mut unusable);
         return Texels { width, height, data, unusable };
     }
     let data = match image {
-        DynamicImage::ImageLuma8(pixels) => bytes(&pixels, channels, encoding),
-        DynamicImage::ImageLumaA8(pixels) => bytes(&pixels, channels, encoding),
-        DynamicImage::ImageRgb8(pixels) => bytes(&pixels, channels, encoding),
-        DynamicImage::ImageRgba8(pixels) => bytes(&pixels, channels, encoding),
-        DynamicImage::ImageLuma16(pixels) => words(&pixels, channels, encoding),
-        DynamicImage::ImageLumaA16(pixels) => words(&pixels, channels, encoding),
-        DynamicImage::ImageRgb16(pixels) => words(&pixels, channels, encoding),
-        DynamicImage::ImageRgba16(pixels) => words(&pixels, channels, encoding),
-        DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
-        DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
+        DynamicImage::ImageLuma8(pixels) => texels_from_bytes(&pixels, channels, encoding),
+        DynamicImage::ImageLumaA8(pixels) => texels_from_bytes(&pixels, channels, encoding),
+        DynamicImage::ImageRgb8(pixels) => texels_from_bytes(&pixels, channels, encoding),
+        DynamicImage::ImageRgba8(pixels) => texels_from_bytes(&pixels, channels, encoding),
+        DynamicImage::ImageLuma16(pixels) => texels_from_u16(&pixels, channels, encoding),
+        DynamicImage::ImageLumaA16(pixels) => texels_from_u16(&pixels, channels, encoding),
+        DynamicImage::ImageRgb16(pixels) => texels_from_u16(&pixels, channels, encoding),
+        DynamicImage::ImageRgba16(pixels) => texels_from_u16(&pixels, channels, encoding),
+        DynamicImage::ImageRgb32F(pixels) => texels_from_floats(&pixels, channels, encoding, &mut unusable),
+        DynamicImage::ImageRgba32F(pixels) => texels_from_floats(&pixels, channels, encoding, &mut unusable),
         // Formats added in later versions of `image`.
-        other => floats(&other.into_rgb32f(), 3, encoding, &mut unusable),
+        other => texels_from_floats(&other.into_rgb32f(), 3, encoding, &mut unusable),
     };
     Texels { width, height, data, unusable }
 }
@@ -197,12 +198,12 @@ fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     }
 }
 
-fn bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData {
+fn texels_from_bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData {
     let texels = samples.chunks_exact(channels).map(rgb).collect();
     if encoding == ImageEncoding::Linear { TexelData::Linear8(texels) } else { TexelData::Srgb8(texels) }
 }
 
-fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData {
+fn texels_from_u16(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData {
     let value = |word: u16| f32::from(word) / f32::from(u16::MAX);
     let linear: Vec<f32> = match encoding {
         ImageEncoding::Linear | ImageEncoding::Number { .. } | ImageEncoding::CutOut(_) => {
@@ -216,7 +217,12 @@ fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData
     TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
 }
 
-fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding, unusable: &mut u64) -> TexelData {
+fn texels_from_floats(
+    samples: &[f32],
+    channels: usize,
+    encoding: ImageEncoding,
+    unusable: &mut u64,
+) -> TexelData {
     let clean = |value: f32| if value <= LARGEST as f32 { value.max(0.0) } else { 0.0 };
     let decode = |value: f32| match encoding {
         ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
@@ -244,13 +250,13 @@ fn convert_colors(
     metadata: &ImageMetadata,
     unusable: &mut u64,
 ) -> TexelData {
-    fn each<T: Sample>(
+    fn convert_samples<T: Sample>(
         samples: &[T],
         channels: usize,
         (space, is_raw): (&ColorSpace, bool),
         unusable: &mut u64,
     ) -> TexelData {
-        let tables = T::tables(space);
+        let tables = T::linearization_tables(space);
         let mut texel = |pixel| {
             let linear = linearize_pixel(pixel, tables.as_ref());
             let color = space.to_rec_709_color(linear);
@@ -262,16 +268,16 @@ fn convert_colors(
         };
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
-    let space = encoding.space(metadata);
+    let space = encoding.color_space(metadata);
     let options = (&space, encoding == ImageEncoding::Raw);
-    with_samples!(image, samples => each(samples, channel_count(image), options, unusable))
+    with_samples!(image, samples => convert_samples(samples, channel_count(image), options, unusable))
 }
 
 /// Linearizes a pixel, using tables for integers.
 fn linearize_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     let rgb = rgb(pixel);
     match tables {
-        Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].index()]),
+        Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].table_index()]),
         None => rgb.map(T::to_unit_float),
     }
 }

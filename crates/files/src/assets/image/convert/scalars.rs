@@ -2,16 +2,16 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha, channel_count, is_channel_constant, rgb, sanitize, with_samples};
+use super::{Sample, alpha_sample_index, channel_count, is_channel_constant, rgb, sanitize, with_samples};
 use crate::assets::image::metadata::ImageMetadata;
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::{Channel, PixelValue};
+use crate::materials::{Channel, ChannelSelector};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
 /// Samples from which a pixel's scalar is computed.
 #[derive(Clone, Copy)]
-enum ScalarSamples {
+enum ScalarSource {
     /// One sample: its index, and whether it is sRGB.
     Sample(usize, bool),
     /// Luminance of red, green and blue.
@@ -23,70 +23,70 @@ enum ScalarSamples {
 /// Selects the samples from which the scalar is computed.
 fn select_samples(
     image: &DynamicImage,
-    (of, is_srgb): (PixelValue, bool),
+    (of, is_srgb): (ChannelSelector, bool),
     metadata: &ImageMetadata,
-) -> ScalarSamples {
+) -> ScalarSource {
     let is_gray = channel_count(image) < 3;
-    let alpha = alpha(image, metadata);
-    let of_color = |place: usize| ScalarSamples::Sample(if is_gray { 0 } else { place }, is_srgb);
-    let luminance = if is_gray { of_color(0) } else { ScalarSamples::Luminance };
-    let of_alpha = |alpha| ScalarSamples::Sample(alpha, false);
+    let alpha = alpha_sample_index(image, metadata);
+    let of_color = |place: usize| ScalarSource::Sample(if is_gray { 0 } else { place }, is_srgb);
+    let luminance = if is_gray { of_color(0) } else { ScalarSource::Luminance };
+    let of_alpha = |alpha| ScalarSource::Sample(alpha, false);
     match of {
-        PixelValue::Luminance => luminance,
-        PixelValue::Opacity => alpha.map_or(luminance, of_alpha),
-        PixelValue::Mask { of_any_color } => {
+        ChannelSelector::Luminance => luminance,
+        ChannelSelector::Opacity => alpha.map_or(luminance, of_alpha),
+        ChannelSelector::Mask { of_any_color } => {
             let is_alpha = |alpha: &usize| {
-                !is_channel_constant(image, *alpha, 1.0) || !is_gray_mask(image, of_any_color)
+                !is_channel_constant(image, *alpha, 1.0) || !uses_luminance_mask(image, of_any_color)
             };
             alpha.filter(is_alpha).map_or(luminance, of_alpha)
         }
-        PixelValue::Channel(Channel::Red) => of_color(0),
-        PixelValue::Channel(Channel::Green) => of_color(1),
-        PixelValue::Channel(Channel::Blue) => of_color(2),
-        PixelValue::Channel(Channel::Alpha) => alpha.map_or(ScalarSamples::One, of_alpha),
+        ChannelSelector::Channel(Channel::Red) => of_color(0),
+        ChannelSelector::Channel(Channel::Green) => of_color(1),
+        ChannelSelector::Channel(Channel::Blue) => of_color(2),
+        ChannelSelector::Channel(Channel::Alpha) => alpha.map_or(ScalarSource::One, of_alpha),
     }
 }
 
 /// Whether to use an opaque image's luminance as its opacity.
-pub(super) fn is_gray_mask(image: &DynamicImage, of_any_color: bool) -> bool {
+pub(super) fn uses_luminance_mask(image: &DynamicImage, of_any_color: bool) -> bool {
     of_any_color || has_gray_pixels(image)
 }
 
 /// Whether red, green and blue are equal in all pixels.
 fn has_gray_pixels(image: &DynamicImage) -> bool {
-    fn all<T: Sample>(samples: &[T], channels: usize) -> bool {
+    fn all_pixels_gray<T: Sample>(samples: &[T], channels: usize) -> bool {
         samples.chunks_exact(channels).map(rgb).all(|[r, g, b]| r == g && g == b)
     }
-    with_samples!(image, samples => all(samples, channel_count(image)))
+    with_samples!(image, samples => all_pixels_gray(samples, channel_count(image)))
 }
 
 /// Converts an image to texels that contain the scalar in all channels.
 pub(super) fn scalar_texels(
     image: &DynamicImage,
-    of: (PixelValue, bool),
+    of: (ChannelSelector, bool),
     metadata: &ImageMetadata,
 ) -> Texels {
     let (width, height) = (image.width(), image.height());
     let (channels, samples) = (channel_count(image), select_samples(image, of, metadata));
     let mut unusable = 0;
     let data = match (image, samples) {
-        (_, ScalarSamples::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
-        (DynamicImage::ImageLuma8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+        (_, ScalarSource::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
+        (DynamicImage::ImageLuma8(pixels), ScalarSource::Sample(place, is_srgb)) => {
             scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageLumaA8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+        (DynamicImage::ImageLumaA8(pixels), ScalarSource::Sample(place, is_srgb)) => {
             scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageRgb8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+        (DynamicImage::ImageRgb8(pixels), ScalarSource::Sample(place, is_srgb)) => {
             scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageRgba8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+        (DynamicImage::ImageRgba8(pixels), ScalarSource::Sample(place, is_srgb)) => {
             scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
         (image, samples) => {
             let is_srgb = of.1;
             with_samples!(image, pixels => {
-                unusable = unusable_pixels(pixels, channels, samples);
+                unusable = count_unusable_pixels(pixels, channels, samples);
                 scalar_texels_from_samples(pixels, channels, samples, is_srgb)
             })
         }
@@ -95,11 +95,11 @@ pub(super) fn scalar_texels(
 }
 
 /// Counts the pixels in which any used sample is negative, too large or not finite.
-fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamples) -> u64 {
+fn count_unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSource) -> u64 {
     let used = match samples {
-        ScalarSamples::Sample(place, _) => place..place + 1,
-        ScalarSamples::Luminance => 0..3,
-        ScalarSamples::One => 0..0,
+        ScalarSource::Sample(place, _) => place..place + 1,
+        ScalarSource::Luminance => 0..3,
+        ScalarSource::One => 0..0,
     };
     let is_broken = |pixel: &&[T]| {
         !pixel[used.clone()].iter().all(|value| sanitize(value.to_unit_float()) == value.to_unit_float())
@@ -118,7 +118,7 @@ fn scalar_texels_from_bytes(samples: &[u8], (channels, index): (usize, usize), i
 fn scalar_texels_from_samples<T: Sample>(
     all: &[T],
     channels: usize,
-    samples: ScalarSamples,
+    samples: ScalarSource,
     is_srgb: bool,
 ) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
@@ -126,11 +126,11 @@ fn scalar_texels_from_samples<T: Sample>(
         if is_srgb { srgb_to_linear(value) } else { value }
     };
     let number = |pixel: &[T]| match samples {
-        ScalarSamples::Sample(place, is_srgb) => decoded(pixel[place], is_srgb),
-        ScalarSamples::Luminance => {
+        ScalarSource::Sample(place, is_srgb) => decoded(pixel[place], is_srgb),
+        ScalarSource::Luminance => {
             luminance(Vec3::from_array(rgb(pixel).map(|sample| decoded(sample, is_srgb))))
         }
-        ScalarSamples::One => 1.0,
+        ScalarSource::One => 1.0,
     };
     TexelData::Float(all.chunks_exact(channels).map(number).map(Vec3::splat).collect())
 }
@@ -142,7 +142,7 @@ mod tests {
     use crate::assets::image::ImageEncoding;
     use ::image::ImageBuffer;
 
-    fn number(image: DynamicImage, of: PixelValue, is_srgb: bool) -> f32 {
+    fn number(image: DynamicImage, of: ChannelSelector, is_srgb: bool) -> f32 {
         let texels = texels(image, ImageEncoding::Number { of, is_srgb }, &ImageMetadata::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
@@ -153,30 +153,30 @@ mod tests {
     fn pixel_values_are_scalars() {
         let color =
             || DynamicImage::ImageRgba8(ImageBuffer::from_pixel(1, 1, ::image::Rgba([51, 102, 204, 25])));
-        let of = |channel| PixelValue::Channel(channel);
+        let of = |channel| ChannelSelector::Channel(channel);
         for (which, exact) in [
             (of(Channel::Red), 0.2),
             (of(Channel::Green), 0.4),
             (of(Channel::Blue), 0.8),
             (of(Channel::Alpha), 25.0 / 255.0),
-            (PixelValue::Opacity, 25.0 / 255.0),
-            (PixelValue::Luminance, 0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.8),
+            (ChannelSelector::Opacity, 25.0 / 255.0),
+            (ChannelSelector::Luminance, 0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.8),
         ] {
             assert!((number(color(), which, false) - exact).abs() < 1e-4, "{which:?}");
         }
         // Alpha is linear. The other channels are decoded.
-        assert!((number(color(), PixelValue::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
+        assert!((number(color(), ChannelSelector::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
         assert!((number(color(), of(Channel::Blue), true) - srgb_to_linear(0.8)).abs() < 1e-6);
         // Without an alpha channel, alpha is 1, and the opacity is the luminance.
         let gray = || DynamicImage::ImageLuma8(ImageBuffer::from_pixel(1, 1, ::image::Luma([51])));
         assert_eq!(number(gray(), of(Channel::Alpha), false), 1.0);
-        for which in [PixelValue::Opacity, PixelValue::Luminance, of(Channel::Green)] {
+        for which in [ChannelSelector::Opacity, ChannelSelector::Luminance, of(Channel::Green)] {
             assert!((number(gray(), which, false) - 0.2).abs() < 1e-6, "{which:?}");
         }
         let deep =
             || DynamicImage::ImageLumaA16(ImageBuffer::from_pixel(1, 1, ::image::LumaA([13107, 52428])));
-        assert!((number(deep(), PixelValue::Opacity, true) - 0.8).abs() < 1e-6);
-        assert!((number(deep(), PixelValue::Luminance, false) - 0.2).abs() < 1e-6);
+        assert!((number(deep(), ChannelSelector::Opacity, true) - 0.8).abs() < 1e-6);
+        assert!((number(deep(), ChannelSelector::Luminance, false) - 0.2).abs() < 1e-6);
         let float =
             || DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(1, 1, ::image::Rgb([2.0, f32::NAN, -1.0])));
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
@@ -189,7 +189,7 @@ mod tests {
         // A pixel with several unusable samples is counted once.
         let broken = texels(
             float(),
-            ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false },
+            ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false },
             &ImageMetadata::default(),
         );
         assert_eq!(broken.unusable, 1);

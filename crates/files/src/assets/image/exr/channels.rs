@@ -175,7 +175,7 @@ fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
 }
 
 /// Error message for a file without usable channels.
-pub(super) fn no_color(headers: &[Header]) -> String {
+pub(super) fn describe_missing_channels(headers: &[Header]) -> String {
     const MAX_NAMES: usize = 8;
     if headers.iter().all(|header| header.deep) {
         return "deep images are not supported; flatten the image".to_owned();
@@ -184,10 +184,10 @@ pub(super) fn no_color(headers: &[Header]) -> String {
     let mut names = flat.flat_map(|header| &header.channels.list).map(|channel| channel.name.to_string());
     let shown: Vec<_> = names.by_ref().take(MAX_NAMES).collect();
     let more = if names.next().is_some() { ", …" } else { "" };
-    no_usable_channels(&format!("{}{more}", shown.join(", ")))
+    no_usable_channels_message(&format!("{}{more}", shown.join(", ")))
 }
 
 /// Error message for an image without usable channels. `names` lists the channels.
-pub(in crate::assets::image) fn no_usable_channels(names: &str) -> String {
+pub(in crate::assets::image) fn no_usable_channels_message(names: &str) -> String {
     format!("no usable channels among {names}; expected R, G and B, or Y for gray")
 }

@@ -5,7 +5,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
 use super::channels::ChannelIndex;
-use super::{ChannelRow, SAMPLE_BYTES, description};
+use super::{ChannelRow, SAMPLE_BYTES, channel_description};
 use crate::math::DVec3;
 
 /// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
@@ -27,7 +27,7 @@ pub(super) struct LuminanceChroma {
 impl LuminanceChroma {
     pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
-        let (size, step) = (headers[ry.part].layer_size, description(headers, ry).sampling);
+        let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
@@ -35,7 +35,7 @@ impl LuminanceChroma {
     /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
-        let rows = size.height() / description(headers, ry).sampling.y();
+        let rows = size.height() / channel_description(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
@@ -62,17 +62,17 @@ impl LuminanceChroma {
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
-                put(at, luminance_chroma_to_rgb(*luminance, self.interpolated(at), weights));
+                put(at, luminance_chroma_to_rgb(*luminance, self.interpolated_chroma(at), weights));
             }
             return;
         }
-        let mut rows = [-1, 0, 1].map(|row| self.row(row, weights));
+        let mut rows = [-1, 0, 1].map(|row| self.rgb_row(row, weights));
         for y in 0..height {
             for x in 0..width {
                 put([x, y], limit_saturation([&rows[0], &rows[1], &rows[2]], x, weights));
             }
             rows.rotate_left(1);
-            rows[2] = self.row(y as i64 + 2, weights);
+            rows[2] = self.rgb_row(y as i64 + 2, weights);
         }
     }
 
@@ -89,7 +89,7 @@ impl LuminanceChroma {
     }
 
     /// Returns the colors in a row. Rows outside the image repeat rows near the edge.
-    fn row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
+    fn rgb_row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
         let (width, height) = (self.size.width(), self.size.height() as i64);
         let inside = if y >= height { height - 2 } else { y.max(0) } as usize;
         let color = |x: usize| {
@@ -110,7 +110,7 @@ impl LuminanceChroma {
     }
 
     /// Chroma of a pixel, interpolated linearly between rows that have samples.
-    fn interpolated(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+    fn interpolated_chroma(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
         [0, 1].map(|plane| {
             interpolate_linearly(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x])

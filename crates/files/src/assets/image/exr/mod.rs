@@ -20,7 +20,7 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 use super::metadata::{AlphaUsage, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use channels::{ChannelIndex, ChosenChannels, choose_channels, no_color};
+use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_missing_channels};
 use chroma::LuminanceChroma;
 use sampling::{BlockDecompressor, ChannelSampling, SubsamplingHidingReader};
 
@@ -42,11 +42,12 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let file = SubsamplingHidingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
         let Some(channels) = choose_channels(reader.headers()) else {
-            return Err(decoding_error(no_color(reader.headers())));
+            return Err(decoding_error(describe_missing_channels(reader.headers())));
         };
         let decompressor = BlockDecompressor::new(reader.meta_data(), &samplings);
         check_samplings(decompressor.headers(), channels).map_err(decoding_error)?;
-        let needed = channels.all().map(|channel| block_bytes(&reader.headers()[channel.part])).max();
+        let needed =
+            channels.all().map(|channel| decompressed_block_size(&reader.headers()[channel.part])).max();
         let chroma_bytes = channels
             .luminance_chroma_channels()
             .map_or(0, |planes| LuminanceChroma::memory_bytes(decompressor.headers(), planes));
@@ -80,7 +81,7 @@ pub(super) const DEGENERATE_CHROMATICITIES: &str = "degenerate chromaticities ar
 const SIZE_NOT_DIVISIBLE: &str = "the subsampling does not divide the image size";
 const CHROMA_DIFFERS: &str = "channels RY and BY have different subsampling";
 
-pub(super) fn subsampled(channel: &str) -> String {
+pub(super) fn subsampled_channel_message(channel: &str) -> String {
     format!("channel {channel} is subsampled; only RY and BY may be subsampled")
 }
 
@@ -91,7 +92,7 @@ fn primaries(header: &Header) -> Option<Primaries> {
 }
 
 /// Size in bytes of a decompressed block (a tile or several rows), including all channels.
-fn block_bytes(header: &Header) -> u64 {
+fn decompressed_block_size(header: &Header) -> u64 {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (width, height) = match header.blocks {
         BlockDescription::ScanLines => (width, header.compression.scan_lines_per_block().min(height)),
@@ -103,13 +104,13 @@ fn block_bytes(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| description(headers, channel).sampling;
+    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -119,7 +120,9 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     }
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
-        Some(channel) => Err(subsampled(&description(headers, channel).name.to_string())),
+        Some(channel) => {
+            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
+        }
         None => match channels.luminance_chroma_channels() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
@@ -211,7 +214,7 @@ impl PartialImage<'_> {
         let window = header.shared_attributes.display_window;
         let offset = header.own_attributes.layer_position - window.position;
         let slots = self.channels.component_channels();
-        let pixel_bytes = pixel_bytes(self.channels);
+        let pixel_bytes = bytes_per_pixel(self.channels);
         let Ok(row) = usize::try_from(row as i64 + i64::from(offset.y())) else { return };
         let width = window.size.width() * pixel_bytes;
         let Some(row) = samples.chunks_exact_mut(width).nth(row) else { return };
@@ -237,7 +240,7 @@ impl PartialImage<'_> {
         let Some(weights) = weights.or(Primaries::REC_709.luminance_weights()) else { return };
         let offset = header.own_attributes.layer_position - window.position;
         let (width, height) = (window.size.width() as i64, window.size.height() as i64);
-        let bytes = pixel_bytes(self.channels);
+        let bytes = bytes_per_pixel(self.channels);
         planes.for_each_color(weights, |[x, y], color| {
             let (x, y) = (x as i64 + i64::from(offset.x()), y as i64 + i64::from(offset.y()));
             if !(0..width).contains(&x) || !(0..height).contains(&y) {
@@ -251,7 +254,7 @@ impl PartialImage<'_> {
 }
 
 /// Size of a decoded pixel in bytes.
-fn pixel_bytes(channels: ChosenChannels) -> usize {
+fn bytes_per_pixel(channels: ChosenChannels) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
 }
 
@@ -266,7 +269,7 @@ impl ChannelRow<'_> {
     /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item from
     /// `targets`.
     fn for_each_value<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
-        fn each<const N: usize, T>(
+        fn for_each_chunk<const N: usize, T>(
             bytes: &[u8],
             skipped: usize,
             targets: impl Iterator<Item = T>,
@@ -277,13 +280,17 @@ impl ChannelRow<'_> {
         }
         match self.sample_type {
             SampleType::F32 => {
-                each(self.bytes, skipped, targets, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
+                for_each_chunk(self.bytes, skipped, targets, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
             }
             SampleType::F16 => {
-                each(self.bytes, skipped, targets, |at, bytes| put(at, f16::from_ne_bytes(bytes).to_f32()));
+                for_each_chunk(self.bytes, skipped, targets, |at, bytes| {
+                    put(at, f16::from_ne_bytes(bytes).to_f32());
+                });
             }
             SampleType::U32 => {
-                each(self.bytes, skipped, targets, |at, bytes| put(at, u32::from_ne_bytes(bytes) as f32));
+                for_each_chunk(self.bytes, skipped, targets, |at, bytes| {
+                    put(at, u32::from_ne_bytes(bytes) as f32);
+                });
             }
         }
     }

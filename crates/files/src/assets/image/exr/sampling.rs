@@ -47,11 +47,11 @@ impl<'a> HeaderParser<'a> {
         let mut parts = Vec::new();
         loop {
             let mut channels = None;
-            while let name = self.text()?
+            while let name = self.read_c_string()?
                 && !name.is_empty()
             {
-                let kind = self.text()?;
-                let size = self.word()?;
+                let kind = self.read_c_string()?;
+                let size = self.read_u32()?;
                 let start = self.at;
                 if name == b"channels" && kind == b"chlist" {
                     channels = Some(self.channels(start.checked_add(size)?)?);
@@ -69,23 +69,23 @@ impl<'a> HeaderParser<'a> {
     fn channels(&mut self, end: usize) -> Option<Vec<ChannelSampling>> {
         const KIND_BYTES: usize = 8;
         let mut channels = Vec::new();
-        while self.at < end && !self.text()?.is_empty() {
+        while self.at < end && !self.read_c_string()?.is_empty() {
             self.at += KIND_BYTES;
             let at = self.at as u64;
-            channels.push(ChannelSampling { at, step: Vec2(self.word()?, self.word()?) });
+            channels.push(ChannelSampling { at, step: Vec2(self.read_u32()?, self.read_u32()?) });
         }
         Some(channels)
     }
 
     /// Reads a zero-terminated string.
-    fn text(&mut self) -> Option<&'a [u8]> {
+    fn read_c_string(&mut self) -> Option<&'a [u8]> {
         let rest = self.bytes.get(self.at..)?;
         let end = memchr::memchr(0, rest)?;
         self.at += end + 1;
         Some(&rest[..end])
     }
 
-    fn word(&mut self) -> Option<usize> {
+    fn read_u32(&mut self) -> Option<usize> {
         let word = self.bytes.get(self.at..)?.first_chunk()?;
         self.at += 4;
         usize::try_from(i32::from_le_bytes(*word)).ok()
@@ -158,7 +158,7 @@ impl BlockDecompressor {
         let pixels = header.get_absolute_block_pixel_coordinates(tile)?;
         let top = usize::try_from(pixels.position.y()).unwrap_or_default();
         let rows = top..top + pixels.size.height();
-        let bytes: usize = rows.map(|row| row_bytes(header, row, pixels.size.width())).sum();
+        let bytes: usize = rows.map(|row| row_size_in_bytes(header, row, pixels.size.width())).sum();
         // `exr` expects the block size to be a multiple of the number of pixels.
         if !bytes.is_multiple_of(pixels.size.area()) {
             return Err(Error::NotSupported("this channel subsampling".into()));
@@ -183,7 +183,7 @@ fn is_subsampled(header: &Header) -> bool {
 }
 
 /// Size in bytes of a row of pixels, including all channels.
-fn row_bytes(header: &Header, row: usize, width: usize) -> usize {
+fn row_size_in_bytes(header: &Header, row: usize, width: usize) -> usize {
     let channels = header.channels.list.iter().filter(|channel| row.is_multiple_of(channel.sampling.y()));
     channels.map(|channel| width / channel.sampling.x() * channel.sample_type.bytes_per_sample()).sum()
 }

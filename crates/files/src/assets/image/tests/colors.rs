@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ::png::{BitDepth, ColorType, Encoder, Info, ScaledFloat, SourceChromaticities, SrgbRenderingIntent};
 
 use super::*;
-use crate::assets::image::space::Curve;
+use crate::assets::image::space::TransferFunction;
 
 /// A PNG with a single pixel.
 fn png(change: impl FnOnce(&mut Info<'static>)) -> Vec<u8> {
@@ -178,7 +178,7 @@ fn unsupported_profiles_cause_warnings() {
     let tables = icc(b"RGB ", b"Lab ", &[(b"A2B0", vec![0; 40])]);
     let flat = rgb_profile([SRGB[0]; 3], curv(&[]));
     for (bytes, reason) in [
-        (cmyk, icc::wrong_space("CMYK", false)),
+        (cmyk, icc::wrong_color_space_message("CMYK", false)),
         (tables, icc::LOOKUP_TABLES.to_owned()),
         (flat, icc::DEGENERATE_PRIMARIES.to_owned()),
         (b"no profile".to_vec(), icc::MALFORMED.to_owned()),
@@ -187,7 +187,7 @@ fn unsupported_profiles_cause_warnings() {
         let file = png(profile(bytes));
         assert!(is_plain(&file), "{reason}");
         let warnings = warnings_of("a.png", &file, ImageEncoding::Color);
-        assert_eq!(warnings, [format!("a.png: {}", profile_ignored(&reason))]);
+        assert_eq!(warnings, [format!("a.png: {}", profile_ignored_warning(&reason))]);
         assert_eq!(warnings_of("a.png", &file, ImageEncoding::Srgb), warnings);
     }
     let whole = rgb_profile(SRGB, para(3, &SRGB_CURVE));
@@ -209,10 +209,15 @@ fn code_points_have_the_highest_precedence() {
     let of = |primaries, transfer| color(&points([primaries, transfer, 0, 1]));
     assert!(is_near(of(12, 13), P3));
     assert!(is_near(of(1, 8), power(1.0)));
-    let of_curve =
-        |curve: Curve| Vec3::from_array([188.0, 128.0, 64.0].map(|x| curve.decode(x / 255.0) as f32));
-    for (transfer, curve) in [(16, Curve::Pq), (18, Curve::Hlg), (7, Curve::SMPTE_240M), (11, Curve::REC_709)]
-    {
+    let of_curve = |curve: TransferFunction| {
+        Vec3::from_array([188.0, 128.0, 64.0].map(|x| curve.decode(x / 255.0) as f32))
+    };
+    for (transfer, curve) in [
+        (16, TransferFunction::Pq),
+        (18, TransferFunction::Hlg),
+        (7, TransferFunction::SMPTE_240M),
+        (11, TransferFunction::REC_709),
+    ] {
         assert!(is_near(of(1, transfer), of_curve(curve)), "{transfer}");
     }
     for primaries in [1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 22] {
@@ -246,7 +251,7 @@ fn scene_encoding_overrides_the_file() {
         ] {
             assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
         }
-        let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
+        let number = ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
         let scalar = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
         assert_eq!(scalar(&file), scalar(&png(|_| {})));
     }

@@ -55,14 +55,14 @@ fn masks_without_alpha_use_the_luminance() {
     let number = |image: DynamicImage, of| {
         texels(image, ImageEncoding::Number { of, is_srgb: false }, AlphaUsage::Straight).get(0, 0).x
     };
-    let mask = |of_any_color| PixelValue::Mask { of_any_color };
+    let mask = |of_any_color| ChannelSelector::Mask { of_any_color };
     let gray = || bytes(&[[51, 51, 51, 255], [0, 0, 0, 255]]);
     let red = || bytes(&[[255, 0, 0, 255]]);
     for (image, of, expected) in [
         (gray(), mask(false), 0.2),
         (gray(), mask(true), 0.2),
-        (gray(), PixelValue::Opacity, 1.0),
-        (gray(), PixelValue::Channel(Channel::Alpha), 1.0),
+        (gray(), ChannelSelector::Opacity, 1.0),
+        (gray(), ChannelSelector::Channel(Channel::Alpha), 1.0),
         (red(), mask(false), 1.0),
         (red(), mask(true), 0.2126),
         (bytes(&[[51, 51, 51, 102], [0, 0, 0, 255]]), mask(true), 0.4),
@@ -75,7 +75,7 @@ fn masks_without_alpha_use_the_luminance() {
     };
     assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));
     assert_eq!(warning(red(), mask(false)), Some(convert::OPAQUE));
-    assert_eq!(warning(bytes(&[[1, 2, 3, 0]]), PixelValue::Opacity), Some(convert::INVISIBLE));
-    assert_eq!(warning(red(), PixelValue::Opacity), None);
+    assert_eq!(warning(bytes(&[[1, 2, 3, 0]]), ChannelSelector::Opacity), Some(convert::INVISIBLE));
+    assert_eq!(warning(red(), ChannelSelector::Opacity), None);
     assert_eq!(warning(bytes(&[[1, 2, 3, 9], [1, 2, 3, 255]]), mask(false)), None);
 }

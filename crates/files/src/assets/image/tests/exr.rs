@@ -6,8 +6,10 @@ use ::exr::meta::attribute::Chromaticities;
 use ::exr::prelude::*;
 
 use super::*;
-use crate::assets::image::exr::channels::no_usable_channels;
-use crate::assets::image::exr::{DEGENERATE_CHROMATICITIES, subsampled as subsampled_channel};
+use crate::assets::image::exr::channels::no_usable_channels_message;
+use crate::assets::image::exr::{
+    DEGENERATE_CHROMATICITIES, subsampled_channel_message as subsampled_channel,
+};
 
 const SIZE: Vec2<usize> = Vec2(2, 2);
 
@@ -158,7 +160,7 @@ fn unusable_channels_are_rejected() {
         (&["Y", "X", "depth"], "X, Y, depth"),
     ] {
         let reason = rejected(names);
-        assert!(reason.ends_with(&no_usable_channels(shown)), "{reason}");
+        assert!(reason.ends_with(&no_usable_channels_message(shown)), "{reason}");
     }
     let whole = single_layer(vec![("Y", floats(RAMP))]);
     for length in 0..whole.len() {
@@ -193,7 +195,7 @@ fn colors_may_be_split_across_parts() {
     for vector in [&["X", "Y", "Z"][..], &["R", "G"], &["u.Y", "u.X"]] {
         let channels: Vec<_> = vector.iter().map(|name| (*name, RAMP)).collect();
         let reason = error("a.exr", &parts(&channels));
-        assert!(reason.ends_with(&no_usable_channels(&vector.join(", "))), "{reason}");
+        assert!(reason.ends_with(&no_usable_channels_message(&vector.join(", "))), "{reason}");
     }
 }
 

@@ -1,7 +1,9 @@
 //! Tests for Radiance HDR files from various programs.
 
 use super::*;
-use crate::assets::image::hdr::{RUN_TOO_LONG, WRONG_LENGTH, line_ignored, unsupported_encoding};
+use crate::assets::image::hdr::{
+    RUN_TOO_LONG, WRONG_LENGTH, line_ignored_warning, unsupported_format_message,
+};
 
 /// A pixel with exponent 129, so one mantissa step is 1/128.
 const PIXEL: [u8; 4] = [128, 64, 32, 129];
@@ -36,9 +38,9 @@ fn header_variants_are_read() {
             assert_eq!(texels(&file, ImageEncoding::Color), [Vec3::new(1.0, 0.5, 0.25)], "{start}{rest}");
         }
     }
-    assert_eq!(error("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd"), unknown_format());
+    assert_eq!(error("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd"), unknown_format_message());
     let unknown = error("a.hdr", &file("FORMAT=32-bit_rle_xyzw\n", "-Y 1 +X 1", &PIXEL));
-    assert!(unknown.ends_with(&unsupported_encoding("32-bit_rle_xyzw")), "{unknown}");
+    assert!(unknown.ends_with(&unsupported_format_message("32-bit_rle_xyzw")), "{unknown}");
     for size in ["-Y 1 +Y 1", "-Y 1", "X 1 Y 1", "-Y -1 +X 1", "-Y 1 +X 1 2"] {
         assert!(load_bytes("a.hdr", &file("", size, &PIXEL), ImageEncoding::Color).is_err(), "{size}");
     }
@@ -60,7 +62,7 @@ fn all_orientations_decode_to_the_same_image() {
         let pixels: Vec<u8> = order.iter().flat_map(|&number| [number, 0, 0, 136]).collect();
         let image = load_bytes("a.hdr", &file("", size, &pixels), ImageEncoding::Color).expect(size);
         assert_eq!((image.width, image.height), (3, 2), "{size}");
-        let reds: Vec<f32> = (0..6).map(|index| image.at(index).x).collect();
+        let reds: Vec<f32> = (0..6).map(|index| image.linear_value(index).x).collect();
         assert_eq!(reds, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "{size}");
     }
 }
@@ -75,7 +77,7 @@ fn values_are_divided_by_exposure_and_correction() {
     // Lines quoted from other headers are ignored.
     assert_eq!(single_pixel("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
     // The exposure applies to all encodings.
-    let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
+    let number = ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
     for encoding in [ImageEncoding::Linear, ImageEncoding::Raw, number] {
         let [plain, divided] =
             ["", "EXPOSURE=2\n"].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding)[0]);
@@ -85,7 +87,7 @@ fn values_are_divided_by_exposure_and_correction() {
         let file = file(&format!("# first\n{line}\n"), "-Y 1 +X 1", &PIXEL);
         assert_eq!(texels(&file, ImageEncoding::Color), [plain], "{line}");
         let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
-        assert_eq!(warnings, [format!("a.hdr:3: {}", line_ignored(line))]);
+        assert_eq!(warnings, [format!("a.hdr:3: {}", line_ignored_warning(line))]);
     }
 }
 
@@ -111,7 +113,7 @@ fn primaries_are_converted() {
     for broken in ["PRIMARIES=.64 .33 .3 .6 .15 .06", "PRIMARIES=0 0 0 0 0 0 0 0"] {
         let file = file(&format!("{broken}\n"), "-Y 1 +X 1", &PIXEL);
         let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
-        assert_eq!(warnings, [format!("a.hdr:2: {}", line_ignored(broken))]);
+        assert_eq!(warnings, [format!("a.hdr:2: {}", line_ignored_warning(broken))]);
     }
 }
 
@@ -166,5 +168,5 @@ fn malformed_runs_are_rejected() {
     assert!(fails("-Y 1 +X 2", &[1, 1, 1, 1], RUN_TOO_LONG));
     assert!(fails("-Y 1 +X 2", &[9, 1, 1, 1, 1, 1, 1, 255], RUN_TOO_LONG));
     assert!(fails("-Y 1 +X 2", &PIXEL, jpeg::TRUNCATED));
-    assert!(fails("-Y 2 +X 0", &PIXEL, &empty_image(0, 2)));
+    assert!(fails("-Y 2 +X 0", &PIXEL, &empty_image_message(0, 2)));
 }

@@ -19,7 +19,7 @@ fn file(alpha_bits: u8, pixel: [u8; 4], kind: Option<u8>) -> Vec<u8> {
 }
 
 fn opacity(file: &[u8]) -> f32 {
-    let encoding = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
+    let encoding = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     load_bytes("a.tga", file, encoding).expect("a TGA").get(0, 0).x
 }
 
@@ -80,14 +80,14 @@ fn sixteen_bit_gray_has_alpha() {
 
 #[test]
 fn ignored_alpha_bit_causes_a_warning() {
-    let warnings = |file: &[u8], of: PixelValue| {
+    let warnings = |file: &[u8], of: ChannelSelector| {
         warnings_of("a.tga", file, ImageEncoding::Number { of, is_srgb: false })
     };
     let pixels = [0x1f, 0x80, 0x1f, 0x00];
-    let warned = warnings(&row([2, 16, 1], &pixels), PixelValue::Opacity);
+    let warned = warnings(&row([2, 16, 1], &pixels), ChannelSelector::Opacity);
     assert!(warned.len() == 1 && warned[0].contains("alpha bit"), "{warned:?}");
-    assert_eq!(warnings(&row([2, 16, 0], &pixels), PixelValue::Opacity), [""; 0]);
-    assert_eq!(warnings(&row([2, 16, 1], &pixels), PixelValue::Luminance), [""; 0]);
+    assert_eq!(warnings(&row([2, 16, 0], &pixels), ChannelSelector::Opacity), [""; 0]);
+    assert_eq!(warnings(&row([2, 16, 1], &pixels), ChannelSelector::Luminance), [""; 0]);
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn impossible_alpha_bits_are_ignored() {
 fn all_zero_bmp_alpha_is_ignored() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.bmp");
-    let number = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
+    let number = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     for (alpha, expected) in [([0, 0], [1.0, 1.0]), ([0, 51], [0.0, 0.2])] {
         let pixels = [255, 255, 255, alpha[0], 255, 255, 255, alpha[1]];
         save_buffer(&path, &pixels, 2, 1, ExtendedColorType::Rgba8).expect("written");

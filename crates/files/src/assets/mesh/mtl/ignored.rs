@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::map::{Map, MapKind};
-use super::material::{is_opaque_despite_tr, material};
+use super::material::{is_opaque_despite_tr, to_file_material};
 use super::statements::{MtlColor, MtlNumber};
 use super::{MtlMaterial, WithLine};
 use crate::assets::{FileMaterial, FileMaterialKind};
@@ -18,7 +18,7 @@ pub(in crate::assets::mesh) struct IgnoredStatement {
 }
 
 /// Collects warnings about a file and its used materials. Warnings shared by several materials are merged.
-pub(in crate::assets::mesh) fn warnings<'a>(
+pub(in crate::assets::mesh) fn collect_warnings<'a>(
     path: &Path,
     of_file: Vec<IgnoredStatement>,
     materials: impl Iterator<Item = &'a MtlMaterial>,
@@ -46,7 +46,7 @@ pub(in crate::assets::mesh) fn warnings<'a>(
 }
 
 fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
-    let converted = material(found, Path::new(""));
+    let converted = to_file_material(found, Path::new(""));
     let mut ignored = found.ignored.clone();
     let mut add = |line: Option<usize>, words: &str| {
         ignored.push(IgnoredStatement { line: line.unwrap_or(found.line), words: words.to_owned() });
@@ -82,15 +82,15 @@ const LOW_IOR: &str = "`Ni` is ignored because it is not above 1; 1.5 is used";
 const SECOND_NORMAL_MAP: &str = "`bump` has no effect because the material has a normal map";
 pub(super) const AMBIENT_MAP: &str = "`map_Ka` is not supported; ambient light uses the diffuse color";
 
-pub(super) fn statement_ignored(keyword: &str) -> String {
+pub(super) fn ignored_statement_warning(keyword: &str) -> String {
     format!("`{keyword}` is ignored")
 }
 
-pub(super) fn map_unsupported(keyword: &str) -> String {
+pub(super) fn unsupported_map_warning(keyword: &str) -> String {
     format!("`{keyword}` is not supported")
 }
 
-fn without_effect(keyword: &str, kind: FileMaterialKind<'_>) -> String {
+fn no_effect_warning(keyword: &str, kind: FileMaterialKind<'_>) -> String {
     let kind = match kind {
         FileMaterialKind::Phong => "Phong materials",
         FileMaterialKind::Principled(_) => "materials with PBR statements",
@@ -122,7 +122,7 @@ fn warn_about_illumination(
         11.. => add(model, UNKNOWN_MODEL),
         1..=9 => {}
     }
-    let ior = found.number_at(MtlNumber::Ior);
+    let ior = found.number_with_line(MtlNumber::Ior);
     match converted.kind() {
         FileMaterialKind::Glass if converted.ior <= 1.0 => add(model, INVISIBLE_GLASS),
         FileMaterialKind::Glass | FileMaterialKind::Principled(_)
@@ -140,7 +140,7 @@ fn warn_about_illumination(
     if converted.emission != Vec3::ZERO && !converted.emits() {
         let emission = found.color(MtlColor::Emission);
         if emission.is_some() {
-            add(line(emission), &without_effect("Ke", converted.kind()));
+            add(line(emission), &no_effect_warning("Ke", converted.kind()));
         }
     }
 }
@@ -158,7 +158,7 @@ fn warn_about_opacity(
         return;
     }
     let [opacity, transparency] =
-        [MtlNumber::Dissolve, MtlNumber::Transparency].map(|of| found.number_at(of));
+        [MtlNumber::Dissolve, MtlNumber::Transparency].map(|of| found.number_with_line(of));
     if converted.opacity_texture.is_some() {
         let given = opacity.or(transparency).filter(|_| converted.opacity < 1.0);
         given.iter().for_each(|at| add(Some(at.line), OPACITY_MAP));
@@ -227,15 +227,15 @@ fn warn_about_phong(
 
 /// Warns about parameters of the PBR extension that have no effect.
 fn warn_about_pbr(found: &MtlMaterial, converted: &FileMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
-    let nonzero = |number: MtlNumber| found.number_at(number).filter(|at| at.value != 0.0);
+    let nonzero = |number: MtlNumber| found.number_with_line(number).filter(|at| at.value != 0.0);
     for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
         if let Some(at) = nonzero(number) {
-            add(Some(at.line), &statement_ignored(number.keyword()));
+            add(Some(at.line), &ignored_statement_warning(number.keyword()));
         }
     }
     for number in [MtlNumber::Metallic, MtlNumber::Coat] {
         if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
-            add(Some(at.line), &without_effect(number.keyword(), converted.kind()));
+            add(Some(at.line), &no_effect_warning(number.keyword(), converted.kind()));
         }
     }
 }
@@ -250,7 +250,7 @@ fn warn_about_map(
     let line = Some(map.line);
     let physical = converted.physical.as_ref();
     let texture = match kind {
-        MapKind::Other(name) => return add(line, &map_unsupported(name)),
+        MapKind::Other(name) => return add(line, &unsupported_map_warning(name)),
         MapKind::Ambient => {
             let is_diffuse = found
                 .map(MapKind::Diffuse)
@@ -276,7 +276,7 @@ fn warn_about_map(
             FileMaterialKind::Principled(_)
             | FileMaterialKind::Coated
             | FileMaterialKind::Mirror
-            | FileMaterialKind::Glass => add(line, &without_effect(kind.keyword(), converted.kind())),
+            | FileMaterialKind::Glass => add(line, &no_effect_warning(kind.keyword(), converted.kind())),
         }
         return;
     }

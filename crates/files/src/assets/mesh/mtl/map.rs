@@ -5,7 +5,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use crate::assets::{FileLine, FileTexture};
-use crate::materials::{Channel, PixelValue};
+use crate::materials::{Channel, ChannelSelector};
 use crate::math::limits::{LARGEST, is_too_short};
 use crate::math::{DVec2, Vec2};
 
@@ -109,7 +109,7 @@ pub(super) struct Map {
     range: [f64; 2],
     is_clamped: bool,
     /// Channel to read as a scalar, if specified.
-    number: Option<PixelValue>,
+    number: Option<ChannelSelector>,
     /// Scale factor for the normal map's slopes.
     pub(super) strength: f64,
     /// Warnings about options.
@@ -133,38 +133,38 @@ impl Map {
             name: String::new(),
         };
         let mut rest = MapArguments(text.trim());
-        while let Some(option) = rest.option() {
+        while let Some(option) = rest.next_option() {
             let start = rest.0;
-            if !map.add(&option, &mut rest) {
+            if !map.parse_option_arguments(&option, &mut rest) {
                 let arguments = start[..start.len() - rest.0.len()].trim_end();
                 let option = format!("{option} {arguments}");
-                map.warnings.push(option_ignored(option.trim_end()));
+                map.warnings.push(ignored_option_warning(option.trim_end()));
             }
         }
         // Some exporters quote names that contain spaces.
         let name = rest.0;
         map.name = name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).to_owned();
         let first = map.name.split_whitespace().next().filter(|first| first.len() < map.name.len());
-        map.warnings.extend(first.filter(|first| is_like_option(first)).map(not_an_option));
+        map.warnings.extend(first.filter(|first| is_like_option(first)).map(not_an_option_warning));
         (!map.name.is_empty()).then_some(map)
     }
 
     /// Parses an option's arguments. Returns whether all of them are usable.
-    fn add(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
+    fn parse_option_arguments(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
         match option {
             "-s" => {
                 let scale = rest.numbers([1.0; 3]).filter(|[u, v, _]| !is_zero(*u) && !is_zero(*v));
-                set(&mut self.repeat, scale.map(|[u, v, _]| [u, v]))
+                set_if_some(&mut self.repeat, scale.map(|[u, v, _]| [u, v]))
             }
-            "-o" => set(&mut self.offset, rest.numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
+            "-o" => set_if_some(&mut self.offset, rest.numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
             "-t" => rest.numbers([0.0; 3]) == Some([0.0; 3]),
-            "-mm" => set(&mut self.range, rest.numbers([0.0, 1.0])),
+            "-mm" => set_if_some(&mut self.range, rest.numbers([0.0, 1.0])),
             "-bm" => {
                 let strength = rest.numbers([1.0]).filter(|[strength]| *strength >= 0.0);
-                set(&mut self.strength, strength.map(|[strength]| strength))
+                set_if_some(&mut self.strength, strength.map(|[strength]| strength))
             }
-            "-clamp" => set(&mut self.is_clamped, rest.next_switch()),
-            "-imfchan" => set(&mut self.number, rest.word().and_then(channel).map(Some)),
+            "-clamp" => set_if_some(&mut self.is_clamped, rest.next_switch()),
+            "-imfchan" => set_if_some(&mut self.number, rest.word().and_then(parse_channel).map(Some)),
             "-boost" | "-texres" => rest.numbers([0.0]) == Some([0.0]),
             "-blendu" | "-blendv" => rest.next_switch() == Some(true),
             "-cc" => rest.next_switch() == Some(false),
@@ -186,14 +186,14 @@ impl Map {
         let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then_some("-imfchan");
         let range = (self.range != [0.0, 1.0] && kind.is_normal()).then_some("-mm");
         let strength = (self.strength != 1.0 && !kind.is_normal()).then_some("-bm");
-        let unused = channel.into_iter().chain(range).chain(strength).map(option_ignored);
+        let unused = channel.into_iter().chain(range).chain(strength).map(ignored_option_warning);
         self.warnings.iter().cloned().chain(unused)
     }
 
     /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
     /// name without what may be a comment.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
-        without_trailing_comments(&self.name).flat_map(|name| decoded_paths(&name.replace('\\', "/")))
+        without_trailing_comments(&self.name).flat_map(|name| utf8_and_latin1_paths(&name.replace('\\', "/")))
     }
 
     /// Returns the texture for this map in the MTL file at `library`. Its path is the first candidate that
@@ -215,7 +215,7 @@ impl Map {
 }
 
 /// Sets a field unless the value is `None`. Returns whether it was set.
-fn set<T>(field: &mut T, value: Option<T>) -> bool {
+fn set_if_some<T>(field: &mut T, value: Option<T>) -> bool {
     let is_set = value.is_some();
     if let Some(value) = value {
         *field = value;
@@ -224,13 +224,13 @@ fn set<T>(field: &mut T, value: Option<T>) -> bool {
 }
 
 /// Returns the channel that `-imfchan` selects.
-fn channel(letter: &str) -> Option<PixelValue> {
+fn parse_channel(letter: &str) -> Option<ChannelSelector> {
     match letter.to_ascii_lowercase().as_str() {
-        "r" => Some(PixelValue::Channel(Channel::Red)),
-        "g" => Some(PixelValue::Channel(Channel::Green)),
-        "b" => Some(PixelValue::Channel(Channel::Blue)),
-        "m" => Some(PixelValue::Channel(Channel::Alpha)),
-        "l" => Some(PixelValue::Luminance),
+        "r" => Some(ChannelSelector::Channel(Channel::Red)),
+        "g" => Some(ChannelSelector::Channel(Channel::Green)),
+        "b" => Some(ChannelSelector::Channel(Channel::Blue)),
+        "m" => Some(ChannelSelector::Channel(Channel::Alpha)),
+        "l" => Some(ChannelSelector::Luminance),
         _ => None,
     }
 }
@@ -246,11 +246,11 @@ fn is_like_option(word: &str) -> bool {
         .is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()))
 }
 
-pub(super) fn option_ignored(option: &str) -> String {
+pub(super) fn ignored_option_warning(option: &str) -> String {
     format!("option `{option}` is ignored")
 }
 
-pub(super) fn not_an_option(word: &str) -> String {
+pub(super) fn not_an_option_warning(word: &str) -> String {
     format!("`{word}` is not a map option; it is read as part of the file name")
 }
 
@@ -261,7 +261,7 @@ struct MapArguments<'a>(&'a str);
 impl<'a> MapArguments<'a> {
     /// Consumes an option and returns it in lowercase. An unknown option is recognized only if a number or a
     /// switch follows it. Any other word starts the file name, even if it begins with a dash.
-    fn option(&mut self) -> Option<String> {
+    fn next_option(&mut self) -> Option<String> {
         const OPTIONS: [&str; 14] = [
             "-s",
             "-o",
@@ -340,7 +340,7 @@ pub(in crate::assets::mesh) fn without_trailing_comments(text: &str) -> impl Ite
 }
 
 /// Yields the name encoded as UTF-8, and also as Latin-1 if it has non-ASCII letters.
-pub(in crate::assets::mesh) fn decoded_paths(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
+pub(in crate::assets::mesh) fn utf8_and_latin1_paths(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
     let latin1: Option<Vec<u8>> = name.chars().map(|letter| u8::try_from(u32::from(letter)).ok()).collect();
     let latin1 = latin1.filter(|_| !name.is_ascii()).map(|bytes| PathBuf::from(OsStr::from_bytes(&bytes)));
     std::iter::once(PathBuf::from(name)).chain(latin1)

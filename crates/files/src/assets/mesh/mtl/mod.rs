@@ -7,12 +7,12 @@ mod statements;
 
 use std::path::{Path, PathBuf};
 
-use super::text::{decoded, strip_byte_order_mark, with_line_feeds};
+use super::text::{convert_mac_line_ends, decode_line, strip_byte_order_mark};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
-pub(super) use ignored::{IgnoredStatement, warnings};
-pub(super) use map::{decoded_paths, first_existing, without_trailing_comments};
-pub(super) use material::material;
+pub(super) use ignored::{IgnoredStatement, collect_warnings};
+pub(super) use map::{first_existing, utf8_and_latin1_paths, without_trailing_comments};
+pub(super) use material::to_file_material;
 use statements::{MtlColor, MtlNumber, Statement};
 
 /// Maximum size of an MTL file.
@@ -54,10 +54,10 @@ impl MtlMaterial {
     }
 
     fn number(&self, number: MtlNumber) -> Option<f64> {
-        self.number_at(number).map(|number| number.value)
+        self.number_with_line(number).map(|number| number.value)
     }
 
-    fn number_at(&self, number: MtlNumber) -> Option<WithLine<f64>> {
+    fn number_with_line(&self, number: MtlNumber) -> Option<WithLine<f64>> {
         self.numbers[number as usize]
     }
 
@@ -78,18 +78,18 @@ impl MtlMaterial {
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, AssetError> {
     let quiet = Monitor { progress: &crate::control::ignore_progress, ..monitor };
-    let bytes = read::text(path, FILE_LIMIT, quiet)?;
+    let bytes = read::read_text(path, FILE_LIMIT, quiet)?;
     let hash = read::hash(&bytes);
-    let bytes = with_line_feeds(strip_byte_order_mark(&bytes));
+    let bytes = convert_mac_line_ends(strip_byte_order_mark(&bytes));
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
-        let line = decoded(line);
+        let line = decode_line(line);
         let mut warnings = Vec::new();
         let statement = statements::parse(&line, &mut warnings)
             .map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
         library.add(statement, index + 1, warnings);
     }
-    library.add_duplicates();
+    library.warn_about_duplicates();
     Ok(library)
 }
 
@@ -97,7 +97,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
 /// statements, and if the map statement is invalid.
 pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    match statements::parse(&decoded(line), &mut Vec::new()) {
+    match statements::parse(&decode_line(line), &mut Vec::new()) {
         Ok(Statement::Map(_, map)) => map.candidate_paths().map(|file| folder.join(file)).collect(),
         Ok(
             Statement::Nothing
@@ -144,11 +144,11 @@ impl MtlLibrary {
     }
 
     /// Warns about materials with the same name. The last one is used.
-    fn add_duplicates(&mut self) {
+    fn warn_about_duplicates(&mut self) {
         let mut seen = std::collections::HashMap::new();
         for material in &self.materials {
             if let Some(first) = seen.insert(material.name.as_str(), material.line) {
-                let words = duplicate_material(&material.name, first);
+                let words = duplicate_material_warning(&material.name, first);
                 self.ignored.push(IgnoredStatement { line: material.line, words });
             }
         }
@@ -157,7 +157,7 @@ impl MtlLibrary {
 
 const NO_MATERIAL_YET: &str = "statements before the first `newmtl` are ignored";
 
-fn duplicate_material(name: &str, first: usize) -> String {
+fn duplicate_material_warning(name: &str, first: usize) -> String {
     format!("material {name:?} replaces the one defined on line {first}")
 }
 

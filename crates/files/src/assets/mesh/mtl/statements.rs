@@ -1,6 +1,6 @@
 //! Parses lines from an MTL file. Keywords are case-insensitive.
 
-use super::map::{Map, MapKind, option_ignored};
+use super::map::{Map, MapKind, ignored_option_warning};
 use crate::math::limits::LARGEST;
 
 /// A color statement.
@@ -102,7 +102,7 @@ pub(super) fn parse(line: &str, warnings: &mut Vec<String>) -> Result<Statement,
     }
     if is("newmtl") {
         let name = (!rest.is_empty()).then(|| rest.to_owned());
-        return name.map(Statement::New).ok_or_else(|| expected_after("newmtl", "a name"));
+        return name.map(Statement::New).ok_or_else(|| expected_arguments_message("newmtl", "a name"));
     }
     if let Some((color, _)) = MtlColor::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_color(keyword, color, rest, warnings);
@@ -113,22 +113,22 @@ pub(super) fn parse(line: &str, warnings: &mut Vec<String>) -> Result<Statement,
     if let Some(kind) = MapKind::from_keyword(keyword) {
         return match Map::parse(rest) {
             Some(map) => Ok(Statement::Map(kind, map)),
-            None => Err(expected_after(keyword, "a file name")),
+            None => Err(expected_arguments_message(keyword, "a file name")),
         };
     }
     match keyword.to_ascii_lowercase().as_str() {
-        "illum" => illumination(rest, warnings),
+        "illum" => parse_illumination_model(rest, warnings),
         // This affects only reflection maps, which have their own warning.
         "sharpness" => Ok(Statement::Nothing),
         _ => {
-            warnings.push(unknown_statement(keyword));
+            warnings.push(unknown_statement_warning(keyword));
             Ok(Statement::Ignored)
         }
     }
 }
 
 /// Error message for a statement with missing or invalid arguments.
-pub(super) fn expected_after(keyword: &str, expected: &str) -> String {
+pub(super) fn expected_arguments_message(keyword: &str, expected: &str) -> String {
     format!("expected {expected} after `{keyword}`")
 }
 
@@ -136,11 +136,11 @@ pub(super) const THREE_NUMBERS: &str = "three finite numbers";
 pub(super) const ONE_NUMBER: &str = "a finite number";
 pub(super) const INTEGER: &str = "an integer";
 
-pub(super) fn unknown_statement(keyword: &str) -> String {
+pub(super) fn unknown_statement_warning(keyword: &str) -> String {
     format!("unknown statement `{}` is ignored", truncate_word(keyword))
 }
 
-pub(super) fn spectrum_unsupported(keyword: &str) -> String {
+pub(super) fn unsupported_spectrum_warning(keyword: &str) -> String {
     format!("the spectrum of `{keyword}` is not supported; the default color is used")
 }
 
@@ -154,20 +154,26 @@ fn words_before_comment(rest: &str) -> Vec<&str> {
     rest.split('#').next().unwrap_or_default().split_whitespace().collect()
 }
 
-fn finite(word: &str) -> Option<f64> {
+fn parse_finite(word: &str) -> Option<f64> {
     word.parse::<f32>().ok().map(f64::from).filter(|number| number.is_finite())
 }
 
 /// Clamps a value to a range. Adds a warning that quotes `word` if the value changes.
-fn clamp(word: &str, value: f64, [least, most]: [f64; 2], keyword: &str, warnings: &mut Vec<String>) -> f64 {
+fn clamp_with_warning(
+    word: &str,
+    value: f64,
+    [least, most]: [f64; 2],
+    keyword: &str,
+    warnings: &mut Vec<String>,
+) -> f64 {
     let clamped = value.clamp(least, most);
     if clamped != value {
-        warnings.push(value_clamped(word, keyword, clamped));
+        warnings.push(clamped_value_warning(word, keyword, clamped));
     }
     clamped
 }
 
-pub(super) fn value_clamped(word: &str, keyword: &str, limit: f64) -> String {
+pub(super) fn clamped_value_warning(word: &str, keyword: &str, limit: f64) -> String {
     let limit = if limit == LARGEST { "1e18".to_owned() } else { limit.to_string() };
     format!("{word} in `{keyword}` is clamped to {limit}")
 }
@@ -175,15 +181,15 @@ pub(super) fn value_clamped(word: &str, keyword: &str, limit: f64) -> String {
 /// Warns if there are more than `count` words.
 fn warn_about_excess(words: &[&str], count: usize, keyword: &str, warnings: &mut Vec<String>) {
     if words.len() > count {
-        warnings.push(excess_words(keyword));
+        warnings.push(excess_words_warning(keyword));
     }
 }
 
-pub(super) fn excess_words(keyword: &str) -> String {
+pub(super) fn excess_words_warning(keyword: &str) -> String {
     format!("extra words in `{keyword}` are ignored")
 }
 
-pub(super) fn outside_gamut(keyword: &str) -> String {
+pub(super) fn outside_gamut_warning(keyword: &str) -> String {
     format!("`{keyword}` is outside the RGB gamut; its negative components are clamped to 0")
 }
 
@@ -197,17 +203,17 @@ fn parse_color(
     let words = words_before_comment(rest);
     let (is_xyz, words) = match words.as_slice() {
         ["spectral", ..] => {
-            warnings.push(spectrum_unsupported(keyword));
+            warnings.push(unsupported_spectrum_warning(keyword));
             return Ok(Statement::Ignored);
         }
         ["xyz", words @ ..] => (true, words),
         words => (false, words),
     };
-    let numbers: Option<Vec<f64>> = words.iter().take(3).map(|word| finite(word)).collect();
+    let numbers: Option<Vec<f64>> = words.iter().take(3).map(|word| parse_finite(word)).collect();
     let values = match numbers.as_deref() {
         Some([gray]) => [*gray; 3],
         Some([red, green, blue]) => [*red, *green, *blue],
-        Some(_) | None => return Err(expected_after(keyword, THREE_NUMBERS)),
+        Some(_) | None => return Err(expected_arguments_message(keyword, THREE_NUMBERS)),
     };
     warn_about_excess(words, 3, keyword, warnings);
     let values = match (color, is_xyz) {
@@ -218,7 +224,7 @@ fn parse_color(
             const TINY: f64 = 1e-3;
             let rgb = xyz_to_rgb(values);
             if rgb.iter().any(|part| *part < -TINY) {
-                warnings.push(outside_gamut(keyword));
+                warnings.push(outside_gamut_warning(keyword));
             }
             rgb.map(|part| part.clamp(0.0, LARGEST))
         }
@@ -227,7 +233,7 @@ fn parse_color(
             let mut reported = Vec::new();
             let part = |part: usize| {
                 let word = words.get(part).or(words.first()).copied().unwrap_or_default();
-                clamp(word, values[part], [0.0, LARGEST], keyword, &mut reported)
+                clamp_with_warning(word, values[part], [0.0, LARGEST], keyword, &mut reported)
             };
             let clamped = [0, 1, 2].map(part);
             warnings.extend(reported.into_iter().next());
@@ -256,26 +262,26 @@ fn parse_number(
     let words = words_before_comment(rest);
     let words = match words.as_slice() {
         ["-halo", words @ ..] if number == MtlNumber::Dissolve => {
-            warnings.push(option_ignored("-halo"));
+            warnings.push(ignored_option_warning("-halo"));
             words
         }
         words => words,
     };
-    let value = words.first().and_then(|word| Some((*word, finite(word)?)));
-    let (word, value) = value.ok_or_else(|| expected_after(keyword, ONE_NUMBER))?;
+    let value = words.first().and_then(|word| Some((*word, parse_finite(word)?)));
+    let (word, value) = value.ok_or_else(|| expected_arguments_message(keyword, ONE_NUMBER))?;
     warn_about_excess(words, 1, keyword, warnings);
     let value = match number.range() {
-        Some(range) => clamp(word, value, range, keyword, warnings),
+        Some(range) => clamp_with_warning(word, value, range, keyword, warnings),
         None => value,
     };
     Ok(Statement::Number(number, value))
 }
 
 /// Parses an illumination model. Unknown models become 255.
-fn illumination(rest: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
+fn parse_illumination_model(rest: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let words = words_before_comment(rest);
     let number = words.first().and_then(|word| word.parse::<i64>().ok());
-    let number = number.ok_or_else(|| expected_after("illum", INTEGER))?;
+    let number = number.ok_or_else(|| expected_arguments_message("illum", INTEGER))?;
     warn_about_excess(&words, 1, "illum", warnings);
     Ok(Statement::Illumination(u8::try_from(number).unwrap_or(u8::MAX)))
 }

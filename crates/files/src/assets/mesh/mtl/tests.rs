@@ -2,16 +2,17 @@
 
 use super::ignored::{
     AMBIENT_MAP, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY, INVISIBLE_GLASS,
-    SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, map_unsupported, statement_ignored,
+    SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, ignored_statement_warning, unsupported_map_warning,
 };
-use super::map::option_ignored;
+use super::map::ignored_option_warning;
 use super::statements::{
-    INTEGER, ONE_NUMBER, THREE_NUMBERS, expected_after, spectrum_unsupported, unknown_statement,
+    INTEGER, ONE_NUMBER, THREE_NUMBERS, expected_arguments_message, unknown_statement_warning,
+    unsupported_spectrum_warning,
 };
 use super::*;
 use crate::assets::{FileLine, FileMaterial, FileTexture, PhysicalMaterial, rejection};
 use crate::control::{CancelToken, ignore_progress};
-use crate::materials::{Channel, PixelValue};
+use crate::materials::{Channel, ChannelSelector};
 use crate::math::{DVec2, Vec2, Vec3};
 
 /// Path of the MTL file whose materials are converted.
@@ -35,7 +36,7 @@ fn warnings_of(text: &[u8]) -> Vec<String> {
     let token = CancelToken::new();
     let MtlLibrary { materials, ignored, .. } =
         load(&path, Monitor { progress: &ignore_progress, token: &token }).expect("whole");
-    warnings(Path::new("a.mtl"), ignored, materials.iter())
+    collect_warnings(Path::new("a.mtl"), ignored, materials.iter())
 }
 
 fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
@@ -44,13 +45,13 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token })?.materials;
-    Ok(found.iter().map(|found| material(found, Path::new(LIBRARY))).collect())
+    Ok(found.iter().map(|found| to_file_material(found, Path::new(LIBRARY))).collect())
 }
 
 /// Asserts that `text` is rejected on `line` because `expected` is missing after `keyword`.
 #[track_caller]
 fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
-    assert_eq!(rejection(read(text)), (Some(line), expected_after(keyword, expected)), "{text}");
+    assert_eq!(rejection(read(text)), (Some(line), expected_arguments_message(keyword, expected)), "{text}");
 }
 
 #[test]
@@ -209,7 +210,7 @@ fn comments_may_follow_a_file_name() {
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token }).expect("whole").materials;
-    let found = material(&found[0], &path);
+    let found = to_file_material(&found[0], &path);
     let file = |name: &str| folder.path().join(name);
     assert_eq!(super::tests::path(&found.diffuse_texture), Some(file("wall.png").as_path()));
     assert_eq!(super::tests::path(&found.specular_texture), Some(file("Map #1.png").as_path()));
@@ -252,7 +253,7 @@ fn map_options_are_converted() {
         found.opacity_texture.expect(statement)
     };
     let plain = || texture_of("t.png", 2);
-    let channel = |channel| Some(PixelValue::Channel(channel));
+    let channel = |channel| Some(ChannelSelector::Channel(channel));
     for (options, expected) in [
         ("-s 2 3 4", FileTexture { repeat: Vec2::new(2.0, 3.0), ..plain() }),
         ("-s 2", FileTexture { repeat: Vec2::new(2.0, 1.0), ..plain() }),
@@ -266,7 +267,7 @@ fn map_options_are_converted() {
         ("-imfchan G", FileTexture { number: channel(Channel::Green), ..plain() }),
         ("-imfchan b", FileTexture { number: channel(Channel::Blue), ..plain() }),
         ("-imfchan m", FileTexture { number: channel(Channel::Alpha), ..plain() }),
-        ("-imfchan l", FileTexture { number: Some(PixelValue::Luminance), ..plain() }),
+        ("-imfchan l", FileTexture { number: Some(ChannelSelector::Luminance), ..plain() }),
         (
             "-blendu on -s 2 2 1 -clamp on -o 1",
             FileTexture {
@@ -298,20 +299,20 @@ fn map_options_are_converted() {
 fn ignored_statements_are_reported_with_line() {
     let of = |statements: &str| warnings_of(format!("newmtl a\n{statements}").as_bytes());
     for (statements, line, words) in [
-        ("map_Kd -t 1 1 1 t.png\n", 2, option_ignored("-t 1 1 1")),
-        ("\nmap_Kd -cc on t.png\n", 3, option_ignored("-cc on")),
-        ("map_Kd -blendu off t.png\n", 2, option_ignored("-blendu off")),
-        ("map_Kd -boost 2 t.png\n", 2, option_ignored("-boost 2")),
-        ("map_Kd -texres 128 t.png\n", 2, option_ignored("-texres 128")),
-        ("map_Kd -imfchan r t.png\n", 2, option_ignored("-imfchan")),
-        ("map_d -imfchan z t.png\n", 2, option_ignored("-imfchan z")),
-        ("norm -mm 0 2 t.png\n", 2, option_ignored("-mm")),
-        ("norm -bm -3 t.png\n", 2, option_ignored("-bm -3")),
-        ("map_Kd -bm 3 t.png\n", 2, option_ignored("-bm")),
-        ("map_Ns t.png\n", 2, map_unsupported("map_Ns")),
-        ("refl -type sphere t.png\n", 2, map_unsupported("refl")),
+        ("map_Kd -t 1 1 1 t.png\n", 2, ignored_option_warning("-t 1 1 1")),
+        ("\nmap_Kd -cc on t.png\n", 3, ignored_option_warning("-cc on")),
+        ("map_Kd -blendu off t.png\n", 2, ignored_option_warning("-blendu off")),
+        ("map_Kd -boost 2 t.png\n", 2, ignored_option_warning("-boost 2")),
+        ("map_Kd -texres 128 t.png\n", 2, ignored_option_warning("-texres 128")),
+        ("map_Kd -imfchan r t.png\n", 2, ignored_option_warning("-imfchan")),
+        ("map_d -imfchan z t.png\n", 2, ignored_option_warning("-imfchan z")),
+        ("norm -mm 0 2 t.png\n", 2, ignored_option_warning("-mm")),
+        ("norm -bm -3 t.png\n", 2, ignored_option_warning("-bm -3")),
+        ("map_Kd -bm 3 t.png\n", 2, ignored_option_warning("-bm")),
+        ("map_Ns t.png\n", 2, unsupported_map_warning("map_Ns")),
+        ("refl -type sphere t.png\n", 2, unsupported_map_warning("refl")),
         ("map_Ka t.png\n", 2, AMBIENT_MAP.to_owned()),
-        ("Kd spectral brass.rfl\n", 2, spectrum_unsupported("Kd")),
+        ("Kd spectral brass.rfl\n", 2, unsupported_spectrum_warning("Kd")),
         ("illum 0\n", 2, UNSHADED.to_owned()),
         ("illum 10\n", 2, SHADOW_CATCHER.to_owned()),
         ("illum 99\n", 2, UNKNOWN_MODEL.to_owned()),
@@ -322,8 +323,8 @@ fn ignored_statements_are_reported_with_line() {
         ("Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n", 2, GAINS_ENERGY.to_owned()),
         ("Ks 2 2 2\nillum 3\n", 2, BRIGHT_MIRROR.to_owned()),
         ("Kd .1 .1 .1\nKs .9 .9 .9\nillum 3\n", 2, DIFFUSE_UNDER_MIRROR.to_owned()),
-        ("Ps 0.5\n", 2, statement_ignored("Ps")),
-        ("Foo 1\n", 2, unknown_statement("Foo")),
+        ("Ps 0.5\n", 2, ignored_statement_warning("Ps")),
+        ("Foo 1\n", 2, unknown_statement_warning("Foo")),
     ] {
         assert_eq!(of(statements), [format!("a.mtl:{line}: {words}")], "{statements}");
     }
@@ -343,8 +344,8 @@ fn ignored_statements_are_reported_with_line() {
         warnings_of(b"Kd 1 1 1\nnewmtl a\nmap_Ns t.png\nnewmtl b\nmap_Ns t.png\nnewmtl a\n"),
         [
             format!("a.mtl:1: {NO_MATERIAL_YET}"),
-            format!("a.mtl:6: {}", duplicate_material("a", 2)),
-            format!("a.mtl:3: {} (1 more)", map_unsupported("map_Ns")),
+            format!("a.mtl:6: {}", duplicate_material_warning("a", 2)),
+            format!("a.mtl:3: {} (1 more)", unsupported_map_warning("map_Ns")),
         ]
     );
 }
@@ -474,7 +475,7 @@ fn latin_1_file_names_are_found() {
     std::fs::write(&path, mtl).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Monitor { progress: &ignore_progress, token: &token }).expect("whole").materials;
-    let [a, b] = [0, 1].map(|index| material(&found[index], &path));
+    let [a, b] = [0, 1].map(|index| to_file_material(&found[index], &path));
     assert_eq!(a.name, "gr\u{fc}n");
     assert_eq!(super::tests::path(&a.diffuse_texture), Some(latin1(b"caf\xe9.png").as_path()));
     assert_eq!(super::tests::path(&a.specular_texture), Some(folder.path().join("\u{e4}.png").as_path()));

@@ -19,7 +19,7 @@ pub(super) struct FaceRun {
 }
 
 /// Adds the faces from all runs. Within an object, every distinct combination of indices becomes a vertex.
-pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
+pub(super) fn build_faces(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
     let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
     let mut builder = VertexBuilder {
@@ -35,7 +35,7 @@ pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut Pars
         face: 0,
         corner: 0,
     };
-    runs.iter().for_each(|run| builder.run(run));
+    runs.iter().for_each(|run| builder.add_face_run(run));
 }
 
 /// Smoothing group of a vertex and, for flat shading, the face number, starting at 1.
@@ -58,7 +58,7 @@ struct VertexBuilder<'a> {
 }
 
 impl VertexBuilder<'_> {
-    fn run(&mut self, run: &FaceRun) {
+    fn add_face_run(&mut self, run: &FaceRun) {
         if run.is_object {
             self.vertices.clear();
         }
@@ -67,7 +67,7 @@ impl VertexBuilder<'_> {
             self.face += 1;
             for corner in &self.statements.corners[self.corner..self.corner + arity] {
                 let vertex = self.vertex(*corner, run.smoothing);
-                self.parsed.faces.corner(vertex);
+                self.parsed.faces.push_corner(vertex);
             }
             self.parsed.faces.end_face(arity);
             self.corner += arity;

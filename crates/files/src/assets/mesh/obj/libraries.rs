@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, MtlLibrary, decoded_paths, without_trailing_comments};
+use super::super::mtl::{self, MtlLibrary, utf8_and_latin1_paths, without_trailing_comments};
 use super::super::{AssetError, MeshSource};
 use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
@@ -43,7 +43,7 @@ impl MtlLibraries<'_> {
 
     /// Maps each used material name to its index in `names`. In both OBJ and MTL files, a name may contain
     /// `#` (`Material #25`) or be followed by a comment, so the longest match is used.
-    fn resolve<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
+    fn resolve_material_names<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
         for (name, index) in all {
@@ -56,7 +56,7 @@ impl MtlLibraries<'_> {
     }
 
     fn load_file(&mut self, path: &Path) -> Result<HashMap<String, usize>, AssetError> {
-        let stamp = FileStamp::of(path);
+        let stamp = FileStamp::from_path(path);
         let library = mtl::load(path, self.source.monitor);
         let hash = library.as_ref().ok().map(|library| library.hash);
         self.found.files.push(Companion { path: path.to_owned(), hash, stamp });
@@ -64,7 +64,7 @@ impl MtlLibraries<'_> {
             Ok(library) => Ok(self.add(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
                 self.found.missing = true;
-                self.found.warnings.push(missing_library(&error));
+                self.found.warnings.push(missing_library_warning(&error));
                 Ok(HashMap::new())
             }
             Err(error) => Err(error),
@@ -74,13 +74,17 @@ impl MtlLibraries<'_> {
     fn add(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
         let MtlLibrary { materials, ignored, hash: _ } = library;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let indices = self.resolve(materials.iter().map(|material| material.name.as_str()));
+        let indices = self.resolve_material_names(materials.iter().map(|material| material.name.as_str()));
         let used: BTreeSet<usize> = indices.values().copied().collect();
         let found = &mut self.found;
-        found.warnings.extend(mtl::warnings(path, ignored, used.into_iter().map(|index| &materials[index])));
+        found.warnings.extend(mtl::collect_warnings(
+            path,
+            ignored,
+            used.into_iter().map(|index| &materials[index]),
+        ));
         found.images.extend(materials.iter().flat_map(|material| material.image_paths(folder)));
         let first = found.materials.len();
-        found.materials.extend(materials.iter().map(|material| mtl::material(material, path)));
+        found.materials.extend(materials.iter().map(|material| mtl::to_file_material(material, path)));
         indices.into_iter().map(|(name, index)| (name, first + index)).collect()
     }
 }
@@ -91,16 +95,19 @@ pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =
         without_trailing_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
-    let readings = readings.flat_map(|name| decoded_paths(&name));
+    let readings = readings.flat_map(|name| utf8_and_latin1_paths(&name));
     let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
     if let Some(path) = single {
         return vec![path];
     }
     let names = without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
-    names.split_whitespace().filter_map(|name| mtl::first_existing(folder, decoded_paths(name))).collect()
+    names
+        .split_whitespace()
+        .filter_map(|name| mtl::first_existing(folder, utf8_and_latin1_paths(name)))
+        .collect()
 }
 
 /// Warning about a library that cannot be read.
-pub(super) fn missing_library(error: &AssetError) -> String {
+pub(super) fn missing_library_warning(error: &AssetError) -> String {
     format!("{error}; its materials are skipped")
 }

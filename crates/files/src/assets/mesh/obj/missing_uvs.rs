@@ -53,7 +53,7 @@ impl MissingUvs {
     /// Warning about objects in which only some corners have texture coordinates.
     pub(super) fn warning(&self, source: &MeshSource<'_>) -> Option<String> {
         let (first, count) = self.partial?;
-        Some(uvs_missing(source.line(face_start(source, first)), count))
+        Some(missing_uvs_warning(source.line_number(face_start(source, first)), count))
     }
 
     /// Warnings about textured objects without texture coordinates, one for each material.
@@ -64,13 +64,17 @@ impl MissingUvs {
         let warning = |(material, face): (&u32, &usize)| {
             let line = faces.binary_search(face).map_or(0, |index| lines[index]);
             let name = &parsed.materials[*material as usize].name;
-            if parsed.uvs.is_empty() { half_of_texture(line, name) } else { corner_of_texture(line, name) }
+            if parsed.uvs.is_empty() {
+                file_without_uvs_warning(line, name)
+            } else {
+                faces_without_uvs_warning(line, name)
+            }
         };
         self.textured.iter().map(warning).collect()
     }
 }
 
-pub(super) fn uvs_missing(first: usize, count: usize) -> String {
+pub(super) fn missing_uvs_warning(first: usize, count: usize) -> String {
     let faces = match count {
         1 => format!("line {first}: a face has"),
         _ => format!("line {first} and {} more faces have", count - 1),
@@ -79,14 +83,14 @@ pub(super) fn uvs_missing(first: usize, count: usize) -> String {
 }
 
 /// Warning about a material with textures in a file without texture coordinates.
-pub(super) fn half_of_texture(line: usize, material: &str) -> String {
+pub(super) fn file_without_uvs_warning(line: usize, material: &str) -> String {
     format!(
         "line {line}: the file has no texture coordinates, so each triangle shows half of every texture in \"{material}\""
     )
 }
 
 /// Warning about faces without texture coordinates in a file that has some.
-pub(super) fn corner_of_texture(line: usize, material: &str) -> String {
+pub(super) fn faces_without_uvs_warning(line: usize, material: &str) -> String {
     format!(
         "line {line}: faces without texture coordinates show only the point (0, 0) of every texture in \"{material}\""
     )

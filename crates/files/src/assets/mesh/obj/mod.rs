@@ -11,19 +11,19 @@ mod words;
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::assemble::assemble_text;
+use super::assemble::assemble_text_mesh;
 use super::parsed::ParsedMesh;
-use super::text::with_line_feeds;
+use super::text::convert_mac_line_ends;
 use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::FileMaterial;
-use build::{FaceRun, build};
+use build::{FaceRun, build_faces};
 use libraries::{LibraryContents, MtlLibraries};
 use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
 use statements::{NONE, Smoothing, StateChange, Statements, face_start};
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    parse_lines(&MeshSource { bytes: &with_line_feeds(source.bytes), ..*source })
+    parse_lines(&MeshSource { bytes: &convert_mac_line_ends(source.bytes), ..*source })
 }
 
 fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -38,12 +38,12 @@ fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
         warnings: std::mem::take(&mut statements.warnings),
         ..ParsedMesh::default()
     };
-    build(&statements, &runs, &mut parsed);
+    build_faces(&statements, &runs, &mut parsed);
     let missing = MissingUvs::find(&statements, &runs, &parsed.materials);
     parsed.warnings.extend(missing.warning(source));
     parsed.material_warnings.extend(missing.material_warnings(source, &parsed));
     drop(statements);
-    assemble_text(source, parsed, |face| Some(face_start(source, face)))
+    assemble_text_mesh(source, parsed, |face| Some(face_start(source, face)))
 }
 
 /// Materials for an OBJ file.
@@ -83,14 +83,14 @@ impl ObjMaterials {
         let mut warnings = std::mem::take(&mut found.warnings);
         if !found.missing {
             let unknown = names.difference(&found.resolved);
-            warnings.extend(unknown.map(|name| unknown_material(name)));
+            warnings.extend(unknown.map(|name| unknown_material_warning(name)));
         }
         let all = std::mem::take(&mut found.materials);
         Ok(Self { all, used, warnings, found })
     }
 }
 
-fn unknown_material(name: &str) -> String {
+fn unknown_material_warning(name: &str) -> String {
     format!("unknown material {name:?}")
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::super::text::{Lines, with_line_feeds};
+use super::super::text::{Lines, convert_mac_line_ends};
 use super::super::{FILE_LIMIT, mtl};
 use super::libraries::library_paths;
 use super::words::Words;
@@ -37,15 +37,15 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
             continue;
         }
         let statement = lines.join_continuation_lines(token)?;
-        let statement = with_line_feeds(statement);
+        let statement = convert_mac_line_ends(statement);
         let mut words = Words::new(&statement);
-        words.word();
+        words.next_word();
         libraries.extend(library_paths(path, &words.name()));
     }
 }
 
 fn is_library_statement(line: &[u8]) -> bool {
-    Words::new(line).word().is_some_and(|word| word.eq_ignore_ascii_case(b"mtllib"))
+    Words::new(line).next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"mtllib"))
 }
 
 #[cfg(test)]

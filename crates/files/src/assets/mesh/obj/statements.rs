@@ -1,10 +1,10 @@
 //! Parses the statements in an OBJ file.
 
-use super::super::parsed::{alpha_ignored, face_of_corner};
-use super::super::text::expected;
+use super::super::parsed::{alpha_ignored_warning, face_of_corner};
+use super::super::text::expected_message;
 use super::super::{AssetError, MeshSource};
 use super::vertex::Vertices;
-use super::words::{Words, integer, number, too_few};
+use super::words::{Words, integer, number, too_few_numbers_message};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Number of statements between polls of the cancel token.
@@ -71,30 +71,32 @@ impl Statements {
         let mut count = 0;
         while words.next_statement() {
             if count % BATCH == 0 {
-                source.tick(words.at())?;
+                source.report_progress(words.offset())?;
             }
             count += 1;
-            let start = words.at();
-            found.statement(source, &mut words).map_err(|reason| source.wrong_at(start, reason))?;
-            words.line();
+            let start = words.offset();
+            found
+                .parse_statement(source, &mut words)
+                .map_err(|reason| source.malformed_error_with_line(start, reason))?;
+            words.take_line_rest();
         }
         found.drop_missing_attributes(source);
-        found.check_ranges(source)?;
-        found.warn(source);
+        found.check_index_ranges(source)?;
+        found.add_warnings(source);
         Ok(found)
     }
 
-    fn statement(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>) -> Result<(), String> {
-        let start = words.at();
-        let Some(keyword) = words.word() else {
-            if let Some(paint) = words.line().strip_prefix(b"#MRGB ") {
+    fn parse_statement(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>) -> Result<(), String> {
+        let start = words.offset();
+        let Some(keyword) = words.next_word() else {
+            if let Some(paint) = words.take_line_rest().strip_prefix(b"#MRGB ") {
                 self.vertices.read_mrgb_colors(paint);
             }
             return Ok(());
         };
         let mut lower = [0; LONGEST_KEYWORD];
         match lower_case(keyword, &mut lower) {
-            b"v" => self.vertices.read(words)?,
+            b"v" => self.vertices.parse_vertex(words)?,
             b"vt" => {
                 let [u, v, _] = parse_numbers(words, 1, 2, "texture coordinates")?;
                 self.uvs.push(DVec2::new(u, v).as_vec2());
@@ -102,16 +104,16 @@ impl Statements {
             b"vn" => {
                 self.normals.push(DVec3::from(parse_numbers(words, 3, 3, "normal coordinates")?).as_vec3());
             }
-            b"f" => self.face(words)?,
-            b"o" | b"g" => self.change(StateChange::Object),
+            b"f" => self.parse_face(words)?,
+            b"o" | b"g" => self.push_state_change(StateChange::Object),
             b"s" => self.parse_smoothing(source, words, start),
             b"mtllib" => {
                 let name = words.name();
-                self.change(StateChange::Library(name));
+                self.push_state_change(StateChange::Library(name));
             }
             b"usemtl" => {
                 let name = words.name();
-                self.change(StateChange::Material(name));
+                self.push_state_change(StateChange::Material(name));
             }
             b"surf" | b"curv" | b"curv2" => {
                 self.free_form.get_or_insert((start, String::from_utf8_lossy(keyword).into_owned()));
@@ -121,30 +123,30 @@ impl Statements {
         Ok(())
     }
 
-    fn change(&mut self, change: StateChange) {
+    fn push_state_change(&mut self, change: StateChange) {
         self.changes.push((self.arities.len(), change));
     }
 
     /// Parses a smoothing group. Ignores invalid groups with a warning.
     fn parse_smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
-        let group = words.word().unwrap_or(b"off");
+        let group = words.next_word().unwrap_or(b"off");
         let smoothing = match integer(group).map(u32::try_from) {
             Some(Ok(0)) => Smoothing::Flat,
             Some(Ok(number)) => Smoothing::Group(number),
             None if group.eq_ignore_ascii_case(b"off") => Smoothing::Flat,
             None if group.eq_ignore_ascii_case(b"on") => Smoothing::Group(1),
             Some(Err(_)) | None => {
-                self.warnings.push(invalid_smoothing(source.line(start), group));
+                self.warnings.push(invalid_smoothing_warning(source.line_number(start), group));
                 return;
             }
         };
-        self.change(StateChange::Smoothing(smoothing));
+        self.push_state_change(StateChange::Smoothing(smoothing));
     }
 
-    fn face(&mut self, words: &mut Words<'_>) -> Result<(), String> {
+    fn parse_face(&mut self, words: &mut Words<'_>) -> Result<(), String> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let before = self.corners.len();
-        while let Some(word) = words.word() {
+        while let Some(word) = words.next_word() {
             self.corners.push(parse_corner(word, counts)?);
         }
         self.arities.push((self.corners.len() - before) as u32);
@@ -159,8 +161,8 @@ impl Statements {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line = source.line(face_start(source, face_of_corner(&self.arities, first)));
-                self.warnings.push(attribute_missing(line, name));
+                let line = source.line_number(face_start(source, face_of_corner(&self.arities, first)));
+                self.warnings.push(missing_attribute_warning(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
         }
@@ -168,7 +170,7 @@ impl Statements {
 
     /// Checks the indices of all corners. Must be called after all statements are parsed, because faces may
     /// precede their vertices.
-    fn check_ranges(&self, source: &MeshSource<'_>) -> Result<(), AssetError> {
+    fn check_index_ranges(&self, source: &MeshSource<'_>) -> Result<(), AssetError> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let wrong = |corner: &CornerIndices| {
             (0..3).find(|part| corner[*part] as usize >= counts[*part] && corner[*part] != NONE)
@@ -179,45 +181,45 @@ impl Statements {
             return Ok(());
         };
         let index = i64::from(self.corners[place][part]) + 1;
-        Err(source.wrong_at(
+        Err(source.malformed_error_with_line(
             face_start(source, face_of_corner(&self.arities, place)),
-            out_of_range(part, index, counts[part]),
+            out_of_range_message(part, index, counts[part]),
         ))
     }
 
-    fn warn(&mut self, source: &MeshSource<'_>) {
+    fn add_warnings(&mut self, source: &MeshSource<'_>) {
         if let Some(start) = self.vertices.first_excess {
-            let line = source.line(start);
-            self.warnings.push(excess_words(line));
+            let line = source.line_number(start);
+            self.warnings.push(excess_words_warning(line));
         }
         if let Some(start) = self.vertices.most_transparent_vertex() {
-            self.warnings.push(alpha_ignored(source.line(start)));
+            self.warnings.push(alpha_ignored_warning(source.line_number(start)));
         }
-        if let Some((start, words)) = self.vertices.color_outside_range() {
-            self.warnings.push(format!("line {}: {words}", source.line(start)));
+        if let Some((start, words)) = self.vertices.out_of_range_color_warning() {
+            self.warnings.push(format!("line {}: {words}", source.line_number(start)));
         }
         if let Some((start, keyword)) = &self.free_form {
-            let line = source.line(*start);
-            self.warnings.push(free_form(line, keyword));
+            let line = source.line_number(*start);
+            self.warnings.push(free_form_warning(line, keyword));
         }
     }
 }
 
 pub(super) const CORNER_FORM: &str = "a corner like 1/2/3";
 
-pub(super) fn invalid_smoothing(line: usize, found: &[u8]) -> String {
-    format!("line {line}: {}; ignored", expected("a smoothing group or `off`", found))
+pub(super) fn invalid_smoothing_warning(line: usize, found: &[u8]) -> String {
+    format!("line {line}: {}; ignored", expected_message("a smoothing group or `off`", found))
 }
 
-pub(super) fn attribute_missing(line: usize, attribute: &str) -> String {
+pub(super) fn missing_attribute_warning(line: usize, attribute: &str) -> String {
     format!("line {line}: faces reference {attribute}, but the file has none; the references are ignored")
 }
 
-pub(super) fn excess_words(line: usize) -> String {
+pub(super) fn excess_words_warning(line: usize) -> String {
     format!("line {line}: ignored extra words after a vertex's coordinates and color")
 }
 
-pub(super) fn free_form(line: usize, keyword: &str) -> String {
+pub(super) fn free_form_warning(line: usize, keyword: &str) -> String {
     format!("line {line}: free-form curves and surfaces (`{keyword}`) are not supported and are skipped")
 }
 
@@ -244,10 +246,10 @@ fn face_starts<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use
     let mut words = Words::new(source.bytes);
     std::iter::from_fn(move || {
         while words.next_statement() {
-            let start = words.at();
-            let is_face = words.word().is_some_and(|word| word.eq_ignore_ascii_case(b"f"));
-            while is_face && words.word().is_some() {}
-            words.line();
+            let start = words.offset();
+            let is_face = words.next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"f"));
+            while is_face && words.next_word().is_some() {}
+            words.take_line_rest();
             if is_face {
                 return Some(start);
             }
@@ -260,17 +262,17 @@ fn face_starts<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use
 fn parse_numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;
-    while let Some(word) = words.word().filter(|_| count < max) {
-        let value = number(word).ok_or_else(|| expected(&format!("{max} {what}"), word))?;
+    while let Some(word) = words.next_word().filter(|_| count < max) {
+        let value = number(word).ok_or_else(|| expected_message(&format!("{max} {what}"), word))?;
         values[count] = value;
         count += 1;
     }
-    if count < min { Err(too_few(max, what, count)) } else { Ok(values) }
+    if count < min { Err(too_few_numbers_message(max, what, count)) } else { Ok(values) }
 }
 
 /// Parses a corner such as `1`, `1/2`, `1//3` or `1/2/3`, ignoring trailing slashes.
 fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String> {
-    let wrong = || expected(CORNER_FORM, word);
+    let wrong = || expected_message(CORNER_FORM, word);
     let end = word.iter().rposition(|byte| *byte != b'/').map_or(0, |last| last + 1);
     let mut corner = [NONE; 3];
     for (part, digits) in word[..end].split(|byte| *byte == b'/').enumerate() {
@@ -278,8 +280,8 @@ fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String
             continue;
         }
         let index = integer(digits).filter(|_| part < 3).ok_or_else(wrong)?;
-        corner[part] =
-            absolute_index(index, counts[part]).ok_or_else(|| out_of_range(part, index, counts[part]))?;
+        corner[part] = absolute_index(index, counts[part])
+            .ok_or_else(|| out_of_range_message(part, index, counts[part]))?;
     }
     Ok(corner)
 }
@@ -290,7 +292,7 @@ fn absolute_index(index: i64, count: usize) -> Option<u32> {
     u32::try_from(from_zero).ok().filter(|index| *index != NONE)
 }
 
-pub(super) fn out_of_range(attribute: usize, index: i64, count: usize) -> String {
+pub(super) fn out_of_range_message(attribute: usize, index: i64, count: usize) -> String {
     let what = ["vertex", "texture coordinate", "normal"][attribute];
     format!("{what} {index} is out of range: there are {count}, numbered from 1")
 }

@@ -1,16 +1,17 @@
 use super::super::EMPTY_FILE;
 use super::super::assemble::NO_FACES;
-use super::super::parsed::{alpha_ignored, color_clamped};
-use super::super::text::expected;
-use super::missing_uvs::{corner_of_texture, half_of_texture, uvs_missing};
+use super::super::parsed::{alpha_ignored_warning, clamped_color_warning};
+use super::super::text::expected_message;
+use super::missing_uvs::{faces_without_uvs_warning, file_without_uvs_warning, missing_uvs_warning};
 use super::statements::{
-    CORNER_FORM, attribute_missing, excess_words, free_form, invalid_smoothing, out_of_range,
+    CORNER_FORM, excess_words_warning, free_form_warning, invalid_smoothing_warning,
+    missing_attribute_warning, out_of_range_message,
 };
 use super::vertex::{NONFINITE_COLOR, WEIGHT_OR_COLOR, ZERO_WEIGHT};
-use super::words::too_few;
+use super::words::too_few_numbers_message;
 use super::*;
 use crate::assets::mesh::load;
-use crate::assets::{Dropped, rejection};
+use crate::assets::{DroppedFaces, rejection};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::{Vec2, Vec3};
 use std::fs;
@@ -33,7 +34,7 @@ fn error(text: &str) -> (Option<usize>, String) {
 
 /// Error for an out-of-range vertex index.
 fn vertex_error(line: usize, index: i64, count: usize) -> (Option<usize>, String) {
-    (Some(line), out_of_range(0, index, count))
+    (Some(line), out_of_range_message(0, index, count))
 }
 
 const COORDINATES: &str = "coordinates";
@@ -70,7 +71,7 @@ fn triangles_use_their_assigned_materials() {
     let loaded = read_with(&[("a.obj", text.as_bytes()), ("my one.mtl", mtl)]).expect("whole");
     assert_eq!(loaded.mesh.materials, [u32::MAX, 1, u32::MAX]);
     assert_eq!(loaded.materials[1].emission, Vec3::splat(5.0));
-    assert_eq!(loaded.material_warnings, [unknown_material("none")]);
+    assert_eq!(loaded.material_warnings, [unknown_material_warning("none")]);
 }
 
 #[test]
@@ -105,7 +106,7 @@ fn objects_without_normals_get_computed_normals() {
 fn unusable_faces_are_dropped_and_counted() {
     let text = format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
     let loaded = read(&text).expect("one valid face");
-    assert_eq!(loaded.dropped, Dropped { non_finite: 2, degenerate: 3 });
+    assert_eq!(loaded.dropped, DroppedFaces { non_finite: 2, degenerate: 3 });
     assert_eq!(loaded.mesh.positions.len(), 3);
 }
 
@@ -114,10 +115,13 @@ fn errors_include_line_and_reason() {
     assert_eq!(error("v 0 0 0\nv 1 0 0\nf 1 2 3\n"), vertex_error(3, 3, 2));
     assert_eq!(error(&format!("{SQUARE}f 1 2 -9\n")), vertex_error(5, -9, 4));
     assert_eq!(error(&format!("{SQUARE}f 0 1 2\n")), vertex_error(5, 0, 4));
-    assert_eq!(error(&format!("{SQUARE}vt 0 0\n\n# x\nf 1/1 2/2 3/1\n")), (Some(8), out_of_range(1, 2, 1)));
-    assert_eq!(error("v 0 0\n"), (Some(1), too_few(3, COORDINATES, 2)));
-    assert_eq!(error("v 0 zero 0\n"), (Some(1), expected("3 coordinates", b"zero")));
-    assert_eq!(error(&format!("{SQUARE}f 1 2 x\n")), (Some(5), expected(CORNER_FORM, b"x")));
+    assert_eq!(
+        error(&format!("{SQUARE}vt 0 0\n\n# x\nf 1/1 2/2 3/1\n")),
+        (Some(8), out_of_range_message(1, 2, 1))
+    );
+    assert_eq!(error("v 0 0\n"), (Some(1), too_few_numbers_message(3, COORDINATES, 2)));
+    assert_eq!(error("v 0 zero 0\n"), (Some(1), expected_message("3 coordinates", b"zero")));
+    assert_eq!(error(&format!("{SQUARE}f 1 2 x\n")), (Some(5), expected_message(CORNER_FORM, b"x")));
     assert_eq!(error(SQUARE), (None, NO_FACES.to_owned()));
     assert_eq!(error(""), (None, EMPTY_FILE.to_owned()));
 }
@@ -141,8 +145,8 @@ fn comments_may_follow_a_statement() {
         assert_eq!(read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
     }
     assert_eq!(error("v 0 0 0 # a\nv 1 0 0 # b\n# c\nf 1 2 3 # d\n"), vertex_error(4, 3, 2));
-    assert_eq!(error("v 0 0 # 0\n"), (Some(1), too_few(3, COORDINATES, 2)));
-    assert_eq!(error(&format!("{SQUARE}f 1 2 \\\n x\n")), (Some(5), expected(CORNER_FORM, b"x")));
+    assert_eq!(error("v 0 0 # 0\n"), (Some(1), too_few_numbers_message(3, COORDINATES, 2)));
+    assert_eq!(error(&format!("{SQUARE}f 1 2 \\\n x\n")), (Some(5), expected_message(CORNER_FORM, b"x")));
 }
 
 #[test]
@@ -197,15 +201,16 @@ fn vertex_colors_are_read_in_all_dialects() {
     assert_eq!(colors(["1 0 0", "0 0.2 0", ""]), (plain.to_vec(), vec![]));
     assert_eq!(colors(["", "0 51 0", "1 1 1"]).0, [[255; 3], [0, 51, 0], [1; 3]]);
     // Fractional colors slightly above 1 are not byte values.
-    let clamped =
-        |line: usize, value: f64, one: f64| vec![format!("line {line}: {}", color_clamped(value, one))];
+    let clamped = |line: usize, value: f64, one: f64| {
+        vec![format!("line {line}: {}", clamped_color_warning(value, one))]
+    };
     assert_eq!(colors(["1.5 0 0", "0 0.2 0", "1 1 1"]), (plain.to_vec(), clamped(1, 1.5, 1.0)));
     assert_eq!(colors(["255 0 0", "0 51 -3", "255 255 255"]), (plain.to_vec(), clamped(2, -3.0, 255.0)));
     assert_eq!(colors(["", "", ""]), (vec![], vec![]));
-    let ignored = vec![excess_words(1)];
+    let ignored = vec![excess_words_warning(1)];
     assert_eq!(colors(["a b c", "a b c", "a b c"]), (vec![], ignored.clone()));
     assert_eq!(colors(["1 0 0 1 1 1", "0 0.2 0", ""]), (plain.to_vec(), ignored));
-    let faded = vec![alpha_ignored(2)];
+    let faded = vec![alpha_ignored_warning(2)];
     assert_eq!(colors(["1 0 0 1", "0 0.2 0 0.5", "1 1 1 1"]), (plain.to_vec(), faded.clone()));
     // Alpha has the same range as the colors.
     assert_eq!(colors(["255 0 0 255", "0 51 0 128", "255 255 255 255"]), (plain.to_vec(), faded));
@@ -294,7 +299,7 @@ fn smoothing_groups_define_hard_edges() {
     assert_eq!(textured("s 1"), smooth, "a texture seam should not be an edge");
     assert_eq!(textured("s off"), flat);
     let loaded = read(&format!("{CORNER}s 1\ns sharp\nf 1 2 3\n")).expect("whole");
-    assert_eq!(loaded.warnings, [invalid_smoothing(8, b"sharp")]);
+    assert_eq!(loaded.warnings, [invalid_smoothing_warning(8, b"sharp")]);
 }
 
 #[test]
@@ -332,9 +337,9 @@ fn each_corner_keeps_its_texture_coordinates() {
     let none = [Vec2::ZERO; 3];
     let (found, warnings) = uvs("f 1 2 3\nf 1/1 3/2 4/3\nf 1 2 3\n");
     assert_eq!(found, [none, [a, b, c], none].concat());
-    assert_eq!(warnings, [uvs_missing(8, 2)]);
+    assert_eq!(warnings, [missing_uvs_warning(8, 2)]);
     let (found, warnings) = uvs("f 1/1 2/2 3\n");
-    assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![uvs_missing(8, 1)]));
+    assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![missing_uvs_warning(8, 1)]));
     // Objects without any texture coordinates do not cause a warning.
     let (found, warnings) = uvs("o one\nf 1 2 3\no two\nf 1/1 3/2 4/3\n");
     assert_eq!((found, warnings), ([none, [a, b, c]].concat(), vec![]));
@@ -369,7 +374,7 @@ fn a_library_may_follow_usemtl() {
 #[test]
 fn free_form_surfaces_cause_a_warning() {
     let loaded = read(&format!("{SQUARE}f 1 2 3\ncstype bezier\nsurf 0 1 0 1 1 2 3 4\n")).expect("a face");
-    assert_eq!(loaded.warnings, [free_form(7, "surf")]);
+    assert_eq!(loaded.warnings, [free_form_warning(7, "surf")]);
 }
 
 #[test]
@@ -382,8 +387,8 @@ fn texture_coordinate_v_defaults_to_zero() {
         let mesh = read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
         assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::new(0.5, 0.0), Vec2::X], "{text}");
     }
-    assert_eq!(error("vt 0\nvt\nv 0 0 0\n"), (Some(2), too_few(2, "texture coordinates", 0)));
-    assert_eq!(error("vt 0\nv 0 0\n"), (Some(2), too_few(3, COORDINATES, 2)));
+    assert_eq!(error("vt 0\nvt\nv 0 0 0\n"), (Some(2), too_few_numbers_message(2, "texture coordinates", 0)));
+    assert_eq!(error("vt 0\nv 0 0\n"), (Some(2), too_few_numbers_message(3, COORDINATES, 2)));
 }
 
 #[test]
@@ -391,7 +396,7 @@ fn lone_carriage_returns_end_lines() {
     let plain = read(&format!("# a\n{SQUARE}f 1 2 3 4\n")).expect("whole").mesh;
     let old = format!("# a\n{SQUARE}f 1 2 3 4\n").replace('\n', "\r");
     assert_eq!(read(&old).expect("whole").mesh, plain);
-    assert_eq!(error("v 0 0 0\rv 1 0\r"), (Some(2), too_few(3, COORDINATES, 2)));
+    assert_eq!(error("v 0 0 0\rv 1 0\r"), (Some(2), too_few_numbers_message(3, COORDINATES, 2)));
     let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n").replace('\n', "\r");
     let loaded =
         read_with(&[("a.obj", text.as_bytes()), ("a.mtl", b"newmtl red\rKd 1 0 0\r")]).expect("whole");
@@ -426,7 +431,7 @@ fn trailing_slashes_in_corners_are_ignored() {
     }
     for (faces, word) in [("f 1 2 3 /", "/"), ("f 1 2 //", "//"), ("f 1 2 /1/", "/1/")] {
         let error = error(&format!("{head}{faces}\n"));
-        assert_eq!(error, (Some(9), expected(CORNER_FORM, word.as_bytes())), "{faces}");
+        assert_eq!(error, (Some(9), expected_message(CORNER_FORM, word.as_bytes())), "{faces}");
     }
     for whole in
         ["g here/\nf 1 2 3", "# f 1/\nf 1 2 3", "mtllib f/ 1/\nf 1 2 3", "f 1 2 3 \\\n\ng here/ there"]
@@ -498,17 +503,17 @@ fn textures_without_coordinates_are_reported() {
         (of_materials, loaded.warnings)
     };
     let none: Vec<String> = Vec::new();
-    let half = vec![half_of_texture(9, "wall")];
+    let half = vec![file_without_uvs_warning(9, "wall")];
     assert_eq!(warnings("usemtl plain\nf 1 2 3\nusemtl wall\nf 1 3 4\n"), (half, none.clone()));
     assert_eq!(warnings("usemtl plain\nf 1 2 3\nusemtl glass\nf 1 3 4\n"), (none.clone(), none.clone()));
     let uvs = "vt 0 0\nvt 1 0\nvt 1 1\nusemtl wall\n";
     assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3/3\n")), (none.clone(), none.clone()));
     assert_eq!(
         warnings(&format!("{uvs}f 1/1 2/2 3/3\no other\nf 1 3 4\nf 1 2 3\n")),
-        (vec![corner_of_texture(12, "wall")], none.clone())
+        (vec![faces_without_uvs_warning(12, "wall")], none.clone())
     );
     // Partially missing coordinates are reported regardless of the material.
-    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3\n")), (none, vec![uvs_missing(10, 1)]));
+    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3\n")), (none, vec![missing_uvs_warning(10, 1)]));
 }
 
 #[test]
@@ -516,7 +521,7 @@ fn missing_attributes_are_dropped_with_warning() {
     let loaded = read(&format!("{SQUARE}f 1 2 3\nf 1/1/4 3/2/4 4/3/4\n")).expect("whole");
     assert!(loaded.mesh.uvs.is_empty());
     for what in ["texture coordinates", "normals"] {
-        assert!(loaded.warnings.contains(&attribute_missing(6, what)), "{:?}", loaded.warnings);
+        assert!(loaded.warnings.contains(&missing_attribute_warning(6, what)), "{:?}", loaded.warnings);
     }
 }
 

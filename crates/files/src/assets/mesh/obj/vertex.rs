@@ -1,8 +1,8 @@
 //! Vertices in an OBJ file, including color extensions from several programs.
 
 use super::super::parsed::ColorRange;
-use super::super::text::expected;
-use super::words::{Words, number, too_few};
+use super::super::text::expected_message;
+use super::words::{Words, number, too_few_numbers_message};
 use crate::math::DVec3;
 
 /// Positions and colors.
@@ -28,11 +28,11 @@ pub(super) const NONFINITE_COLOR: &str = "vertex colors must be finite";
 impl Vertices {
     /// Parses a `v` statement: x y z, followed by nothing, a weight, a color, a color with alpha, or a weight
     /// and a color with alpha.
-    pub(super) fn read(&mut self, words: &mut Words<'_>) -> Result<(), String> {
-        let start = words.at();
+    pub(super) fn parse_vertex(&mut self, words: &mut Words<'_>) -> Result<(), String> {
+        let start = words.offset();
         let mut numbers = [0.0; 8];
         let mut count = 0;
-        while let Some(word) = words.word() {
+        while let Some(word) = words.next_word() {
             match number(word) {
                 Some(value) if count < numbers.len() => numbers[count] = value,
                 Some(_) => {}
@@ -40,13 +40,13 @@ impl Vertices {
                     self.first_excess.get_or_insert(start);
                     break;
                 }
-                None => return Err(expected("3 coordinates", word)),
+                None => return Err(expected_message("3 coordinates", word)),
             }
             count += 1;
         }
         let [x, y, z, rest @ ..] = numbers;
         let (weight, color, alpha) = match (count, rest) {
-            (0..3, _) => return Err(too_few(3, "coordinates", count)),
+            (0..3, _) => return Err(too_few_numbers_message(3, "coordinates", count)),
             (3, _) => (1.0, None, None),
             (4, [weight, ..]) => (weight, None, None),
             (5, _) => return Err(WEIGHT_OR_COLOR.to_owned()),
@@ -103,12 +103,12 @@ impl Vertices {
     /// Byte offset of the vertex with the minimum alpha. `None` if every alpha is at its maximum. Alpha has
     /// the same range as the colors.
     pub(super) fn most_transparent_vertex(&self) -> Option<usize> {
-        self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
+        self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
     }
 
     /// Returns the byte offset of a vertex whose color is out of range, and a warning.
-    pub(super) fn color_outside_range(&self) -> Option<(usize, String)> {
-        self.range.outside()
+    pub(super) fn out_of_range_color_warning(&self) -> Option<(usize, String)> {
+        self.range.out_of_range_warning()
     }
 
     /// Color of a position. White if the file does not specify it.
@@ -117,6 +117,6 @@ impl Vertices {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);
         }
         let color = self.colors.get(index).copied().flatten();
-        color.map_or([u8::MAX; 3], |color| self.range.bytes(color.map(f64::from)))
+        color.map_or([u8::MAX; 3], |color| self.range.color_to_bytes(color.map(f64::from)))
     }
 }

@@ -2,7 +2,7 @@
 
 use fast_float2::parse;
 
-use super::super::text::decoded;
+use super::super::text::decode_line;
 
 /// A cursor in an OBJ file's text.
 pub(super) struct Words<'a> {
@@ -16,7 +16,7 @@ impl<'a> Words<'a> {
     }
 
     /// Byte offset of the next word.
-    pub(super) fn at(&self) -> usize {
+    pub(super) fn offset(&self) -> usize {
         self.at
     }
 
@@ -29,7 +29,7 @@ impl<'a> Words<'a> {
 
     /// Consumes the next word in this statement. A statement ends at a comment or at the end of the line,
     /// unless the line ends with a backslash.
-    pub(super) fn word(&mut self) -> Option<&'a [u8]> {
+    pub(super) fn next_word(&mut self) -> Option<&'a [u8]> {
         loop {
             match self.bytes.get(self.at)? {
                 b'\n' | b'#' => return None,
@@ -56,20 +56,20 @@ impl<'a> Words<'a> {
     pub(super) fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
-            let line = self.line();
+            let line = self.take_line_rest();
             let text = line.trim_ascii_end();
             let Some(text) = text.strip_suffix(b"\\").filter(|_| self.at < self.bytes.len()) else {
-                name.push_str(&decoded(text));
+                name.push_str(&decode_line(text));
                 return name.trim().to_owned();
             };
-            name.push_str(&decoded(text));
+            name.push_str(&decode_line(text));
             name.push(' ');
             self.at += 1;
         }
     }
 
     /// Consumes the rest of this line.
-    pub(super) fn line(&mut self) -> &'a [u8] {
+    pub(super) fn take_line_rest(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let line = &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())];
         self.at += line.len();
@@ -95,7 +95,7 @@ pub(super) fn integer(word: &[u8]) -> Option<i64> {
 }
 
 /// Error message for a statement with too few numbers.
-pub(super) fn too_few(wanted: usize, what: &str, found: usize) -> String {
+pub(super) fn too_few_numbers_message(wanted: usize, what: &str, found: usize) -> String {
     format!("expected {wanted} {what}, found {found}")
 }
 
@@ -107,9 +107,9 @@ mod tests {
         let mut words = Words::new(text.as_bytes());
         let mut found = Vec::new();
         while words.next_statement() {
-            let statement = std::iter::from_fn(|| words.word());
+            let statement = std::iter::from_fn(|| words.next_word());
             found.push(statement.map(|word| String::from_utf8_lossy(word).into_owned()).collect());
-            words.line();
+            words.take_line_rest();
         }
         found
     }
@@ -128,7 +128,7 @@ mod tests {
     fn names_keep_blanks_and_number_signs() {
         let name = |text: &str| {
             let mut words = Words::new(text.as_bytes());
-            words.word();
+            words.next_word();
             words.name()
         };
         assert_eq!(name("usemtl\ta #2 \r\nf"), "a #2");

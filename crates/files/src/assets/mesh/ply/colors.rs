@@ -1,25 +1,25 @@
 //! Colors in a PLY file. Their range depends on their type and on the largest value.
 
-use super::super::parsed::{ALPHA_IGNORED, ColorRange, Extremes, color_bytes};
-use super::header::Scalar;
+use super::super::parsed::{ALPHA_IGNORED, ColorRange, ComponentExtremes, color_bytes};
+use super::header::ScalarType;
 
 /// Colors in file order.
 pub(super) struct PlyColors {
     /// Types of red, green and blue.
-    scalars: [Scalar; 3],
+    scalars: [ScalarType; 3],
     /// Colors stored as bytes.
     bytes: Vec<[u8; 3]>,
     /// Colors stored as types other than bytes.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
     /// Extremes of red, green and blue.
-    extremes: [Extremes; 3],
+    extremes: [ComponentExtremes; 3],
     /// Minimum alpha, its type, and a byte offset in its item.
-    alpha: Option<(f64, Scalar, usize)>,
+    alpha: Option<(f64, ScalarType, usize)>,
 }
 
 impl PlyColors {
-    pub(super) fn new(scalars: [Scalar; 3]) -> Self {
+    pub(super) fn new(scalars: [ScalarType; 3]) -> Self {
         let (bytes, numbers) = Default::default();
         let (range, extremes) = Default::default();
         Self { scalars, bytes, numbers, range, extremes, alpha: None }
@@ -40,7 +40,7 @@ impl PlyColors {
     }
 
     fn are_bytes(&self) -> bool {
-        self.scalars == [Scalar::U8; 3]
+        self.scalars == [ScalarType::U8; 3]
     }
 
     fn store(&mut self, color: [f64; 3]) {
@@ -51,7 +51,7 @@ impl PlyColors {
         }
     }
 
-    pub(super) fn add_alpha(&mut self, alpha: f64, scalar: Scalar, at: usize) {
+    pub(super) fn add_alpha(&mut self, alpha: f64, scalar: ScalarType, at: usize) {
         if self.alpha.is_none_or(|(least, ..)| alpha < least) {
             self.alpha = Some((alpha, scalar, at));
         }
@@ -60,19 +60,19 @@ impl PlyColors {
     /// Returns the colors as bytes, and warnings about ignored alpha and out-of-range values. Each warning
     /// has a byte offset in an affected item.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
-        let max = self.extremes.iter().map(Extremes::max).fold(0.0, f64::max);
-        let one = |scalar: Scalar| match scalar {
-            Scalar::U8 | Scalar::I8 => scalar.full_intensity(),
-            Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
+        let max = self.extremes.iter().map(ComponentExtremes::max).fold(0.0, f64::max);
+        let one = |scalar: ScalarType| match scalar {
+            ScalarType::U8 | ScalarType::I8 => scalar.full_intensity(),
+            ScalarType::I16 | ScalarType::U16 | ScalarType::I32 | ScalarType::U32 => {
                 let fits = |limit: &f64| max <= *limit;
                 [255.0, 65535.0].into_iter().find(fits).unwrap_or(f64::INFINITY).min(scalar.full_intensity())
             }
-            Scalar::F32 | Scalar::F64 => self.range.one(),
+            ScalarType::F32 | ScalarType::F64 => self.range.full_intensity(),
         };
         let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar));
         let outside = self.scalars.iter().zip(&self.extremes).find_map(|(scalar, extremes)| {
-            let fraction = extremes.fraction().filter(|_| scalar.is_integer());
-            extremes.outside(one(*scalar)).or(fraction)
+            let fraction = extremes.fraction_warning().filter(|_| scalar.is_integer());
+            extremes.out_of_range_warning(one(*scalar)).or(fraction)
         });
         let mut warnings: Vec<_> = outside.into_iter().collect();
         warnings.extend(transparent.map(|(.., at)| (at, ALPHA_IGNORED.to_owned())));

@@ -3,8 +3,10 @@
 use super::super::parsed::{FACE_COLORS_IGNORED, ParsedMesh};
 use super::body::NumberReader;
 use super::colors::PlyColors;
-use super::header::{Element, PropertyType, Scalar};
-use super::{ErrorContext, checked_vertex_index, list_length, read_items, skip, vertex_property_slot};
+use super::header::{Element, PropertyType, ScalarType};
+use super::{
+    ErrorContext, checked_vertex_index, read_items, read_list_length, skip_property, vertex_property_slot,
+};
 use crate::assets::AssetError;
 use crate::math::DVec2;
 
@@ -71,9 +73,9 @@ pub(super) fn read(
     let roles = property_roles(element, corners);
     let mut faces = FaceReader::new(&roles);
     read_items(context, element, numbers, |numbers| {
-        let start = numbers.at();
+        let start = numbers.offset();
         faces.read(&roles, numbers, vertices)?;
-        faces.add(parsed, start, numbers.at());
+        faces.add(parsed, start, numbers.offset());
         Ok(())
     })?;
     faces.finish(context, parsed);
@@ -90,9 +92,9 @@ struct FaceReader {
     parts: Vec<f64>,
     values: [f64; 7],
     /// Type of the face's alpha.
-    alpha: Option<Scalar>,
+    alpha: Option<ScalarType>,
     /// Type of the colors in lists.
-    list_scalar: Option<Scalar>,
+    list_scalar: Option<ScalarType>,
     colors: Option<PlyColors>,
     /// Texture number of the first face.
     texture: Option<f64>,
@@ -113,7 +115,7 @@ impl FaceReader {
             })
         };
         let has_color = COLOR.iter().all(has_value);
-        let scalars = COLOR.map(|index| scalar(PropertyRole::Value(index)).unwrap_or(Scalar::U8));
+        let scalars = COLOR.map(|index| scalar(PropertyRole::Value(index)).unwrap_or(ScalarType::U8));
         let list_scalar = scalar(PropertyRole::Colors);
         let colors = match list_scalar {
             Some(scalar) => Some(PlyColors::new([scalar; 3])),
@@ -150,13 +152,13 @@ impl FaceReader {
         for &(kind, role) in roles {
             match (kind, role) {
                 (PropertyType::List { count, item }, PropertyRole::Corners) => {
-                    for _ in 0..list_length(numbers, count, item)? {
+                    for _ in 0..read_list_length(numbers, count, item)? {
                         self.corners.push(checked_vertex_index(numbers.integer(item)?, vertices)?);
                     }
                 }
                 (PropertyType::List { count, item }, PropertyRole::Uvs | PropertyRole::Colors) => {
                     let list = if role == PropertyRole::Uvs { &mut self.uvs } else { &mut self.parts };
-                    for _ in 0..list_length(numbers, count, item)? {
+                    for _ in 0..read_list_length(numbers, count, item)? {
                         list.push(numbers.float(item)?);
                     }
                 }
@@ -171,7 +173,7 @@ impl FaceReader {
                     | PropertyRole::Value(_)
                     | PropertyRole::Unused,
                 ) => {
-                    skip(numbers, kind)?;
+                    skip_property(numbers, kind)?;
                 }
             }
         }
@@ -191,7 +193,7 @@ impl FaceReader {
             self.wrong += 1;
         }
         for (index, &vertex) in self.corners.iter().enumerate() {
-            parsed.faces.corner(vertex);
+            parsed.faces.push_corner(vertex);
             if self.has_uvs {
                 let of_face = if self.has_uv { UV.map(|index| self.values[index]) } else { [f64::NAN; 2] };
                 let of_corner =
@@ -221,7 +223,7 @@ impl FaceReader {
         if self.wrong > 0 {
             let (face, start) = self.first_wrong;
             let face = context.face_label(start, face);
-            parsed.warnings.push(wrong_list_length(&face, self.wrong));
+            parsed.warnings.push(wrong_list_length_warning(&face, self.wrong));
         }
         if self.has_several_textures {
             parsed.warnings.push(SEVERAL_TEXTURES.to_owned());
@@ -230,7 +232,7 @@ impl FaceReader {
         if parsed.colors.is_empty() {
             let (colors, warnings) = colors.finish();
             parsed.corner_colors = colors;
-            parsed.warnings.extend(context.located(warnings));
+            parsed.warnings.extend(context.with_line_numbers(warnings));
         } else {
             parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }
@@ -241,7 +243,7 @@ impl FaceReader {
 pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces have the same material";
 
 /// Warning about `count` faces whose texture coordinate or color lists do not match the number of corners.
-pub(super) fn wrong_list_length(first: &str, count: u64) -> String {
+pub(super) fn wrong_list_length_warning(first: &str, count: u64) -> String {
     let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
     format!("{first}{more}: ignored texture coordinates or colors that do not match the number of corners")
 }

@@ -1,6 +1,6 @@
 //! PLY header: the file's elements and their properties.
 
-use super::super::text::{expected, shown};
+use super::super::text::{expected_message, quote_word};
 use super::super::{AssetError, MeshSource};
 
 /// Maximum size of a header. Typical headers have a few hundred bytes.
@@ -14,7 +14,7 @@ pub(super) enum Encoding {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(super) enum ScalarType {
     I8,
     U8,
     I16,
@@ -25,8 +25,8 @@ pub(super) enum Scalar {
     F64,
 }
 
-impl Scalar {
-    fn named(name: &str) -> Option<Self> {
+impl ScalarType {
+    fn from_name(name: &str) -> Option<Self> {
         Some(match name {
             "char" | "int8" => Self::I8,
             "uchar" | "uint8" => Self::U8,
@@ -70,8 +70,8 @@ impl Scalar {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PropertyType {
-    Scalar(Scalar),
-    List { count: Scalar, item: Scalar },
+    Scalar(ScalarType),
+    List { count: ScalarType, item: ScalarType },
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -128,7 +128,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
         Some((_, _, line)) if line.trim_ascii() == b"ply" => {}
         other => {
             let found = other.map_or(&[][..], |(_, _, line)| line.trim_ascii());
-            return Err(source.wrong_at(0, expected("ply", found)));
+            return Err(source.malformed_error_with_line(0, expected_message("ply", found)));
         }
     }
     let mut encoding = None;
@@ -145,32 +145,38 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
         let words: Vec<&str> = line.split_whitespace().collect();
         if words == ["end_header"] {
             let (count, first) = skipped;
-            let warning = (count > 0).then(|| skipped_lines(&first, count));
+            let warning = (count > 0).then(|| skipped_lines_warning(&first, count));
             let encoding = encoding.ok_or_else(|| {
                 let hint = warning.iter().map(|warning| format!("; {warning}")).collect::<String>();
-                source.wrong_at(start, format!("{NO_FORMAT}{hint}"))
+                source.malformed_error_with_line(start, format!("{NO_FORMAT}{hint}"))
             })?;
             let (count, first, name) = textures;
-            let texture_warning = (count > 0).then(|| texture_ignored(first, &name, count));
+            let texture_warning = (count > 0).then(|| ignored_texture_warning(first, &name, count));
             return Ok(PlyHeader { encoding, elements, warning, texture_warning, body: end });
         }
         if let Some(name) = texture_name(&line) {
             if textures.0 == 0 {
-                (textures.1, textures.2) = (source.line(start), name.to_owned());
+                (textures.1, textures.2) = (source.line_number(start), name.to_owned());
             }
             textures.0 += 1;
         }
         // Do not skip unknown keywords after the first element. They may be misspelled properties.
         if elements.is_empty() && words.first().is_some_and(|first| !KEYWORDS.contains(first)) {
             if skipped.0 == 0 {
-                skipped.1 = format!("line {}: {}", source.line(start), unknown_keyword(words[0]));
+                skipped.1 =
+                    format!("line {}: {}", source.line_number(start), unknown_keyword_message(words[0]));
             }
             skipped.0 += 1;
             continue;
         }
-        statement(&words, &mut encoding, &mut elements).map_err(|reason| source.wrong_at(start, reason))?;
+        parse_statement(&words, &mut encoding, &mut elements)
+            .map_err(|reason| source.malformed_error_with_line(start, reason))?;
     }
-    Err(source.wrong(if bytes.len() == source.bytes.len() { NO_END.to_owned() } else { too_long() }))
+    Err(source.malformed_error(if bytes.len() == source.bytes.len() {
+        NO_END.to_owned()
+    } else {
+        header_too_long_message()
+    }))
 }
 
 pub(super) const NO_FORMAT: &str = "the header has no format line";
@@ -178,7 +184,7 @@ pub(super) const NO_END: &str = "the header has no end_header";
 pub(super) const PROPERTY_FIRST: &str = "a property before the first element";
 
 /// Warning about `count` skipped lines. `first` describes the first one.
-pub(super) fn skipped_lines(first: &str, count: u32) -> String {
+pub(super) fn skipped_lines_warning(first: &str, count: u32) -> String {
     match count {
         1 => format!("{first}; line skipped"),
         _ => format!("{first}; skipped this line and {} more", count - 1),
@@ -193,74 +199,75 @@ fn texture_name(line: &str) -> Option<&str> {
 }
 
 /// Warning about `count` ignored textures. The first one is `name`, on line `first`.
-pub(super) fn texture_ignored(first: usize, name: &str, count: u32) -> String {
+pub(super) fn ignored_texture_warning(first: usize, name: &str, count: u32) -> String {
     let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
-    let name = shown(name.as_bytes());
+    let name = quote_word(name.as_bytes());
     format!("line {first}: the texture {name}{more} is ignored; set a `material` with a texture in a scene")
 }
 
-pub(super) fn too_long() -> String {
+pub(super) fn header_too_long_message() -> String {
     format!("{NO_END} in its first {} MiB, the maximum header size", HEADER_LIMIT >> 20)
 }
 
-pub(super) fn unknown_keyword(found: &str) -> String {
-    format!("{} is not a PLY header keyword", shown(found.as_bytes()))
+pub(super) fn unknown_keyword_message(found: &str) -> String {
+    format!("{} is not a PLY header keyword", quote_word(found.as_bytes()))
 }
 
-pub(super) fn invalid_statement(keyword: &str) -> String {
-    format!("incomplete or unknown statement {}", shown(keyword.as_bytes()))
+pub(super) fn invalid_statement_message(keyword: &str) -> String {
+    format!("incomplete or unknown statement {}", quote_word(keyword.as_bytes()))
 }
 
-pub(super) fn invalid_count(found: &str, element: &str) -> String {
-    format!("{} is not a valid count for element `{element}`", shown(found.as_bytes()))
+pub(super) fn invalid_count_message(found: &str, element: &str) -> String {
+    format!("{} is not a valid count for element `{element}`", quote_word(found.as_bytes()))
 }
 
-pub(super) fn unknown_type(found: &str) -> String {
-    format!("{} is not a PLY type", shown(found.as_bytes()))
+pub(super) fn unknown_type_message(found: &str) -> String {
+    format!("{} is not a PLY type", quote_word(found.as_bytes()))
 }
 
-pub(super) fn unknown_encoding(found: &str) -> String {
-    let found = shown(found.as_bytes());
+pub(super) fn unknown_encoding_message(found: &str) -> String {
+    let found = quote_word(found.as_bytes());
     format!("the format must be ascii, binary_little_endian or binary_big_endian, not {found}")
 }
 
-fn statement(
+fn parse_statement(
     words: &[&str],
     encoding: &mut Option<Encoding>,
     elements: &mut Vec<Element>,
 ) -> Result<(), String> {
     match *words {
         [] | ["comment" | "obj_info", ..] => {}
-        ["format", name, ..] => *encoding = Some(named_encoding(name)?),
+        ["format", name, ..] => *encoding = Some(parse_encoding(name)?),
         ["element", name, count] => {
-            let count = count.parse().map_err(|_| invalid_count(count, name))?;
+            let count = count.parse().map_err(|_| invalid_count_message(count, name))?;
             elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
         }
         ["property", ref words @ ..] => {
             let element = elements.last_mut().ok_or(PROPERTY_FIRST)?;
-            let property = property(words)?;
+            let property = parse_property(words)?;
             if element.properties.iter().any(|known| known.name == property.name) {
-                let (name, element) = (shown(property.name.as_bytes()), shown(element.name.as_bytes()));
+                let (name, element) =
+                    (quote_word(property.name.as_bytes()), quote_word(element.name.as_bytes()));
                 return Err(format!("duplicate property {name} in element {element}"));
             }
             element.properties.push(property);
         }
-        [first, ..] => return Err(invalid_statement(first)),
+        [first, ..] => return Err(invalid_statement_message(first)),
     }
     Ok(())
 }
 
-fn named_encoding(name: &str) -> Result<Encoding, String> {
+fn parse_encoding(name: &str) -> Result<Encoding, String> {
     match name {
         "ascii" => Ok(Encoding::Ascii),
         "binary_little_endian" => Ok(Encoding::LittleEndian),
         "binary_big_endian" => Ok(Encoding::BigEndian),
-        _ => Err(unknown_encoding(name)),
+        _ => Err(unknown_encoding_message(name)),
     }
 }
 
-fn property(words: &[&str]) -> Result<Property, String> {
-    let scalar = |name: &str| Scalar::named(name).ok_or_else(|| unknown_type(name));
+fn parse_property(words: &[&str]) -> Result<Property, String> {
+    let scalar = |name: &str| ScalarType::from_name(name).ok_or_else(|| unknown_type_message(name));
     let (kind, name) = match *words {
         ["list", count, item, name] => {
             let count = scalar(count)?;

@@ -7,26 +7,26 @@ mod faces;
 mod header;
 pub mod write;
 
-use super::assemble::assemble_text;
+use super::assemble::assemble_text_mesh;
 use super::parsed::ParsedMesh;
 use super::text::Cursor;
-use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range};
+use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3};
-use body::{Ascii, Binary, LineEndMode, NumberReader};
+use body::{AsciiReader, BinaryReader, LineEndMode, NumberReader};
 use colors::PlyColors;
-use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
+use header::{Element, Encoding, PlyHeader, PropertyType, ScalarType};
 
 /// Number of items between polls of the cancel token.
 const BATCH: u64 = 1 << 14;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    source.tick(0)?;
+    source.report_progress(0)?;
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
     match header.encoding {
         Encoding::Ascii => read_text(source, &header),
-        Encoding::LittleEndian => read(source, &header, &mut Binary::<false> { bytes, at }),
-        Encoding::BigEndian => read(source, &header, &mut Binary::<true> { bytes, at }),
+        Encoding::LittleEndian => read(source, &header, &mut BinaryReader::<false> { bytes, at }),
+        Encoding::BigEndian => read(source, &header, &mut BinaryReader::<true> { bytes, at }),
     }
 }
 
@@ -34,18 +34,18 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
 /// undeclared values, so the file is read again with one item per line.
 fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
-    let mut words = Ascii(cursor, LineEndMode::Blank);
+    let mut words = AsciiReader(cursor, LineEndMode::Blank);
     let by_words = read(source, header, &mut words);
     source.monitor.token.check()?;
     if by_words.is_ok() && !words.0.skip_to_word() {
         return by_words;
     }
-    let mut lines = Ascii(cursor, LineEndMode::EndItems(0, None));
+    let mut lines = AsciiReader(cursor, LineEndMode::EndItems(0, None));
     let by_lines = read(source, header, &mut lines);
     match (by_lines, lines.1) {
         (Ok(mut loaded), LineEndMode::EndItems(count, Some(first))) => {
-            let line = source.line(first);
-            loaded.warnings.push(undeclared_values(line, count));
+            let line = source.line_number(first);
+            loaded.warnings.push(undeclared_values_warning(line, count));
             Ok(loaded)
         }
         // Return the error from the second pass. The first pass misreads files with undeclared values.
@@ -62,24 +62,24 @@ struct ErrorContext<'a> {
 
 impl ErrorContext<'_> {
     /// Creates an error about an item. Includes the line number in text files.
-    fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
-        let reason = item_error(&element.name, index + 1, reason);
+    fn malformed_item_error(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
+        let reason = item_error_message(&element.name, index + 1, reason);
         match self.encoding {
-            Encoding::Ascii => self.source.wrong_at(at, reason),
-            _ => self.source.wrong(reason),
+            Encoding::Ascii => self.source.malformed_error_with_line(at, reason),
+            _ => self.source.malformed_error(reason),
         }
     }
 
     /// Line number prefix for a message. Empty for binary files.
     fn line_prefix(&self, at: usize) -> String {
         match self.encoding {
-            Encoding::Ascii => format!("line {}: ", self.source.line(at)),
+            Encoding::Ascii => format!("line {}: ", self.source.line_number(at)),
             Encoding::LittleEndian | Encoding::BigEndian => String::new(),
         }
     }
 
     /// Adds line numbers to warnings that have a byte offset.
-    fn located(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
+    fn with_line_numbers(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
         warnings.into_iter().map(|(at, words)| format!("{}{words}", self.line_prefix(at)))
     }
 
@@ -99,7 +99,8 @@ fn read(
         |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
     let vertices = count_of("vertex");
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
-        return Err(source.wrong(format!("too many vertices ({vertices}), or more than one vertex element")));
+        return Err(source
+            .malformed_error(format!("too many vertices ({vertices}), or more than one vertex element")));
     }
     // Ignore strips if there are faces, because both describe the same triangles.
     let has_faces = count_of("face") > 0;
@@ -110,7 +111,7 @@ fn read(
     };
     let mut before_faces = None;
     for element in &header.elements {
-        check_plausible_counts(source, element, header.encoding, numbers.at())?;
+        check_plausible_counts(source, element, header.encoding, numbers.offset())?;
         match element.name.as_str() {
             "vertex" => read_vertices(&context, element, numbers, &mut parsed)?,
             "face" => {
@@ -120,7 +121,7 @@ fn read(
             "tristrips" if !has_faces => read_strips(&context, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
             _ => read_items(&context, element, numbers, |numbers| {
-                element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
+                element.properties.iter().try_for_each(|property| skip_property(numbers, property.kind))
             })?,
         }
     }
@@ -128,9 +129,9 @@ fn read(
         let (element, mut numbers) = before_faces.clone().filter(|_| header.encoding == Encoding::Ascii)?;
         let earlier = Element { count: face as u64, ..element.clone() };
         read_faces(&context, &earlier, &mut numbers, vertices, &mut ParsedMesh::default()).ok()?;
-        Some(numbers.start())
+        Some(numbers.next_number_offset())
     };
-    assemble_text(source, parsed, start_of)
+    assemble_text_mesh(source, parsed, start_of)
 }
 
 /// Rejects element counts that are too large for the file size, before any memory is allocated.
@@ -143,21 +144,25 @@ fn check_plausible_counts(
     let needed = element.count.saturating_mul(element.min_item_bytes(encoding));
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
-        return Err(source.wrong(implausible(&element.name, element.count, remaining)));
+        return Err(source.malformed_error(implausible_count_message(
+            &element.name,
+            element.count,
+            remaining,
+        )));
     }
     Ok(())
 }
 
-fn item_error(element: &str, number: u64, reason: &str) -> String {
+fn item_error_message(element: &str, number: u64, reason: &str) -> String {
     format!("{element} {number}: {reason}")
 }
 
-fn implausible(element: &str, count: u64, remaining: u64) -> String {
+fn implausible_count_message(element: &str, count: u64, remaining: u64) -> String {
     format!("the header claims {count} `{element}` elements, but only {remaining} bytes follow")
 }
 
 /// Warning about `count` lines with more values than properties.
-fn undeclared_values(first: usize, count: u64) -> String {
+fn undeclared_values_warning(first: usize, count: u64) -> String {
     let lines = match count {
         1 => format!("line {first}"),
         _ => format!("line {first} and {} more", count - 1),
@@ -165,17 +170,17 @@ fn undeclared_values(first: usize, count: u64) -> String {
     format!("{lines}: ignored values not declared in the header")
 }
 
-fn list_too_long(length: i64) -> String {
+fn list_too_long_message(length: i64) -> String {
     format!("a list claims {length} items, more than the file can hold")
 }
 
-fn negative_length(length: i64) -> String {
+fn negative_length_message(length: i64) -> String {
     format!("negative list length {length}")
 }
 
 const NO_POSITIONS: &str = "the vertices need properties x, y and z";
 
-fn no_vertex_list(element: &str) -> String {
+fn no_vertex_list_message(element: &str) -> String {
     format!("the element `{element}` needs an integer list `vertex_indices`")
 }
 
@@ -188,30 +193,35 @@ fn read_items<N: NumberReader>(
 ) -> Result<(), AssetError> {
     for index in 0..element.count {
         if index % BATCH == 0 {
-            context.source.tick(numbers.at())?;
+            context.source.report_progress(numbers.offset())?;
         }
-        read_item(numbers).map_err(|reason| context.wrong(numbers.at(), element, index, &reason))?;
+        read_item(numbers)
+            .map_err(|reason| context.malformed_item_error(numbers.offset(), element, index, &reason))?;
         numbers.end_item();
     }
     Ok(())
 }
 
-fn skip(numbers: &mut impl NumberReader, kind: PropertyType) -> Result<(), String> {
+fn skip_property(numbers: &mut impl NumberReader, kind: PropertyType) -> Result<(), String> {
     match kind {
         PropertyType::Scalar(scalar) => numbers.skip(scalar, 1),
         PropertyType::List { count, item } => {
-            let length = list_length(numbers, count, item)?;
+            let length = read_list_length(numbers, count, item)?;
             numbers.skip(item, length)
         }
     }
 }
 
-fn list_length(numbers: &mut impl NumberReader, count: Scalar, item: Scalar) -> Result<usize, String> {
+fn read_list_length(
+    numbers: &mut impl NumberReader,
+    count: ScalarType,
+    item: ScalarType,
+) -> Result<usize, String> {
     let length = numbers.integer(count)?;
     match u64::try_from(length) {
-        Ok(fits) if numbers.can_hold(item, fits) => Ok(fits as usize),
-        Ok(_) => Err(list_too_long(length)),
-        Err(_) => Err(negative_length(length)),
+        Ok(fits) if numbers.has_bytes_for(item, fits) => Ok(fits as usize),
+        Ok(_) => Err(list_too_long_message(length)),
+        Err(_) => Err(negative_length_message(length)),
     }
 }
 
@@ -256,7 +266,7 @@ fn read_vertices(
         .collect();
     let has = |slots: &[usize]| slots.iter().all(|slot| layout.iter().any(|(_, to)| *to == Some(*slot)));
     if !has(&[0, 1, 2]) {
-        return Err(context.source.wrong(NO_POSITIONS));
+        return Err(context.source.malformed_error(NO_POSITIONS));
     }
     let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
     let has_second_uvs = has(&[11, 12]);
@@ -267,7 +277,7 @@ fn read_vertices(
         })
     };
     let mut colors =
-        has_colors.then(|| PlyColors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(Scalar::U8))));
+        has_colors.then(|| PlyColors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(ScalarType::U8))));
     let alpha_scalar = scalar(ALPHA);
     let count = element.count as usize;
     parsed.positions.reserve(count);
@@ -279,7 +289,7 @@ fn read_vertices(
         for &(kind, slot) in &layout {
             match (kind, slot) {
                 (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
-                _ => skip(numbers, kind)?,
+                _ => skip_property(numbers, kind)?,
             }
         }
         let [x, y, z, nx, ny, nz, u, v, red, green, blue, second_u, second_v, alpha] = values;
@@ -294,9 +304,9 @@ fn read_vertices(
             parsed.second_uvs.push(DVec2::new(second_u, second_v).as_vec2());
         }
         if let Some(colors) = &mut colors {
-            colors.push([red, green, blue], numbers.at());
+            colors.push([red, green, blue], numbers.offset());
             if let Some(scalar) = alpha_scalar {
-                colors.add_alpha(alpha, scalar, numbers.at());
+                colors.add_alpha(alpha, scalar, numbers.offset());
             }
         }
         Ok(())
@@ -304,7 +314,7 @@ fn read_vertices(
     if let Some(colors) = colors {
         let (colors, warnings) = colors.finish();
         parsed.colors = colors;
-        parsed.warnings.extend(context.located(warnings));
+        parsed.warnings.extend(context.with_line_numbers(warnings));
     }
     Ok(())
 }
@@ -317,7 +327,7 @@ fn read_faces(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.wrong(no_vertex_list(&element.name)));
+        return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
     };
     if faces::has_attributes(element, corners) {
         return faces::read(context, element, corners, numbers, vertices, parsed);
@@ -326,7 +336,7 @@ fn read_faces(
     faces.reserve(element.count as usize);
     read_lists(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
-            faces.corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
+            faces.push_corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
         }
         faces.end_face(length);
         Ok(())
@@ -343,7 +353,7 @@ fn read_strips(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.wrong(no_vertex_list(&element.name)));
+        return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
     };
     let faces = &mut parsed.faces;
     read_lists(context, element, corners, numbers, |numbers, item, length| {
@@ -358,7 +368,7 @@ fn read_strips(
             let [first, second] = before;
             if count >= 2 && first != second && second != next && next != first {
                 let triangle = if count % 2 == 0 { [first, second, next] } else { [second, first, next] };
-                triangle.into_iter().for_each(|vertex| faces.corner(vertex));
+                triangle.into_iter().for_each(|vertex| faces.push_corner(vertex));
                 faces.end_face(3);
             }
             (before, count) = ([second, next], count + 1);
@@ -379,7 +389,7 @@ fn vertex_list_index(element: &Element) -> Option<usize> {
 fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
     match u32::try_from(vertex) {
         Ok(fits) if u64::from(fits) < vertices => Ok(fits),
-        Ok(_) | Err(_) => Err(vertex_out_of_range(vertex, vertices)),
+        Ok(_) | Err(_) => Err(vertex_out_of_range_message(vertex, vertices)),
     }
 }
 
@@ -390,15 +400,15 @@ fn read_lists<N: NumberReader>(
     element: &Element,
     corners: usize,
     numbers: &mut N,
-    mut read: impl FnMut(&mut N, Scalar, usize) -> Result<(), String>,
+    mut read: impl FnMut(&mut N, ScalarType, usize) -> Result<(), String>,
 ) -> Result<(), AssetError> {
     read_items(context, element, numbers, |numbers| {
         for (index, property) in element.properties.iter().enumerate() {
             let PropertyType::List { count, item } = property.kind else {
-                skip(numbers, property.kind)?;
+                skip_property(numbers, property.kind)?;
                 continue;
             };
-            let length = list_length(numbers, count, item)?;
+            let length = read_list_length(numbers, count, item)?;
             if index != corners {
                 numbers.skip(item, length)?;
                 continue;

@@ -1,12 +1,15 @@
 use std::path::Path;
 
-use super::super::parsed::{FACE_COLORS_IGNORED, alpha_ignored, color_clamped, color_not_integer};
-use super::super::text::expected;
+use super::super::parsed::{
+    FACE_COLORS_IGNORED, alpha_ignored_warning, clamped_color_warning, fractional_color_warning,
+};
+use super::super::text::expected_message;
 use super::body::END_OF_FILE;
-use super::faces::{SEVERAL_TEXTURES, wrong_list_length};
+use super::faces::{SEVERAL_TEXTURES, wrong_list_length_warning};
 use super::header::{
-    NO_END, NO_FORMAT, PROPERTY_FIRST, invalid_count, invalid_statement, skipped_lines, texture_ignored,
-    too_long, unknown_encoding, unknown_keyword, unknown_type,
+    NO_END, NO_FORMAT, PROPERTY_FIRST, header_too_long_message, ignored_texture_warning,
+    invalid_count_message, invalid_statement_message, skipped_lines_warning, unknown_encoding_message,
+    unknown_keyword_message, unknown_type_message,
 };
 use super::*;
 use crate::assets::read::Monitor;
@@ -26,7 +29,7 @@ fn error(bytes: &[u8]) -> (Option<usize>, String) {
 
 /// Error in the first face.
 fn face_error(reason: &str) -> String {
-    item_error("face", 1, reason)
+    item_error_message("face", 1, reason)
 }
 
 const VERTEX: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
@@ -122,13 +125,13 @@ fn faces_may_precede_vertices() {
 #[test]
 fn errors_include_line_or_face() {
     for (body, line, reason) in [
-        (format!("{SQUARE}3 0 1 4\n"), 15, face_error(&vertex_out_of_range(4, 4))),
-        (format!("{SQUARE}-3 0 1 2\n"), 15, face_error(&negative_length(-3))),
-        (format!("{SQUARE}999 0 1 2\n"), 15, face_error(&list_too_long(999))),
+        (format!("{SQUARE}3 0 1 4\n"), 15, face_error(&vertex_out_of_range_message(4, 4))),
+        (format!("{SQUARE}-3 0 1 2\n"), 15, face_error(&negative_length_message(-3))),
+        (format!("{SQUARE}999 0 1 2\n"), 15, face_error(&list_too_long_message(999))),
         (
             "0 0 0\n1 x 0\n0 0 0\n0 0 0\n3 0 1 2\n".to_owned(),
             12,
-            item_error("vertex", 2, &expected("a number", b"x")),
+            item_error_message("vertex", 2, &expected_message("a number", b"x")),
         ),
     ] {
         assert_eq!(error(&ascii(&body)), (Some(line), reason));
@@ -136,13 +139,13 @@ fn errors_include_line_or_face() {
     let mut binary = wild(false);
     let last = binary.len() - 2;
     binary[last] = 9;
-    assert_eq!(error(&binary), (None, face_error(&vertex_out_of_range(9, 3))));
+    assert_eq!(error(&binary), (None, face_error(&vertex_out_of_range_message(9, 3))));
     for (text, line, reason) in [
-        ("plx\n", Some(1), expected("ply", b"plx")),
-        ("ply\nformat ascii 1.0\nelement vertex many\n", Some(3), invalid_count("many", "vertex")),
+        ("plx\n", Some(1), expected_message("ply", b"plx")),
+        ("ply\nformat ascii 1.0\nelement vertex many\n", Some(3), invalid_count_message("many", "vertex")),
         ("ply\nproperty float x\n", Some(2), PROPERTY_FIRST.to_owned()),
-        ("ply\nformat utf8 1.0\n", Some(2), unknown_encoding("utf8")),
-        ("ply\nelement v 1\nproperty half x\n", Some(3), unknown_type("half")),
+        ("ply\nformat utf8 1.0\n", Some(2), unknown_encoding_message("utf8")),
+        ("ply\nelement v 1\nproperty half x\n", Some(3), unknown_type_message("half")),
         ("ply\nend_header\n", Some(2), NO_FORMAT.to_owned()),
         ("ply\nformat ascii 1.0\n", None, NO_END.to_owned()),
         (
@@ -160,25 +163,25 @@ fn false_counts_cause_no_allocation() {
     for encoding in ["ascii", "binary_little_endian"] {
         let vertices = VERTEX.replace('4', "4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{vertices}{FACE}0 0 0\n");
-        assert_eq!(error(text.as_bytes()).1, implausible("vertex", 4_000_000_000, 6));
+        assert_eq!(error(text.as_bytes()).1, implausible_count_message("vertex", 4_000_000_000, 6));
         let faces = FACE.replace("face 1", "face 4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{faces}");
-        assert_eq!(error(text.as_bytes()).1, implausible("face", 4_000_000_000, 0));
+        assert_eq!(error(text.as_bytes()).1, implausible_count_message("face", 4_000_000_000, 0));
     }
     let list = FACE.replace("uchar int", "uint int");
     let mut file = format!("ply\nformat binary_little_endian 1.0\n{VERTEX}{list}").into_bytes();
     file.extend([0; 48]);
     file.extend(4_000_000_000_u32.to_le_bytes());
-    assert_eq!(error(&file).1, face_error(&list_too_long(4_000_000_000)));
+    assert_eq!(error(&file).1, face_error(&list_too_long_message(4_000_000_000)));
 }
 
 #[test]
 fn the_header_size_is_limited() {
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(10_000);
     let long = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
-    assert_eq!(error(long.as_bytes()).1, too_long());
+    assert_eq!(error(long.as_bytes()).1, header_too_long_message());
     let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
-    assert_eq!(error(line.as_bytes()).1, too_long());
+    assert_eq!(error(line.as_bytes()).1, header_too_long_message());
     // This header is just short enough. The size limit is reached within a line after it.
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
     let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
@@ -217,17 +220,17 @@ fn strip_triangles_alternate_in_orientation() {
     // A repeated vertex joins strips and is not counted as a dropped face.
     let joined = read("8 0 1 3 3 3 1 2 0\n");
     assert_eq!(joined.mesh.triangles, [[0, 1, 3], [3, 1, 2], [2, 1, 0]]);
-    assert_eq!(joined.dropped, crate::assets::Dropped::default());
-    let strip_error = |reason: &str| item_error("tristrips", 1, reason);
+    assert_eq!(joined.dropped, crate::assets::DroppedFaces::default());
+    let strip_error = |reason: &str| item_error_message("tristrips", 1, reason);
     for (list, reason) in [
-        ("3 0 1 4\n", vertex_out_of_range(4, 4)),
-        ("3 0 1 -2\n", vertex_out_of_range(-2, 4)),
-        ("900 0 1 2\n", list_too_long(900)),
+        ("3 0 1 4\n", vertex_out_of_range_message(4, 4)),
+        ("3 0 1 -2\n", vertex_out_of_range_message(-2, 4)),
+        ("900 0 1 2\n", list_too_long_message(900)),
     ] {
         assert_eq!(error(&file(list, strips)).1, strip_error(&reason));
     }
     let not_a_list = file("", "element tristrips 0\nproperty float vertex_indices\n");
-    assert_eq!(error(&not_a_list).1, no_vertex_list("tristrips"));
+    assert_eq!(error(&not_a_list).1, no_vertex_list_message("tristrips"));
     // Strips are ignored if there are faces.
     let both = format!("{strips}element face 1\nproperty list uchar int vertex_indices\n");
     assert_eq!(read_bytes(&file("4 0 1 3 2\n3 0 1 2\n", &both)).expect("whole").mesh.triangles, [[0, 1, 2]]);
@@ -240,19 +243,19 @@ fn unknown_header_lines_are_skipped_with_warning() {
     let odd = text.replace("comment made here", "Created by hand, with love");
     let read = read_bytes(odd.as_bytes()).expect("whole");
     assert_eq!(read.mesh, plain.mesh);
-    let unknown = format!("line 3: {}", unknown_keyword("Created"));
-    assert_eq!(read.warnings, [skipped_lines(&unknown, 1)]);
+    let unknown = format!("line 3: {}", unknown_keyword_message("Created"));
+    assert_eq!(read.warnings, [skipped_lines_warning(&unknown, 1)]);
     let odd = text.replace("comment made here", "Created by hand\nwith love\nlong ago");
-    assert_eq!(read_bytes(odd.as_bytes()).expect("whole").warnings, [skipped_lines(&unknown, 3)]);
+    assert_eq!(read_bytes(odd.as_bytes()).expect("whole").warnings, [skipped_lines_warning(&unknown, 3)]);
     // Misspelled keywords are errors if they could change the meaning.
     let replaced = |from: &str, to: &str| error(text.replace(from, to).as_bytes());
-    assert_eq!(replaced("element face", "elment face").1, invalid_statement("elment"));
-    assert_eq!(replaced("property float z", "porperty float z").1, invalid_statement("porperty"));
-    let misspelled = skipped_lines(&format!("line 2: {}", unknown_keyword("frmat")), 1);
+    assert_eq!(replaced("element face", "elment face").1, invalid_statement_message("elment"));
+    assert_eq!(replaced("property float z", "porperty float z").1, invalid_statement_message("porperty"));
+    let misspelled = skipped_lines_warning(&format!("line 2: {}", unknown_keyword_message("frmat")), 1);
     assert_eq!(replaced("format", "frmat").1, format!("{NO_FORMAT}; {misspelled}"));
     // Incomplete statements are ambiguous, so they are errors.
-    assert_eq!(replaced("comment made here", "element box").1, invalid_statement("element"));
-    assert_eq!(replaced("comment made here", "format").1, invalid_statement("format"));
+    assert_eq!(replaced("comment made here", "element box").1, invalid_statement_message("element"));
+    assert_eq!(replaced("comment made here", "format").1, invalid_statement_message("format"));
     assert_eq!(error(&[b"ply\n".as_slice(), &[7; 3000]].concat()).1, NO_END);
 }
 
@@ -269,11 +272,11 @@ fn undeclared_values_are_ignored() {
         assert_eq!(read.mesh, plain.mesh, "{body}");
         assert_eq!(read.warnings.len(), 1);
         let line = if body.contains("9 9") { 11 } else { 14 };
-        assert_eq!(read.warnings[0], undeclared_values(line, 2));
+        assert_eq!(read.warnings[0], undeclared_values_warning(line, 2));
     }
     // A truncated file with undeclared values must not be read word by word.
     let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n";
-    assert_eq!(error(&ascii(rows)), (None, implausible("face", 1, 0)));
+    assert_eq!(error(&ascii(rows)), (None, implausible_count_message("face", 1, 0)));
     let truncated = (Some(15), face_error(END_OF_FILE));
     assert_eq!(error(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n")), truncated);
     // A face with too few corners is an error in both passes.
@@ -348,7 +351,7 @@ fn corner_texture_coordinates_are_read() {
     assert_eq!(uvs(list, &[two[0], "3 0 2 3 0"]), (vec![a, b, c, a, a, a], vec![]));
     let (found, warnings) = uvs(list, &[two[0], "3 0 2 3 5 1 1 1 1 1"]);
     assert_eq!(found, [a, b, c, a, a, a]);
-    assert_eq!(warnings, [wrong_list_length("line 15: face 2", 1)]);
+    assert_eq!(warnings, [wrong_list_length_warning("line 15: face 2", 1)]);
     assert!(uvs("", &["3 0 1 2"]).0.is_empty());
 }
 
@@ -420,7 +423,7 @@ fn alpha_below_one_causes_a_warning() {
         ("float", "9 9 9 255", "9 9 9 9"),
     ] {
         assert!(warnings(scalar, opaque).is_empty(), "{scalar} {opaque}");
-        assert_eq!(warnings(scalar, faded), [alpha_ignored(14)]);
+        assert_eq!(warnings(scalar, faded), [alpha_ignored_warning(14)]);
     }
 }
 
@@ -429,22 +432,40 @@ fn unusable_vertex_colors_are_reported_with_line() {
     let properties =
         |scalar: &str| ["red", "green", "blue"].map(|name| format!("property {scalar} {name}\n")).concat();
     for (scalar, tails, line, words, color) in [
-        ("uchar", ["0 0 0", "0 300 0", "0 0 0", "0 0 0"], 14, color_clamped(300.0, 255.0), [0, 255, 0]),
-        ("uchar", ["0 0 0", "0 0 0", "0 0 -5", "0 0 0"], 15, color_clamped(-5.0, 255.0), [0; 3]),
-        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, color_not_integer(0.5), [0; 3]),
-        ("float", ["0 0.5 0", "0 1.5 0", "0 0 0", "0 0 0"], 14, color_clamped(1.5, 1.0), [0, 255, 0]),
-        ("float", ["0 0 0", "0 -0.5 0", "0 0 0", "0 0 0"], 14, color_clamped(-0.5, 1.0), [0; 3]),
-        ("float", ["0 9 0", "0 300 0", "0 0 0", "0 0 0"], 14, color_clamped(300.0, 255.0), [0, 255, 0]),
-        ("double", ["0 1 0", "0 nan 0", "0 0 0", "0 0 0"], 14, color_clamped(f64::NAN, 1.0), [0; 3]),
-        ("float", ["0 1 0", "0 inf 0", "0 0 0", "0 0 0"], 14, color_clamped(f64::INFINITY, 1.0), [0, 255, 0]),
+        (
+            "uchar",
+            ["0 0 0", "0 300 0", "0 0 0", "0 0 0"],
+            14,
+            clamped_color_warning(300.0, 255.0),
+            [0, 255, 0],
+        ),
+        ("uchar", ["0 0 0", "0 0 0", "0 0 -5", "0 0 0"], 15, clamped_color_warning(-5.0, 255.0), [0; 3]),
+        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, fractional_color_warning(0.5), [0; 3]),
+        ("float", ["0 0.5 0", "0 1.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(1.5, 1.0), [0, 255, 0]),
+        ("float", ["0 0 0", "0 -0.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(-0.5, 1.0), [0; 3]),
+        (
+            "float",
+            ["0 9 0", "0 300 0", "0 0 0", "0 0 0"],
+            14,
+            clamped_color_warning(300.0, 255.0),
+            [0, 255, 0],
+        ),
+        ("double", ["0 1 0", "0 nan 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(f64::NAN, 1.0), [0; 3]),
+        (
+            "float",
+            ["0 1 0", "0 inf 0", "0 0 0", "0 0 0"],
+            14,
+            clamped_color_warning(f64::INFINITY, 1.0),
+            [0, 255, 0],
+        ),
         (
             "ushort",
             ["0 1 0", "0 70000 0", "0 0 0", "0 0 0"],
             14,
-            color_clamped(70000.0, 65535.0),
+            clamped_color_warning(70000.0, 65535.0),
             [0, 255, 0],
         ),
-        ("int", ["0 1 0", "0 -1 0", "0 0 0", "0 0 0"], 14, color_clamped(-1.0, 255.0), [0; 3]),
+        ("int", ["0 1 0", "0 -1 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(-1.0, 255.0), [0; 3]),
     ] {
         let found = loaded(&square((&properties(scalar), tails), "", &["3 0 1 2"]));
         assert_eq!(found.warnings, [format!("line {line}: {words}")], "{scalar} {tails:?}");
@@ -476,8 +497,9 @@ fn unusable_face_colors_are_reported_with_line() {
     };
     let warnings = |face: &str, lines: &[&str]| loaded(&square(PLAIN, face, lines)).warnings;
     let rgb = ["red", "green", "blue"];
-    let clamped =
-        |line: usize, value: f64, one: f64| vec![format!("line {line}: {}", color_clamped(value, one))];
+    let clamped = |line: usize, value: f64, one: f64| {
+        vec![format!("line {line}: {}", clamped_color_warning(value, one))]
+    };
     let (own, list) = (parts("uchar", &rgb), "property list uchar float color\n");
     let rows = |face: &str, lines: &[&str]| {
         square(PLAIN, face, lines)
@@ -491,10 +513,10 @@ fn unusable_face_colors_are_reported_with_line() {
     let lines = ["3 0 1 2 3 0 0 0.5", "3 0 2 3 3 -1 0 0"];
     assert_eq!(warnings(list, &lines), clamped(rows(list, &lines) + 1, -1.0, 1.0));
     let lines = ["3 0 1 2 4 0 0 1 1", "3 0 2 3 4 0 0 1 0.5"];
-    assert_eq!(warnings(list, &lines), [alpha_ignored(rows(list, &lines) + 1)]);
+    assert_eq!(warnings(list, &lines), [alpha_ignored_warning(rows(list, &lines) + 1)]);
     let with_alpha = parts("uchar", &["red", "green", "blue", "alpha"]);
     let lines = ["3 0 1 2 0 0 0 255", "3 0 2 3 0 0 0 254"];
-    assert_eq!(warnings(&with_alpha, &lines), [alpha_ignored(rows(&with_alpha, &lines) + 1)]);
+    assert_eq!(warnings(&with_alpha, &lines), [alpha_ignored_warning(rows(&with_alpha, &lines) + 1)]);
 }
 
 #[test]
@@ -505,9 +527,9 @@ fn texture_comments_are_reported_with_line() {
         (found.warnings, found.material_warnings)
     };
     assert_eq!(with("comment made by hand\ncomment TextureFiles\n"), (vec![], vec![]));
-    let one = vec![texture_ignored(3, "old wall.png", 1)];
+    let one = vec![ignored_texture_warning(3, "old wall.png", 1)];
     assert_eq!(with("comment TextureFile old wall.png\n"), (vec![], one));
-    let two = vec![texture_ignored(3, "a.png", 2)];
+    let two = vec![ignored_texture_warning(3, "a.png", 2)];
     assert_eq!(with("comment TextureFile a.png\ncomment TextureFile b.png\n"), (vec![], two));
 }
 

@@ -18,18 +18,18 @@ const NONE: u32 = u32::MAX;
 
 /// Triangulates a counterclockwise polygon. Returns whether all cuts are diagonals, which is false for
 /// self-intersecting polygons.
-pub(super) fn clip(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
-    Clipper::new(points, emit).run()
+pub(super) fn clip_ears(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
+    EarClipper::new(points, emit).run()
 }
 
 /// Like [`clip`], but also returns the number of visits.
 #[cfg(test)]
 pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
-    let mut clipper = Clipper::new(points, |_| {});
+    let mut clipper = EarClipper::new(points, |_| {});
     (clipper.run(), clipper.visits)
 }
 
-struct Clipper<'a, F> {
+struct EarClipper<'a, F> {
     points: &'a [DVec2],
     emit: F,
     next: Vec<u32>,
@@ -46,7 +46,7 @@ struct Clipper<'a, F> {
     max_visits: u64,
 }
 
-impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
+impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
     fn new(points: &'a [DVec2], emit: F) -> Self {
         let count = points.len() as u32;
         Self {
@@ -70,7 +70,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         while self.remaining > 2 {
             self.clip_queued();
             if self.remaining <= 2
-                || self.clip_first(|clipper, corner| clipper.blocker(corner, true).is_none())
+                || self.clip_first(|clipper, corner| clipper.find_blocker(corner, true).is_none())
             {
                 continue;
             }
@@ -90,11 +90,11 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
                 continue;
             }
             if self.is_spike(corner) {
-                self.clip(corner);
+                self.clip_corner(corner);
             } else if self.is_convex(corner) {
-                match self.blocker(corner, false) {
-                    None => self.clip(corner),
-                    Some(blocker) => self.wait(corner, stamp, blocker),
+                match self.find_blocker(corner, false) {
+                    None => self.clip_corner(corner),
+                    Some(blocker) => self.wait_for_blocker(corner, stamp, blocker),
                 }
             }
         }
@@ -106,7 +106,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         let mut corner = start as u32;
         for _ in 0..self.remaining {
             if self.is_convex(corner) && is_ear(self, corner) {
-                self.clip(corner);
+                self.clip_corner(corner);
                 return true;
             }
             corner = self.next[corner as usize];
@@ -118,24 +118,24 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         self.points[corner as usize]
     }
 
-    fn around(&self, corner: u32) -> [u32; 3] {
+    fn corner_and_neighbors(&self, corner: u32) -> [u32; 3] {
         [self.previous[corner as usize], corner, self.next[corner as usize]]
     }
 
     fn is_convex(&self, corner: u32) -> bool {
-        let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.corner_and_neighbors(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) > 0.0
     }
 
     /// Whether the outline reverses direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
-        let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.corner_and_neighbors(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
     /// Removes a corner, and emits its triangle unless the triangle has zero area.
-    fn clip(&mut self, corner: u32) {
-        let [a, b, c] = self.around(corner);
+    fn clip_corner(&mut self, corner: u32) {
+        let [a, b, c] = self.corner_and_neighbors(corner);
         if self.is_convex(b) {
             (self.emit)([a, b, c].map(|corner| corner as usize));
         }
@@ -146,7 +146,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         self.remaining -= 1;
         self.tree.remove(b);
         for changed in [b, a, c] {
-            self.wake(changed);
+            self.requeue_blocked(changed);
         }
         for neighbor in [a, c] {
             self.enqueue(neighbor);
@@ -161,14 +161,14 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         self.queue.push_back((corner, *stamp));
     }
 
-    fn wait(&mut self, corner: u32, stamp: u32, blocker: u32) {
+    fn wait_for_blocker(&mut self, corner: u32, stamp: u32, blocker: u32) {
         let first = &mut self.first_waiting[blocker as usize];
         self.waiting.push((corner, stamp, *first));
         *first = (self.waiting.len() - 1) as u32;
     }
 
     /// Queues the corners blocked by `blocker`.
-    fn wake(&mut self, blocker: u32) {
+    fn requeue_blocked(&mut self, blocker: u32) {
         let mut entry = std::mem::replace(&mut self.first_waiting[blocker as usize], NONE);
         while entry != NONE {
             let (corner, stamp, next) = self.waiting[entry as usize];
@@ -182,14 +182,14 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     /// Finds a corner that prevents a convex corner from being an ear: one at which the outline enters the
     /// convex corner's triangle. Unless `may_touch` is true, corners on the diagonal also count, because the
     /// triangles on its two sides would not share these vertices.
-    fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
+    fn find_blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
         if self.visits > self.max_visits {
             return None;
         }
-        let around = self.around(corner);
+        let around = self.corner_and_neighbors(corner);
         let triangle = around.map(|corner| self.point(corner));
         let mut visits = self.visits;
-        let found = self.tree.find(triangle, &mut visits, |other| {
+        let found = self.tree.find_near_triangle(triangle, &mut visits, |other| {
             self.next[other as usize] != NONE
                 && !around.contains(&other)
                 && self.outline_enters(triangle, other, may_touch)
@@ -203,7 +203,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     fn outline_enters(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
-        let turns = turns(triangle, point);
+        let turns = edge_orientations(triangle, point);
         if turns.iter().any(|turn| *turn < 0.0) {
             return false;
         }
@@ -213,13 +213,13 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         // If the corner is on the triangle's boundary, the outline enters the triangle if a neighbor is
         // inside every side that the corner is on.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
-            let sides = self::turns(triangle, self.point(neighbor));
+            let sides = self::edge_orientations(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
         })
     }
 }
 
 /// Returns which side of each triangle edge a point is on. Positive values are inside.
-fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
+fn edge_orientations([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     [twice_signed_area(a, b, point), twice_signed_area(b, c, point), twice_signed_area(c, a, point)]
 }

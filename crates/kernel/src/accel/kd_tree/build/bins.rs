@@ -30,7 +30,7 @@ struct Histogram {
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
-    fn of(references: &[TriangleReference], start: Vec4, per_length: Vec4) -> Self {
+    fn from_references(references: &[TriangleReference], start: Vec4, per_length: Vec4) -> Self {
         let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
         // Subtract ½ to turn rounding to nearest into rounding down.
         let bins = |at: Vec4| {
@@ -48,7 +48,7 @@ impl Histogram {
         own
     }
 
-    fn add(mut self, other: &Self) -> Self {
+    fn merge(mut self, other: &Self) -> Self {
         let own = self.starts.iter_mut().chain(&mut self.ends).flatten();
         for (own, other) in own.zip(other.starts.iter().chain(&other.ends).flatten()) {
             *own += other;
@@ -58,7 +58,7 @@ impl Histogram {
 }
 
 /// Finds the cheapest plane. Returns `None` if a leaf is no more expensive.
-pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
+pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     let around = SimdBounds::around(references);
     let extent = around.extent();
     let scale = |length: f32| {
@@ -68,10 +68,11 @@ pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<S
     let per_length = Vec4::new(scale(extent.x), scale(extent.y), scale(extent.z), 0.0);
     let histogram = if references.len() > PARALLEL_SIZE {
         let chunks = references.par_chunks(references.len().div_ceil(8));
-        let parts: Vec<_> = chunks.map(|chunk| Histogram::of(chunk, around.min, per_length)).collect();
-        parts.into_iter().reduce(|all, one| all.add(&one))?
+        let parts: Vec<_> =
+            chunks.map(|chunk| Histogram::from_references(chunk, around.min, per_length)).collect();
+        parts.into_iter().reduce(|all, one| all.merge(&one))?
     } else {
-        Histogram::of(references, around.min, per_length)
+        Histogram::from_references(references, around.min, per_length)
     };
     let mut search = PlaneSearch::<{ PLANES / 4 }>::new(cell, references.len());
     for axis in 0..3 {

@@ -24,7 +24,7 @@ pub struct SubtreeSize {
 
 impl TreePart {
     /// Creates an upper node from its plane and its two parts.
-    pub fn halves(plane: SplitPlane, halves: [Self; 2]) -> Self {
+    pub fn from_halves(plane: SplitPlane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
         let size = SubtreeSize { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
         Self::Halves { plane, size, halves: Box::new(halves) }
@@ -39,7 +39,7 @@ impl TreePart {
 
     /// Joins all parts into one subtree. Nodes precede their children, and left children precede right
     /// children.
-    pub fn join(self) -> KdSubtree {
+    pub fn flatten(self) -> KdSubtree {
         let size = self.size();
         let mut all =
             KdSubtree { nodes: pages::with_huge_pages(size.nodes), ids: pages::with_huge_pages(size.ids) };
@@ -48,12 +48,12 @@ impl TreePart {
             || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),
             || (0..size.ids).into_par_iter().map(|_| 0).collect_into_vec(&mut all.ids),
         );
-        self.write(&mut all.nodes, &mut all.ids, SubtreeSize { nodes: 0, ids: 0 });
+        self.flatten_into(&mut all.nodes, &mut all.ids, SubtreeSize { nodes: 0, ids: 0 });
         all
     }
 
     /// Writes the part, given the numbers of nodes and references that precede it.
-    fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: SubtreeSize) {
+    fn flatten_into(self, nodes: &mut [KdNode], ids: &mut [u32], before: SubtreeSize) {
         match self {
             Self::Built(subtree) => {
                 for (node, own) in nodes.iter_mut().zip(&subtree.nodes) {
@@ -73,8 +73,8 @@ impl TreePart {
                 let right_place = before_right.nodes as u32;
                 node[0] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right: right_place });
                 rayon::join(
-                    || left.write(left_nodes, left_ids, before_left),
-                    || right.write(right_nodes, right_ids, before_right),
+                    || left.flatten_into(left_nodes, left_ids, before_left),
+                    || right.flatten_into(right_nodes, right_ids, before_right),
                 );
             }
         }

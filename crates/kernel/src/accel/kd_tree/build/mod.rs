@@ -71,11 +71,11 @@ pub fn build(
     token: &CancelToken,
 ) -> Result<BuiltKdTree, Cancelled> {
     let room = MOST_ROOM.min(MOST_PER_TRIANGLE * (u64::from(count) + FEW));
-    build_within(room, count, corners, token)
+    build_with_budget(room, count, corners, token)
 }
 
 /// [`build`] with at most `room` leaves and references in total.
-fn build_within(
+fn build_with_budget(
     room: u64,
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -89,7 +89,7 @@ fn build_within(
     let bounds = SimdBounds::around(&references);
     let levels = depth_limit(references.len());
     let part = build_part(&Cell { bounds, levels, room }, references, &corners, token)?;
-    let all = part.join();
+    let all = part.flatten();
     token.check()?;
     let (references, order) = order_by_first_use(all.ids, count);
     let triangles = order.into_par_iter().map(|id| LeafTriangle { corners: corners(id), id }).collect();
@@ -125,19 +125,19 @@ impl Cell {
     /// Chooses the splitting plane. Returns `None` if the cell should become a leaf.
     fn choose_split(&self, references: &[TriangleReference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
-        let has_room = 2 * leaf_room(references.len()) <= self.room;
+        let has_room = 2 * leaf_size(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
         } else if references.len() <= sweep::SWEPT {
-            sweep::cheapest(references, &self.bounds)
+            sweep::cheapest_plane(references, &self.bounds)
         } else {
-            bins::cheapest(references, &self.bounds)
+            bins::cheapest_plane(references, &self.bounds)
         }
     }
 
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
-        let [left, right] = counts.map(leaf_room);
+        let [left, right] = counts.map(leaf_size);
         // Divide the room proportionally. If there is enough room for both halves together, each half gets
         // enough.
         let room = self.room * left / (left + right);
@@ -148,7 +148,7 @@ impl Cell {
 }
 
 /// Room needed by a leaf with `count` references.
-fn leaf_room(count: usize) -> u64 {
+fn leaf_size(count: usize) -> u64 {
     count as u64 + 1
 }
 
@@ -171,7 +171,7 @@ fn build_part(
         || build_part(&left_cell, left, corners, token),
         || build_part(&right_cell, references, corners, token),
     );
-    Ok(TreePart::halves(plane, [left?, right?]))
+    Ok(TreePart::from_halves(plane, [left?, right?]))
 }
 
 #[cfg(test)]
@@ -207,7 +207,7 @@ mod tests {
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
         };
         let size = |room| {
-            let built = build_within(room, 6000, fan, &CancelToken::new()).expect("never canceled");
+            let built = build_with_budget(room, 6000, fan, &CancelToken::new()).expect("never canceled");
             let leaf = |node: &&KdNode| matches!(node.kind(), NodeKind::Leaf { .. });
             assert_eq!(built.triangles.len(), 6000);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64

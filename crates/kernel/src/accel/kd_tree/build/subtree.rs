@@ -32,7 +32,7 @@ impl KdSubtree {
             corners,
             token,
         };
-        builder.add(0, cell)?;
+        builder.build_cell(0, cell)?;
         Ok(builder.built)
     }
 }
@@ -50,7 +50,7 @@ struct KdSubtreeBuilder<'a, C> {
 impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     /// Builds the nodes for a cell and removes the cell's references, which begin at `first`. The recursion
     /// depth is limited by the tree depth.
-    fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
+    fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
         let leaf = NodeKind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
@@ -67,10 +67,10 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
         let middle = self.references.len();
         let [left_cell, right_cell] = cell.halves(&plane, [left.len(), middle - first]);
         self.references.extend_from_slice(left);
-        self.add(middle, &left_cell)?;
+        self.build_cell(middle, &left_cell)?;
         let right = self.built.nodes.len() as u32;
         self.built.nodes[place] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right });
-        self.add(first, &right_cell)
+        self.build_cell(first, &right_cell)
     }
 }
 

@@ -10,20 +10,23 @@ use crate::math::Vec4;
 pub const SWEPT: usize = 24;
 
 /// Finds the cheapest plane. Returns `None` if a leaf costs no more.
-pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
+pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     match references.len() {
-        0..=4 => cheapest_of::<1>(references, cell),
-        5..=8 => cheapest_of::<2>(references, cell),
-        9..=16 => cheapest_of::<4>(references, cell),
-        _ => cheapest_of::<{ SWEPT / 4 }>(references, cell),
+        0..=4 => cheapest_plane_simd::<1>(references, cell),
+        5..=8 => cheapest_plane_simd::<2>(references, cell),
+        9..=16 => cheapest_plane_simd::<4>(references, cell),
+        _ => cheapest_plane_simd::<{ SWEPT / 4 }>(references, cell),
     }
 }
 
 /// A number for each of 4·`N` references.
-type Values<const N: usize> = [[f32; 4]; N];
+type LaneValues<const N: usize> = [[f32; 4]; N];
 
-/// [`cheapest`] for at most 4·`N` references.
-fn cheapest_of<const N: usize>(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
+/// [`cheapest_plane`] for at most 4·`N` references.
+fn cheapest_plane_simd<const N: usize>(
+    references: &[TriangleReference],
+    cell: &SimdBounds,
+) -> Option<SplitPlane> {
     let mut search = PlaneSearch::<N>::new(cell, references.len());
     // Store the start and the end of each box along each axis. Unused lanes start above every plane and end
     // below it.
@@ -39,7 +42,7 @@ fn cheapest_of<const N: usize>(references: &[TriangleReference], cell: &SimdBoun
         let (starts, ends) = (&starts[axis], &ends[axis]);
         let has_planar = (0..N).any(|i| Vec4::from(starts[i]).cmpeq(Vec4::from(ends[i])).any());
         for at in [starts, ends] {
-            add_planes_across(axis, at, [starts, ends], references.len(), has_planar, &mut search);
+            add_axis_planes(axis, at, [starts, ends], references.len(), has_planar, &mut search);
         }
     }
     search.cheapest()
@@ -47,10 +50,10 @@ fn cheapest_of<const N: usize>(references: &[TriangleReference], cell: &SimdBoun
 
 /// Adds the candidate planes at `at`, perpendicular to an axis, to the search.
 #[inline(always)]
-fn add_planes_across<const N: usize>(
+fn add_axis_planes<const N: usize>(
     axis: usize,
-    at: &Values<N>,
-    [starts, ends]: [&Values<N>; 2],
+    at: &LaneValues<N>,
+    [starts, ends]: [&LaneValues<N>; 2],
     count: usize,
     has_planar: bool,
     search: &mut PlaneSearch<N>,
@@ -85,7 +88,7 @@ fn add_planes_across<const N: usize>(
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     /// Cost of a plane, computed directly from the definition. Infinite if the plane does not intersect the
     /// cell.
@@ -133,7 +136,7 @@ mod tests {
                 (0..6).map(move |i| SplitPlane { axis: i % 3, at: corner[i % 3], planar_right: i < 3 })
             });
             let least = all.map(|plane| cost(&references, &cell, &plane)).fold(count as f32, f32::min);
-            match cheapest(&references, &cell) {
+            match cheapest_plane(&references, &cell) {
                 Some(plane) => {
                     let own = cost(&references, &cell, &plane);
                     assert!((own - least).abs() <= 1e-5 * least, "{round}: {plane:?} {own}, {least}");

@@ -9,7 +9,7 @@ use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
 /// Joins all parts into one list of nodes, starting with the root, and one list of packs.
-pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<PackRange>) {
+pub fn flatten(root: TreePart) -> (Vec<WideNode>, Vec<PackRange>) {
     let mut top = UpperNodes::default();
     match root {
         TreePart::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => {
@@ -81,7 +81,7 @@ impl UpperNodes {
     fn finish(self) -> (Vec<WideNode>, Vec<PackRange>) {
         let starts = self.subtree_starts();
         let nodes_of_top: Vec<WideNode> =
-            self.nodes.iter().map(|children| self.top_node(children, &starts)).collect();
+            self.nodes.iter().map(|children| self.build_wide_node(children, &starts)).collect();
         let total = starts.last().map_or(0, |end| end.node);
         let mut nodes = pages::with_huge_pages(total as usize);
         let node = |place: u32| match nodes_of_top.get(place as usize) {
@@ -108,7 +108,7 @@ impl UpperNodes {
         starts
     }
 
-    fn top_node(&self, children: &[(SimdBounds, UpperChild)], starts: &[SubtreeStart]) -> WideNode {
+    fn build_wide_node(&self, children: &[(SimdBounds, UpperChild)], starts: &[SubtreeStart]) -> WideNode {
         let mut node = WideNode::EMPTY;
         for (slot, &(bounds, below)) in children.iter().enumerate() {
             let child = match below {

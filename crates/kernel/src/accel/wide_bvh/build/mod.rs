@@ -46,13 +46,13 @@ pub fn build(
         return Ok(BuiltWideBvh { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
     if quality == Quality::High {
-        references = triangle_splits::split_large(&references, &corners, token)?;
+        references = triangle_splits::split_large_triangles(&references, &corners, token)?;
     }
     let whole = ReferenceRange::whole(&references);
     let bounds = whole.bounds.aabb();
     let part = build_part(&mut references, 0, whole, token)?;
     token.check()?;
-    let (nodes, leaves) = join::join(part);
+    let (nodes, leaves) = join::flatten(part);
     token.check()?;
     let pack = |leaf: &subtree::PackRange| {
         let members = &references[leaf.first as usize..][..leaf.count as usize];

@@ -45,7 +45,7 @@ pub struct ReferenceRange {
 pub enum Split {
     /// At a plane. References below `bin` on `axis` go to the left. `sides` are the bounding boxes of both
     /// sides.
-    Plane { axis: usize, bin: usize, bins: Bins, sides: [SimdBounds; 2] },
+    Plane { axis: usize, bin: usize, bins: BinMapping, sides: [SimdBounds; 2] },
     /// In the middle of the references in their current order.
     Middle,
 }
@@ -53,11 +53,11 @@ pub enum Split {
 impl ReferenceRange {
     /// The segment that contains all references.
     pub fn whole(references: &[TriangleReference]) -> Self {
-        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(SegmentBounds::around);
-        Self::new(references, chunks.reduce(|| SegmentBounds::EMPTY, SegmentBounds::union), 0)
+        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(ReferenceBounds::around);
+        Self::new(references, chunks.reduce(|| ReferenceBounds::EMPTY, ReferenceBounds::union), 0)
     }
 
-    fn new(references: &[TriangleReference], boxes: SegmentBounds, level: u32) -> Self {
+    fn new(references: &[TriangleReference], boxes: ReferenceBounds, level: u32) -> Self {
         let count = references.len();
         let (split, is_node) =
             if count <= PACK { (None, false) } else { choose_split(references, &boxes, level) };
@@ -67,12 +67,12 @@ impl ReferenceRange {
 
 /// Bounding boxes of some references and of their centroids.
 #[derive(Clone, Copy)]
-struct SegmentBounds {
+struct ReferenceBounds {
     bounds: SimdBounds,
     centroids: SimdBounds,
 }
 
-impl SegmentBounds {
+impl ReferenceBounds {
     const EMPTY: Self = Self { bounds: SimdBounds::EMPTY, centroids: SimdBounds::EMPTY };
 
     fn around(references: &[TriangleReference]) -> Self {
@@ -99,21 +99,21 @@ impl SegmentBounds {
 /// Chooses the best split of a segment, and decides whether the segment is worth its own node.
 fn choose_split(
     references: &[TriangleReference],
-    boxes: &SegmentBounds,
+    boxes: &ReferenceBounds,
     level: u32,
 ) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
-    let SegmentBounds { bounds, centroids } = boxes;
-    let bins = Bins::new(centroids, count);
+    let ReferenceBounds { bounds, centroids } = boxes;
+    let bins = BinMapping::new(centroids, count);
     let best = if level >= SURFACE_AREA_LEVELS {
         None
     } else if count <= FEW {
-        Histogram::<FEW_BINS>::of(references, &bins).cheapest(&bins)
+        Histogram::<FEW_BINS>::from_references(references, &bins).cheapest_split(&bins)
     } else if count <= PARALLEL_SIZE {
-        Histogram::<BINS>::of(references, &bins).cheapest(&bins)
+        Histogram::<BINS>::from_references(references, &bins).cheapest_split(&bins)
     } else {
-        Histogram::<BINS>::in_parallel(references, &bins).cheapest(&bins)
+        Histogram::<BINS>::from_references_parallel(references, &bins).cheapest_split(&bins)
     };
     let leaf_cost = pack_count(count as u32) as f32 * bounds.half_area();
     match best {
@@ -134,7 +134,7 @@ fn pack_count(count: u32) -> u32 {
 
 /// Maps centroids to bins.
 #[derive(Clone, Copy, Debug)]
-pub struct Bins {
+pub struct BinMapping {
     /// Lower end of the first bin.
     pub start: Vec4,
     /// Bins per unit length; 0 along axes without extent.
@@ -145,7 +145,7 @@ pub struct Bins {
 /// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits.
 pub const ROUND: f32 = 12_582_912.0;
 
-impl Bins {
+impl BinMapping {
     fn new(centroids: &SimdBounds, references: usize) -> Self {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.extent();
@@ -165,7 +165,7 @@ impl Bins {
     }
 
     #[inline(always)]
-    fn of(&self, reference: &TriangleReference) -> [usize; 3] {
+    fn bin_indices(&self, reference: &TriangleReference) -> [usize; 3] {
         let [x, y, z, _] = self.bin_coordinates(reference.centroid()).to_array();
         [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
@@ -190,29 +190,31 @@ struct CheapestBinSplit {
 impl<const N: usize> Histogram<N> {
     const EMPTY: Self = Self { bounds: [[SimdBounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
 
-    fn of(references: &[TriangleReference], bins: &Bins) -> Self {
+    fn from_references(references: &[TriangleReference], bins: &BinMapping) -> Self {
         let mut own = Self::EMPTY;
-        if !simd::binning::count(references, bins, &mut own) {
-            own.count(references, bins);
+        if !simd::binning::add_to_histogram(references, bins, &mut own) {
+            own.add_references(references, bins);
         }
         own
     }
 
-    fn count(&mut self, references: &[TriangleReference], bins: &Bins) {
+    fn add_references(&mut self, references: &[TriangleReference], bins: &BinMapping) {
         for reference in references {
-            for (axis, bin) in bins.of(reference).into_iter().enumerate() {
+            for (axis, bin) in bins.bin_indices(reference).into_iter().enumerate() {
                 self.bounds[bin % N][axis].grow(&reference.bounds);
                 self.counts[bin % N][axis] += 1;
             }
         }
     }
 
-    fn in_parallel(references: &[TriangleReference], bins: &Bins) -> Self {
-        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(|references| Self::of(references, bins));
-        chunks.reduce(|| Self::of(&[], bins), |all, one| all.add(&one))
+    fn from_references_parallel(references: &[TriangleReference], bins: &BinMapping) -> Self {
+        let chunks = references
+            .par_chunks(PARALLEL_SIZE / 4)
+            .map(|references| Self::from_references(references, bins));
+        chunks.reduce(|| Self::from_references(&[], bins), |all, one| all.merge(&one))
     }
 
-    fn add(mut self, other: &Self) -> Self {
+    fn merge(mut self, other: &Self) -> Self {
         for bin in 0..N {
             for axis in 0..3 {
                 self.bounds[bin][axis].grow(&other.bounds[bin][axis]);
@@ -223,7 +225,7 @@ impl<const N: usize> Histogram<N> {
     }
 
     /// Finds the cheapest plane between bins by sweeping from both ends.
-    fn cheapest(&self, bins: &Bins) -> Option<CheapestBinSplit> {
+    fn cheapest_split(&self, bins: &BinMapping) -> Option<CheapestBinSplit> {
         let mut best: Option<(usize, usize, f32)> = None;
         let count = bins.count.min(N);
         for axis in (0..3).filter(|&axis| bins.per_length[axis] > 0.0) {
@@ -273,13 +275,13 @@ pub fn partition(
                 1 => partition_along_axis::<1>(references, *bin, bins),
                 _ => partition_along_axis::<2>(references, *bin, bins),
             };
-            let boxes = |side: usize, centroids| SegmentBounds { bounds: sides[side], centroids };
+            let boxes = |side: usize, centroids| ReferenceBounds { bounds: sides[side], centroids };
             (middle, boxes(0, left), boxes(1, right))
         }
         Split::Middle => {
             let middle = references.len() / 2;
             let (left, right) = references.split_at(middle);
-            (middle, SegmentBounds::around(left), SegmentBounds::around(right))
+            (middle, ReferenceBounds::around(left), ReferenceBounds::around(right))
         }
     };
     let level = segment.level + 1;
@@ -291,7 +293,7 @@ pub fn partition(
 fn partition_along_axis<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
-    bins: &Bins,
+    bins: &BinMapping,
 ) -> (usize, [SimdBounds; 2]) {
     match simd::binning::partition::<AXIS>(references, bin, bins) {
         Some(done) => done,
@@ -307,7 +309,7 @@ fn partition_along_axis<const AXIS: usize>(
 fn partition_by_plane<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
-    bins: &Bins,
+    bins: &BinMapping,
 ) -> (usize, [SimdBounds; 2]) {
     let (start, per_length) = (Vec4::splat(bins.start[AXIS]), Vec4::splat(bins.per_length[AXIS]));
     let first_right = Vec4::splat(ROUND + bin as f32);
@@ -333,7 +335,7 @@ fn partition_by_plane<const AXIS: usize>(
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     fn references(count: u32) -> Vec<TriangleReference> {
         let mut next = random(5);
@@ -354,7 +356,7 @@ mod tests {
         [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits)
     }
 
-    type Partition = fn(&mut [TriangleReference], usize, &Bins) -> (usize, [SimdBounds; 2]);
+    type Partition = fn(&mut [TriangleReference], usize, &BinMapping) -> (usize, [SimdBounds; 2]);
 
     /// SIMD and scalar partition functions for each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
@@ -365,17 +367,17 @@ mod tests {
 
     #[test]
     fn simd_histograms_match_scalar_histograms() {
-        fn counts<const N: usize>(references: &[TriangleReference], bins: &Bins) {
+        fn counts<const N: usize>(references: &[TriangleReference], bins: &BinMapping) {
             let mut plain = Histogram::<N>::EMPTY;
-            plain.count(references, bins);
-            let own = Histogram::<N>::of(references, bins);
+            plain.add_references(references, bins);
+            let own = Histogram::<N>::from_references(references, bins);
             assert_eq!(own.counts, plain.counts);
             for axis in 0..3 {
                 let counted: u32 = own.counts[..bins.count].iter().map(|counts| counts[axis]).sum();
                 assert_eq!(counted as usize, references.len(), "the bins should contain all references");
                 // Each bin contains exactly the references that map to it.
                 for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
-                    let inside = |one: &&TriangleReference| bins.of(one)[axis] == bin;
+                    let inside = |one: &&TriangleReference| bins.bin_indices(one)[axis] == bin;
                     let inside: Vec<TriangleReference> = references.iter().filter(inside).copied().collect();
                     assert_eq!(counts[axis] as usize, inside.len());
                     assert_eq!(bits(&bounds[axis]), bits(&SimdBounds::around(&inside)));
@@ -387,7 +389,7 @@ mod tests {
         }
         for count in [1, 2, 5, 24, FEW, FEW + 1, 1000] {
             let references = references(count as u32);
-            let bins = Bins::new(&SegmentBounds::around(&references).centroids, references.len());
+            let bins = BinMapping::new(&ReferenceBounds::around(&references).centroids, references.len());
             if count <= FEW {
                 assert!(bins.count <= FEW_BINS, "{} bins", bins.count);
                 counts::<FEW_BINS>(&references, &bins);
@@ -400,7 +402,7 @@ mod tests {
     fn simd_partitions_match_scalar_partitions() {
         for count in [1, 2, 5, 33, 1000] {
             let references = references(count);
-            let bins = Bins::new(&SegmentBounds::around(&references).centroids, references.len());
+            let bins = BinMapping::new(&ReferenceBounds::around(&references).centroids, references.len());
             for (axis, [by_vectors, plainly]) in PARTITIONS.into_iter().enumerate() {
                 for bin in 1..bins.count {
                     let (mut own, mut plain) = (references.clone(), references.clone());
@@ -412,12 +414,12 @@ mod tests {
                     };
                     assert_eq!(ids(&own), ids(&plain));
                     assert_eq!(sides.each_ref().map(bits), plain_sides.each_ref().map(bits));
-                    let is_left = |one: &TriangleReference| bins.of(one)[axis] < bin;
+                    let is_left = |one: &TriangleReference| bins.bin_indices(one)[axis] < bin;
                     assert!(
                         own[..middle].iter().all(is_left) && !own[middle..].iter().any(is_left),
                         "{axis}"
                     );
-                    let around = |side: &[TriangleReference]| bits(&SegmentBounds::around(side).centroids);
+                    let around = |side: &[TriangleReference]| bits(&ReferenceBounds::around(side).centroids);
                     assert_eq!(sides.each_ref().map(bits), [around(&own[..middle]), around(&own[middle..])]);
                 }
             }

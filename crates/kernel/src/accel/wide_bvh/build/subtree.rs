@@ -31,24 +31,24 @@ impl WideSubtree {
             root: Child::Inner(0),
             bounds: segment.bounds,
         };
-        own.root = own.child(references, start, segment);
+        own.root = own.build_child(references, start, segment);
         own
     }
 
-    fn child(
+    fn build_child(
         &mut self,
         references: &mut [TriangleReference],
         start: usize,
         segment: ReferenceRange,
     ) -> Child {
         if segment.is_node {
-            Child::Inner(self.node(references, start, segment))
+            Child::Inner(self.build_node(references, start, segment))
         } else {
-            self.leaf(start, segment.count)
+            self.build_leaf(start, segment.count)
         }
     }
 
-    fn leaf(&mut self, start: usize, count: usize) -> Child {
+    fn build_leaf(&mut self, start: usize, count: usize) -> Child {
         let first = self.packs.len() as u32;
         for at in (0..count).step_by(PACK) {
             self.packs.push(PackRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
@@ -58,7 +58,12 @@ impl WideSubtree {
 
     /// Builds a node. Repeatedly splits the child with the largest box until there are eight (Wald, Benthin,
     /// Boulos, *Getting Rid of Packets*, 2008).
-    fn node(&mut self, references: &mut [TriangleReference], start: usize, segment: ReferenceRange) -> u32 {
+    fn build_node(
+        &mut self,
+        references: &mut [TriangleReference],
+        start: usize,
+        segment: ReferenceRange,
+    ) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(WideNode::EMPTY);
         let mut children: [Option<(usize, ReferenceRange)>; WIDTH] = [const { None }; WIDTH];
@@ -82,7 +87,7 @@ impl WideSubtree {
         for (slot, (from, segment)) in children.into_iter().flatten().enumerate() {
             let bounds = segment.bounds.aabb();
             let members = &mut references[from..from + segment.count];
-            let child = self.child(members, start + from, segment);
+            let child = self.build_child(members, start + from, segment);
             self.nodes[place].set(slot, bounds, child);
         }
         place as u32

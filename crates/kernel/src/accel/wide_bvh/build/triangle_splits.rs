@@ -22,15 +22,15 @@ const CHUNK: usize = 4096;
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
-pub fn split_large(
+pub fn split_large_triangles(
     references: &[TriangleReference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
 ) -> Result<Vec<TriangleReference>, Cancelled> {
-    let grid = Grid::around(references);
+    let grid = BisectionGrid::around(references);
     let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
-    let factor = largest_factor(&priorities, (references.len() as f64 * MOST_MORE) as u64);
+    let factor = find_priority_scale(&priorities, (references.len() as f64 * MOST_MORE) as u64);
     let of_chunk = |(references, priorities): (&[TriangleReference], &[f32])| {
         token.check()?;
         let mut pieces = Vec::new();
@@ -54,7 +54,7 @@ fn cut_count(priority: f32, factor: f32) -> u32 {
 }
 
 /// Finds, by bisection, the largest factor for which the total number of cuts is at most `most`.
-fn largest_factor(priorities: &[f32], most: u64) -> f32 {
+fn find_priority_scale(priorities: &[f32], most: u64) -> f32 {
     let total = |factor: f32| {
         priorities.par_iter().map(|&priority| u64::from(cut_count(priority, factor))).sum::<u64>()
     };
@@ -73,7 +73,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
 }
 
 /// A bounding box that is halved recursively.
-struct Grid {
+struct BisectionGrid {
     start: Vec3,
     extent: Vec3,
 }
@@ -86,14 +86,14 @@ struct GridPlane {
     level: u32,
 }
 
-impl Grid {
+impl BisectionGrid {
     fn around(references: &[TriangleReference]) -> Self {
         let all = SimdBounds::around(references);
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
     /// The coarsest plane that intersects a box.
-    fn plane(&self, bounds: &SimdBounds) -> Option<GridPlane> {
+    fn coarsest_plane(&self, bounds: &SimdBounds) -> Option<GridPlane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
@@ -110,7 +110,7 @@ impl Grid {
 
     /// Priority for cutting a triangle: the excess area of its box, with a lower weight for finer planes.
     fn priority(&self, reference: &TriangleReference, [a, b, c]: [Vec3; 3]) -> f32 {
-        let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
+        let Some(plane) = self.coarsest_plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
         let too_much = reference.bounds.half_area() - (normal.x + normal.y + normal.z);
         let weight = exp2(-((LEVELS - plane.level) as f32));
@@ -126,7 +126,7 @@ impl Grid {
         corners: [Vec3; 3],
         pieces: &mut Vec<TriangleReference>,
     ) {
-        let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
+        let plane = if cuts == 0 { None } else { self.coarsest_plane(&reference.bounds) };
         let Some(GridPlane { axis, at, .. }) = plane else { return pieces.push(reference) };
         let halves = reference.split(axis, at, corners);
         let [left, right] = halves.map(|half| half.bounds.extent().truncate().max_element());
@@ -154,8 +154,8 @@ mod tests {
             .collect();
         let references: Vec<_> =
             mesh.iter().zip(0..).map(|(&corners, id)| TriangleReference::new(id, corners)).collect();
-        let pieces =
-            split_large(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("never canceled");
+        let pieces = split_large_triangles(&references, &|id| mesh[id as usize], &CancelToken::new())
+            .expect("never canceled");
         let of = |id: u32| pieces.iter().filter(move |piece| piece.id() == id);
         assert!(of(7).count() > 10 && pieces.len() <= 130, "{} of {}", of(7).count(), pieces.len());
         assert!((0..100).all(|id| id == 7 || of(id).count() == 1));

@@ -3,14 +3,18 @@
 
 use super::InstructionSet;
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::accel::wide_bvh::build::split::{Bins, Histogram};
+use crate::accel::wide_bvh::build::split::{BinMapping, Histogram};
 
 /// Adds references to a histogram's bins. Returns false and does nothing if the processor lacks AVX2.
-pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into: &mut Histogram<N>) -> bool {
+pub fn add_to_histogram<const N: usize>(
+    references: &[TriangleReference],
+    bins: &BinMapping,
+    into: &mut Histogram<N>,
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
-        unsafe { avx2::count(references, bins, into) };
+        unsafe { avx2::add_to_histogram(references, bins, into) };
         return true;
     }
     let _ = (references, bins, into);
@@ -22,7 +26,7 @@ pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into
 pub fn partition<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
-    bins: &Bins,
+    bins: &BinMapping,
 ) -> Option<(usize, [SimdBounds; 2])> {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
@@ -38,20 +42,20 @@ mod avx2 {
     use std::arch::x86_64::*;
 
     use crate::accel::reference::{SimdBounds, TriangleReference};
-    use crate::accel::wide_bvh::build::split::{BINS, Bins, Histogram, ROUND};
+    use crate::accel::wide_bvh::build::split::{BINS, BinMapping, Histogram, ROUND};
     use crate::math::Vec4;
 
     /// Loads both corners of a box into one register.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn load(bounds: &SimdBounds) -> __m256 {
+    fn load_bounds(bounds: &SimdBounds) -> __m256 {
         // SAFETY: a box is eight floats with sufficient alignment.
         unsafe { _mm256_load_ps(std::ptr::from_ref(bounds).cast()) }
     }
 
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn store(bounds: __m256, to: &mut SimdBounds) {
+    fn store_bounds(bounds: __m256, to: &mut SimdBounds) {
         // SAFETY: a box has space for eight floats with sufficient alignment.
         unsafe { _mm256_store_ps(std::ptr::from_mut(to).cast(), bounds) }
     }
@@ -64,7 +68,7 @@ mod avx2 {
         _mm_sub_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves))
     }
 
-    /// SIMD version of `Bins::bin_coordinates`.
+    /// SIMD version of `BinMapping::bin_coordinates`.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn bin_coordinates(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
@@ -73,10 +77,14 @@ mod avx2 {
     }
 
     #[target_feature(enable = "avx2")]
-    pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into: &mut Histogram<N>) {
+    pub fn add_to_histogram<const N: usize>(
+        references: &[TriangleReference],
+        bins: &BinMapping,
+        into: &mut Histogram<N>,
+    ) {
         let (start, per_length) = (__m128::from(bins.start), __m128::from(bins.per_length));
         for reference in references {
-            let bounds = load(&reference.bounds);
+            let bounds = load_bounds(&reference.bounds);
             let places = _mm_castps_si128(bin_coordinates(centroid(bounds), start, per_length));
             let places = [
                 _mm_extract_epi32::<0>(places),
@@ -86,7 +94,7 @@ mod avx2 {
             for (axis, place) in places.into_iter().enumerate() {
                 let bin = place as usize & (BINS - 1);
                 let own = &mut into.bounds[bin % N][axis];
-                store(_mm256_min_ps(load(own), bounds), own);
+                store_bounds(_mm256_min_ps(load_bounds(own), bounds), own);
                 into.counts[bin % N][axis] += 1;
             }
         }
@@ -99,7 +107,7 @@ mod avx2 {
     pub fn partition<const AXIS: usize>(
         references: &mut [TriangleReference],
         bin: usize,
-        bins: &Bins,
+        bins: &BinMapping,
     ) -> (usize, [SimdBounds; 2]) {
         let start = _mm_set1_ps(bins.start[AXIS]);
         let per_length = _mm_set1_ps(bins.per_length[AXIS]);
@@ -109,10 +117,10 @@ mod avx2 {
         let (mut left, mut right) = (nothing, nothing);
         let mut middle = 0;
         for i in 0..references.len() {
-            let bounds = load(&references[i].bounds);
-            let other = load(&references[middle].bounds);
-            store(other, &mut references[i].bounds);
-            store(bounds, &mut references[middle].bounds);
+            let bounds = load_bounds(&references[i].bounds);
+            let other = load_bounds(&references[middle].bounds);
+            store_bounds(other, &mut references[i].bounds);
+            store_bounds(bounds, &mut references[middle].bounds);
             let centroid = centroid(bounds);
             let along = match AXIS {
                 0 => _mm_permute_ps::<0x00>(centroid),

@@ -15,14 +15,14 @@ impl InstructionSet {
     /// Runs a kernel with this instruction set, or with the fastest supported one if the processor lacks it.
     #[inline]
     pub fn run<L: SimdKernel>(self, work: L) -> L::Output {
-        match self.available() {
+        match self.or_best_supported() {
             Self::Portable => work.run(PortableSimd),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `available` returns an instruction set that the processor supports.
-            Self::Avx2 => unsafe { avx2(work) },
+            Self::Avx2 => unsafe { run_avx2(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Self::Avx512 => unsafe { avx512(work) },
+            Self::Avx512 => unsafe { run_avx512(work) },
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx2 | Self::Avx512 => work.run(PortableSimd),
         }
@@ -32,14 +32,14 @@ impl InstructionSet {
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 #[target_feature(enable = "avx2,fma")]
-fn avx2<L: SimdKernel>(work: L) -> L::Output {
+fn run_avx2<L: SimdKernel>(work: L) -> L::Output {
     work.run(Avx2Simd(()))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512<L: SimdKernel>(work: L) -> L::Output {
+fn run_avx512<L: SimdKernel>(work: L) -> L::Output {
     work.run(Avx512Simd(()))
 }
 
@@ -76,7 +76,7 @@ impl Simd for Avx2Simd {
     #[inline(always)]
     fn call<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
-        unsafe { avx2(work) }
+        unsafe { run_avx2(work) }
     }
 }
 
@@ -113,7 +113,7 @@ impl Simd for Avx512Simd {
     #[inline(always)]
     fn call<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
-        unsafe { avx512(work) }
+        unsafe { run_avx512(work) }
     }
 }
 
@@ -210,7 +210,7 @@ fn avx512_reciprocals(row: &F32x16) -> F32x16 {
 mod tests {
     use super::*;
     use crate::math::lanes::{Simd, mask_from_bits};
-    use crate::math::random::signed;
+    use crate::math::random::signed_generator;
 
     struct Folding(u32);
 
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn reductions_are_equal_on_all_instruction_sets() {
-        let mut next = signed(21);
+        let mut next = signed_generator(21);
         let odd = [0.0, -0.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, f32::MAX];
         for round in 0..20_000_u32 {
             let mut row: F32x16 = std::array::from_fn(|_| next());

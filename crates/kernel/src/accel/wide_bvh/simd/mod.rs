@@ -56,21 +56,21 @@ impl InstructionSet {
         static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
                 Ok("portable") => InstructionSet::Portable,
-                Ok("avx2") => InstructionSet::Avx2.available(),
-                _ => InstructionSet::Avx512.available(),
+                Ok("avx2") => InstructionSet::Avx2.or_best_supported(),
+                _ => InstructionSet::Avx512.or_best_supported(),
             });
         *BEST
     }
 
     /// This instruction set, or the fastest supported one if the processor lacks it.
-    pub fn available(self) -> Self {
-        static AVAILABLE: LazyLock<InstructionSet> = LazyLock::new(available);
+    pub fn or_best_supported(self) -> Self {
+        static AVAILABLE: LazyLock<InstructionSet> = LazyLock::new(best_supported);
         self.min(*AVAILABLE)
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn available() -> InstructionSet {
+fn best_supported() -> InstructionSet {
     use std::arch::is_x86_feature_detected as has;
     if !(has!("avx2") && has!("fma")) {
         InstructionSet::Portable
@@ -82,62 +82,67 @@ fn available() -> InstructionSet {
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn available() -> InstructionSet {
+fn best_supported() -> InstructionSet {
     InstructionSet::Portable
 }
 
-/// [`WideBvh::closest`] for a nonempty tree.
+/// [`WideBvh::closest_hit`] for a nonempty tree.
 #[allow(unsafe_code)]
-pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     match tree.instructions {
-        InstructionSet::Portable => portable::closest(tree, ray),
+        InstructionSet::Portable => portable::closest_hit(tree, ray),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree only has an instruction set that the processor supports
-        // (`InstructionSet::available`).
-        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest(tree, ray) },
+        // (`InstructionSet::or_best_supported`).
+        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest_hit(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
-        _ => portable::closest(tree, ray),
+        _ => portable::closest_hit(tree, ray),
     }
 }
 
-/// [`WideBvh::any`] for a nonempty tree.
+/// [`WideBvh::any_hit`] for a nonempty tree.
 #[allow(unsafe_code)]
-pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     match tree.instructions {
-        InstructionSet::Portable => portable::any(tree, ray, except),
+        InstructionSet::Portable => portable::any_hit(tree, ray, except),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::any(tree, ray, except) },
+        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::any_hit(tree, ray, except) },
         #[cfg(not(target_arch = "x86_64"))]
-        _ => portable::any(tree, ray, except),
+        _ => portable::any_hit(tree, ray, except),
     }
 }
 
-/// [`WideBvh::closest_packet`] for a nonempty tree. Returns whether the packet was traced.
+/// [`WideBvh::closest_hit_packet`] for a nonempty tree. Returns whether the packet was traced.
 #[allow(unsafe_code)]
-pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_hit_packet(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &F32x16,
+    hits: &mut [Option<ShapeHit>],
+) -> bool {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::closest_avx2(tree, rays, ends, hits) },
+        InstructionSet::Avx2 => unsafe { packet::closest_hit_avx2(tree, rays, ends, hits) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::closest_avx512(tree, rays, ends, hits) },
+        InstructionSet::Avx512 => unsafe { packet::closest_hit_avx512(tree, rays, ends, hits) },
         _ => false,
     }
 }
 
-/// [`WideBvh::any_packet`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
+/// [`WideBvh::any_hit_packet`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
 /// packet was not traced.
 #[allow(unsafe_code)]
-pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
+pub fn any_hit_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::any_avx2(tree, rays, ends, except) },
+        InstructionSet::Avx2 => unsafe { packet::any_hit_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::any_avx512(tree, rays, ends, except) },
+        InstructionSet::Avx512 => unsafe { packet::any_hit_avx512(tree, rays, ends, except) },
         _ => None,
     }
 }

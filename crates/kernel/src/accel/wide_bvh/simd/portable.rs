@@ -9,13 +9,13 @@ use crate::math::Vec3;
 
 /// Whether a ray can hit anything. Non-finite rays and rays with a zero direction cannot, although they would
 /// pass every box test.
-fn may_hit(ray: &Ray) -> bool {
+fn is_traceable(ray: &Ray) -> bool {
     ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO
 }
 
 /// Finds the nearest hit. Visits children front to back.
-pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
-    if !may_hit(ray) {
+pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    if !is_traceable(ray) {
         return None;
     }
     let (slabs, sheared) = (
@@ -49,8 +49,8 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 }
 
 /// Whether any triangle is hit. Visits children in any order and stops at the first hit.
-pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
-    if !may_hit(ray) {
+pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    if !is_traceable(ray) {
         return false;
     }
     let (slabs, sheared) = (

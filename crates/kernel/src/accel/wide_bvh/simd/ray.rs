@@ -65,7 +65,7 @@ fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
 /// Whether the ray is finite and its direction is nonzero.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-pub fn may_hit(ray: &Ray) -> bool {
+pub fn is_traceable(ray: &Ray) -> bool {
     let (origin, direction) = origin_and_direction(ray);
     let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
     let (origin, direction) = (_mm_and_ps(origin, unsigned), _mm_and_ps(direction, unsigned));
@@ -80,7 +80,7 @@ pub fn may_hit(ray: &Ray) -> bool {
 /// Loads both corners of a box. The last lane of each contains an unrelated float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn corners(bounds: &Aabb) -> (__m128, __m128) {
+fn load_box_corners(bounds: &Aabb) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Aabb>() == 24 && std::mem::offset_of!(Aabb, max) == 12);
     let floats: *const f32 = std::ptr::from_ref(bounds).cast();
     // SAFETY: reads the first four and the last four of a box's six floats.
@@ -133,7 +133,7 @@ impl SimdRay {
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
         let (origin, direction) = origin_and_direction(ray);
-        let (min, max) = corners(whole);
+        let (min, max) = load_box_corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
         // Margin between boxes and their triangles: `triangle_margin`, plus the additional error of fused
         // products.
@@ -203,9 +203,10 @@ impl SimdRay {
 
     /// Tests the triangles of a pack, except the ray's start triangle.
     #[inline(always)]
-    pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<SimdF32x4> {
-        let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
-        let hits = triangle::hits(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
+    pub fn intersect_pack(&self, pack: &TrianglePack, t_max: f32) -> Hits<SimdF32x4> {
+        let corners =
+            [self.sheared_corner(pack, 0), self.sheared_corner(pack, 3), self.sheared_corner(pack, 6)];
+        let hits = triangle::intersect(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
         let others = !self.start_triangle_lane(pack);
         Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
@@ -223,13 +224,17 @@ impl SimdRay {
 
     /// One corner of each triangle, in the ray's coordinates. `row` is the corner's first row.
     #[inline(always)]
-    fn corner(&self, pack: &TrianglePack, row: usize) -> [SimdF32x4; 3] {
-        let z = self.row(pack, row, 2);
-        [self.row(pack, row, 0) - self.shear[0] * z, self.row(pack, row, 1) - self.shear[1] * z, z]
+    fn sheared_corner(&self, pack: &TrianglePack, row: usize) -> [SimdF32x4; 3] {
+        let z = self.relative_coordinates(pack, row, 2);
+        [
+            self.relative_coordinates(pack, row, 0) - self.shear[0] * z,
+            self.relative_coordinates(pack, row, 1) - self.shear[1] * z,
+            z,
+        ]
     }
 
     #[inline(always)]
-    fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> SimdF32x4 {
+    fn relative_coordinates(&self, pack: &TrianglePack, row: usize, axis: usize) -> SimdF32x4 {
         // SAFETY: values of this type exist, so the processor has the instructions. There are nine rows,
         // `row` is 0, 3, or 6, and axes are less than 3.
         let row = unsafe { SimdF32x4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::portable::update_nearest;
-use super::ray::{SimdRay, may_hit};
+use super::ray::{SimdRay, is_traceable};
 use super::stack::{Stack, entry_distance, sort_key};
 use super::triangle::Hits;
 use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
@@ -13,10 +13,10 @@ use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
-/// [`WideBvh::closest`] with AVX2.
+/// [`WideBvh::closest_hit`] with AVX2.
 #[target_feature(enable = "avx2,fma")]
-pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
-    if !may_hit(ray) {
+pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
+    if !is_traceable(ray) {
         return None;
     }
     // SAFETY: this function is compiled with the required instructions.
@@ -32,14 +32,14 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = lines.box_entries(node, end);
-                if let Some(next) = push_ordered(tree, node, near, met, &mut stack) {
+                if let Some(next) = push_children_ordered(tree, node, near, met, &mut stack) {
                     code = next;
                     continue;
                 }
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
-                    let hits = lines.hits(pack, t_max);
+                    let hits = lines.intersect_pack(pack, t_max);
                     if hits.hit | hits.doubtful != 0 {
                         update_nearest_of_pack(pack, &hits, ray, &mut best, t_max);
                         t_max = best.map_or(t_max, |best| best.t);
@@ -106,7 +106,7 @@ fn update_nearest_uninlined(
 /// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn push_ordered(
+fn push_children_ordered(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,
@@ -131,7 +131,7 @@ fn push_ordered(
         rest &= rest - 1;
         let other = sort_key(entries[slot], node.children[slot]);
         prefetch(tree, other as u32);
-        stack.insert(nearest.max(other), pushed);
+        stack.insert_sorted(nearest.max(other), pushed);
         nearest = nearest.min(other);
         if rest == 0 {
             return Some(nearest as u32);
@@ -160,10 +160,10 @@ fn is_hit(pack: &TrianglePack, lane: usize, ray: &Ray) -> bool {
     ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
 }
 
-/// [`WideBvh::any`] with AVX2.
+/// [`WideBvh::any_hit`] with AVX2.
 #[target_feature(enable = "avx2,fma")]
-pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
-    if !may_hit(ray) {
+pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
+    if !is_traceable(ray) {
         return false;
     }
     // SAFETY: this function is compiled with the required instructions.
@@ -186,7 +186,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
-                    let hits = lines.hits(pack, ray.t_max);
+                    let hits = lines.intersect_pack(pack, ray.t_max);
                     let mut lanes = hits.hit | hits.doubtful;
                     while lanes != 0 {
                         let lane = lanes.trailing_zeros() as usize % PACK;

@@ -6,7 +6,7 @@ use crate::geometry::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
 
 /// Corners in the ray's coordinates: sheared x, sheared y, and z.
-pub type Corners<V> = [[V; 3]; 3];
+pub type ShearedCorners<V> = [[V; 3]; 3];
 
 /// Results of testing a ray against a pack, or a packet against a triangle.
 pub struct Hits<V: SimdVector> {
@@ -24,7 +24,12 @@ pub struct Hits<V: SimdVector> {
 /// through a triangle. With `is_single`, also skips them if all triangles are behind the origin or past the
 /// end of the ray, as in most packs.
 #[inline(always)]
-pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
+pub fn intersect<V: SimdVector>(
+    corners: &ShearedCorners<V>,
+    shear_z: V,
+    t_max: V,
+    is_single: bool,
+) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
     let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
     let zero = ax.splat_like(0.0);
@@ -64,7 +69,7 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 /// determinant may be infinite, the triangle counts as a needle. `along` is t times the determinant.
 #[inline(always)]
 fn may_be_hit<V: SimdVector>(
-    corners: &Corners<V>,
+    corners: &ShearedCorners<V>,
     determinant: V,
     shear_z: V,
     along: V,
@@ -82,7 +87,7 @@ fn may_be_hit<V: SimdVector>(
 
 /// SIMD version of `ShearedRay::distance_error`.
 #[inline(always)]
-fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
+fn distance_error<V: SimdVector>(corners: &ShearedCorners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
     let (x, y, depth) = (max_abs_corner(corners, 0), max_abs_corner(corners, 1), max_abs_corner(corners, 2));
     let z = depth * shear_z.abs();
     let error_z = shear_z.splat_like(gamma(3)) * z;
@@ -97,7 +102,7 @@ fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_deter
 
 /// Largest absolute coordinate of the corners along an axis.
 #[inline(always)]
-fn max_abs_corner<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
+fn max_abs_corner<V: SimdVector>(corners: &ShearedCorners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
 }
 
@@ -106,7 +111,7 @@ fn max_abs_corner<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
 mod tests {
     use super::*;
     use crate::accel::wide_bvh::simd::vector::SimdF32x4;
-    use crate::math::random::signed as random;
+    use crate::math::random::signed_generator as random;
 
     /// Tests triangles slightly inside and slightly outside the filter's limits on thinness and on distance
     /// from the origin.
@@ -131,7 +136,7 @@ mod tests {
                 [at(0, next()), at(1, next()), z]
             };
             let scalar = [corner(1.0, 1.0), corner(-1.0, -1.0), corner(0.0, 0.0)];
-            let corners: Corners<SimdF32x4> = scalar.map(|corner| corner.map(|x| like.splat_like(x)));
+            let corners: ShearedCorners<SimdF32x4> = scalar.map(|corner| corner.map(|x| like.splat_like(x)));
             let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
             let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
             let determinant = wa + wb + wc;

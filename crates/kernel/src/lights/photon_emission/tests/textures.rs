@@ -23,7 +23,7 @@ fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
 }
 
 /// A light with a texture.
-fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvChart) -> Light {
+fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvMapping) -> Light {
     Light::Area(AreaLight {
         texture: EmissionTexture::new(Some(texture), None, chart).map(Box::new),
         ..light
@@ -33,8 +33,8 @@ fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvChart) -> Light {
 #[test]
 fn textured_emission_matches_light_sampling() {
     for shape in shapes() {
-        let light = area_light(&shape, COLOR, OBJECT).expect("an area");
-        let light = textured(light, &texture(16, 8, TextureFilter::Bilinear), UvChart::Shape(shape));
+        let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
+        let light = textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Shape(shape));
         let source = source_of(light.clone(), Some(shape));
         assert_same_irradiance(&format!("{shape:?}"), &light, &source, Some(&shape));
         let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
@@ -49,8 +49,8 @@ fn textured_emission_matches_light_sampling() {
 #[test]
 fn quad_power_is_the_mean_of_its_texture() {
     let (shape, texels) = (shapes()[1], patchy(32, 16));
-    let light = area_light(&shape, COLOR, OBJECT).expect("an area");
-    let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvChart::Shape(shape));
+    let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
+    let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape));
     let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.areas()[0];
     let source = source_of(light, Some(shape));
     assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
@@ -101,14 +101,14 @@ fn mesh_emission_matches_light_sampling() {
             radiance: COLOR,
             texture: None,
             object: OBJECT,
-            part: LightPart::Listed,
+            part: LightCoverage::Listed,
             bounds,
         };
         let area_of =
             |UvTriangle { corners: [a, b, c], .. }: &UvTriangle| 0.5 * (*b - *a).cross(*c - *a).length();
         let area: f64 = patches.iter().map(area_of).sum();
         let light = if is_textured {
-            textured(light, &texture(16, 8, TextureFilter::Bilinear), UvChart::Triangles(patches))
+            textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Triangles(patches))
         } else {
             Light::Area(light)
         };
@@ -126,7 +126,7 @@ fn mesh_emission_matches_light_sampling() {
 #[test]
 fn environment_emission_matches_light_sampling() {
     let sky = Arc::new(EnvironmentMap::new(patchy(24, 12)).expect("light"));
-    let light = Light::Environment(Environment::map(sky, COLOR, 77.0));
+    let light = Light::Environment(Environment::from_map(sky, COLOR, 77.0));
     let source = source_of(light.clone(), None);
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
     let told = f64::from(source.power().y);

@@ -4,7 +4,7 @@ use super::{ConductorPoint, FresnelPoint, reflectance};
 use crate::materials::bsdf::{LobeSet, NarrowLobe};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::microfacet::{HalfVector, SmithTerms, frame_along, sample_reflection};
+use crate::materials::microfacet::{HalfVector, SmithTerms, frame_with_tangent, sample_reflection};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
@@ -23,7 +23,7 @@ soa! {
 
 soa! {
     /// View-dependent values of a conductor.
-    pub struct ConductorView in ConductorViewPacket {
+    pub struct ConductorViewTerms in ConductorViewPacket {
         /// Unit normal that faces the viewer.
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
@@ -38,13 +38,13 @@ const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
     #[inline(always)]
-    fn frame(view: &ConductorView) -> Frame {
-        if BRUSHED { frame_along(view.normal, view.tangent) } else { Frame::from_normal(view.normal) }
+    fn frame(view: &ConductorViewTerms) -> Frame {
+        if BRUSHED { frame_with_tangent(view.normal, view.tangent) } else { Frame::from_normal(view.normal) }
     }
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(&self, view: &ConductorView, wi: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, view: &ConductorViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         if BRUSHED {
             let frame = Self::frame(view);
             [
@@ -63,7 +63,7 @@ impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
 
 impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     type Point = ConductorPoint;
-    type View = ConductorView;
+    type View = ConductorViewTerms;
 
     const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
     const SPLITS_NARROW: BxdfFlags = INDEX;
@@ -85,21 +85,21 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     }
 
     #[inline(always)]
-    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> ConductorView {
+    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> ConductorViewTerms {
         let &SurfaceDirections { normal, wo, tangent } = directions;
-        ConductorView { normal, wo, tangent }
+        ConductorViewTerms { normal, wo, tangent }
     }
 
     #[inline(always)]
-    fn narrow(&self, view: &ConductorView, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let half = HalfVector::between(view.normal, view.wo, wi);
+    fn narrow_lobe_value(&self, view: &ConductorViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let distribution = if BRUSHED {
-            half.anisotropic(&Self::frame(view), self.alphas)
+            half.anisotropic_ggx(&Self::frame(view), self.alphas)
         } else {
-            half.isotropic(self.alphas[0])
+            half.isotropic_ggx(self.alphas[0])
         };
         let [eye, light] = self.smith_terms(view, wi);
-        let white = eye.reflected(&light, distribution);
+        let white = eye.reflection_term(&light, distribution);
         let cosine = half.cosine();
         let weight = schlick_weight(cosine);
         let f = if any.contains(INDEX) {
@@ -116,19 +116,27 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &ConductorView, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &ConductorViewTerms, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         let [eye, light] = self.smith_terms(view, wi);
-        eye.pdf_from_reflected(&light, shape)
+        eye.pdf_from_reflection_term(&light, shape)
     }
 
     #[inline(always)]
-    fn sample(&self, view: &ConductorView, _: LobeSet, _: Vec3, _: f32, u: [f32; 2], _: BxdfFlags) -> Vec3 {
+    fn sample(
+        &self,
+        view: &ConductorViewTerms,
+        _: LobeSet,
+        _: Vec3,
+        _: f32,
+        u: [f32; 2],
+        _: BxdfFlags,
+    ) -> Vec3 {
         sample_reflection(&Self::frame(view), view.wo, self.alphas, u)
     }
 
     #[inline(always)]
-    fn narrow_lobe(&self, view: &ConductorView) -> Option<NarrowLobe> {
+    fn narrow_lobe(&self, view: &ConductorViewTerms) -> Option<NarrowLobe> {
         let alpha = self.alphas[0].max(self.alphas[1]);
-        Some(NarrowLobe::of_microfacets(view.normal, view.wo, alpha, 1.0, 0.0))
+        Some(NarrowLobe::from_microfacets(view.normal, view.wo, alpha, 1.0, 0.0))
     }
 }

@@ -11,7 +11,7 @@ use crate::math::Vec3;
 
 choice! {
     /// A metal whose index of refraction is built in.
-    pub enum Element {
+    pub enum MetalElement {
         /// Au.
         Gold = "gold",
         /// Ag.
@@ -29,9 +29,9 @@ choice! {
     }
 }
 
-impl Element {
+impl MetalElement {
     /// Real and imaginary parts of the index of refraction.
-    pub fn index(self) -> [Vec3; 2] {
+    pub fn complex_ior(self) -> [Vec3; 2] {
         let [eta, k] = match self {
             Self::Gold => [[0.108, 0.488, 1.478], [3.508, 2.338, 1.809]],
             Self::Silver => [[0.055, 0.055, 0.043], [4.293, 3.543, 2.535]],

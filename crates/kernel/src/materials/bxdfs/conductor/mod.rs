@@ -3,12 +3,12 @@
 mod bxdf;
 pub mod elements;
 
-use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::fresnel::{conductor, schlick_weight};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
-use crate::materials::scalar::Number;
-use crate::materials::texture::Color;
+use crate::materials::scalar::ScalarParameter;
+use crate::materials::texture::ColorParameter;
 use crate::math::Vec3;
 pub use bxdf::ConductorBxdf;
 
@@ -18,22 +18,22 @@ pub struct Conductor {
     /// Reflectance of the facets.
     pub fresnel: ConductorFresnel,
     /// The square root of α.
-    pub roughness: Number,
+    pub roughness: ScalarParameter,
     /// Elongation of the lobe along u, in [−1, 1].
-    pub anisotropy: Number,
+    pub anisotropy: ScalarParameter,
 }
 
 /// Reflectance of a smooth conductor as a function of angle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConductorFresnel {
     /// Schlick's approximation, based on the reflectance at normal incidence.
-    Schlick(Color),
+    Schlick(ColorParameter),
     /// Exact equations, from the complex index of refraction.
     Index {
         /// Real part for red, green, and blue.
-        eta: Color,
+        eta: ColorParameter,
         /// Imaginary part for red, green, and blue.
-        k: Color,
+        k: ColorParameter,
     },
 }
 
@@ -60,21 +60,21 @@ impl ConductorFresnel {
     #[inline]
     pub fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> FresnelPoint {
         match self {
-            Self::Schlick(color) => FresnelPoint::schlick(lookup.color(color)),
-            Self::Index { eta, k } => FresnelPoint::index(lookup.color(eta), lookup.color(k)),
+            Self::Schlick(color) => FresnelPoint::from_schlick(lookup.color(color)),
+            Self::Index { eta, k } => FresnelPoint::from_complex_ior(lookup.color(eta), lookup.color(k)),
         }
     }
 }
 
 impl FresnelPoint {
     /// Schlick's approximation. Limits the reflectance at normal incidence to at most 1.
-    pub fn schlick(reflectance: Vec3) -> Self {
+    pub fn from_schlick(reflectance: Vec3) -> Self {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }
 
     /// Uses the exact equations, with a complex index of refraction. The index is limited to 1e8, where
     /// metals reflect all light, because the fourth power of a larger value would overflow.
-    pub fn index(eta: Vec3, k: Vec3) -> Self {
+    pub fn from_complex_ior(eta: Vec3, k: Vec3) -> Self {
         const MOST: Vec3 = Vec3::splat(1e8);
         Self { first: eta.min(MOST), second: k.min(MOST) }
     }
@@ -100,7 +100,7 @@ fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
     if second < 0.0 { approximate } else { exact }
 }
 
-impl RoughMaterial for Conductor {
+impl BxdfMaterial for Conductor {
     type Point = ConductorPoint;
 
     #[inline]
@@ -109,7 +109,7 @@ impl RoughMaterial for Conductor {
         let anisotropy = lookup.signed(&self.anisotropy).clamp(-1.0, 1.0);
         ConductorPoint {
             fresnel: self.fresnel.point(lookup),
-            alphas: microfacet::alphas(roughness, anisotropy),
+            alphas: microfacet::alphas_from_roughness(roughness, anisotropy),
         }
     }
 
@@ -119,19 +119,19 @@ impl RoughMaterial for Conductor {
     }
 
     #[inline]
-    fn has_direction(&self) -> bool {
-        self.anisotropy.constant() != Some(0.0)
+    fn is_anisotropic(&self) -> bool {
+        self.anisotropy.as_constant() != Some(0.0)
     }
 }
 
-impl RoughPoint for ConductorPoint {
+impl BxdfParameters for ConductorPoint {
     #[inline]
     fn is_black(&self) -> bool {
         false
     }
 
     #[inline]
-    fn ambient(&self) -> Vec3 {
+    fn ambient_reflectance(&self) -> Vec3 {
         Vec3::ZERO
     }
 

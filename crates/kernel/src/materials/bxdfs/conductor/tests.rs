@@ -1,12 +1,13 @@
 //! Tests of conductor lobes. Compares values with `f64` formulas, samples with pdfs, and albedos with
 //! quadrature.
 
-use super::elements::Element;
+use super::elements::MetalElement;
 use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
+    ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
+    spherical_direction,
 };
 use crate::math::DVec3;
 
@@ -16,11 +17,11 @@ fn shapes(alpha: f32) -> [[f32; 2]; 3] {
 }
 
 fn schlick(alphas: [f32; 2]) -> ConductorPoint {
-    ConductorPoint { fresnel: FresnelPoint::schlick(Vec3::new(1.0, 0.78, 0.34)), alphas }
+    ConductorPoint { fresnel: FresnelPoint::from_schlick(Vec3::new(1.0, 0.78, 0.34)), alphas }
 }
 
-fn of_element(element: Element, alphas: [f32; 2]) -> ConductorPoint {
-    let [first, second] = element.index();
+fn of_element(element: MetalElement, alphas: [f32; 2]) -> ConductorPoint {
+    let [first, second] = element.complex_ior();
     ConductorPoint { fresnel: FresnelPoint { first, second }, alphas }
 }
 
@@ -36,39 +37,41 @@ fn values_match_the_formulas_and_are_reciprocal() {
             alphas,
             |o, i| {
                 let fresnel = first + (DVec3::ONE - first) * (1.0 - cosine(o, i)).powi(5);
-                fresnel * reference(o, i, wide)
+                fresnel * reference_microfacet_brdf(o, i, wide)
             },
         );
-        let copper = of_element(Element::Copper, alphas);
+        let copper = of_element(MetalElement::Copper, alphas);
         check_values::<ConductorBxdf<true>>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
             let fresnel = copper.fresnel.reflectance(cosine(o, i) as f32).as_dvec3();
-            fresnel * reference(o, i, wide)
+            fresnel * reference_microfacet_brdf(o, i, wide)
         });
     }
 }
 
 #[test]
 fn lanes_are_independent() {
-    let points =
-        ALPHAS.into_iter().flat_map(|alpha| [schlick([alpha; 2]), of_element(Element::Iron, [alpha; 2])]);
-    check_neighbors::<ConductorBxdf<false>>(&points.collect::<Vec<_>>());
-    let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(Element::Iron, alphas));
-    check_neighbors::<ConductorBxdf<true>>(&points.collect::<Vec<_>>());
+    let points = ALPHAS
+        .into_iter()
+        .flat_map(|alpha| [schlick([alpha; 2]), of_element(MetalElement::Iron, [alpha; 2])]);
+    check_lane_independence::<ConductorBxdf<false>>(&points.collect::<Vec<_>>());
+    let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(MetalElement::Iron, alphas));
+    check_lane_independence::<ConductorBxdf<true>>(&points.collect::<Vec<_>>());
 }
 
 #[test]
 fn isotropic_packets_match_brushed_packets() {
     for alpha in ALPHAS {
-        let (point, at) = (schlick([alpha; 2]), direction(0.6, 0.3));
-        let round = Subject::<ConductorBxdf<false>>::new(&point, [alpha; 2], at);
-        let brushed = Subject::<ConductorBxdf<true>>::new(&point, [alpha; 2], at);
+        let (point, at) = (schlick([alpha; 2]), spherical_direction(0.6, 0.3));
+        let round = TestSurface::<ConductorBxdf<false>>::new(&point, [alpha; 2], at);
+        let brushed = TestSurface::<ConductorBxdf<true>>::new(&point, [alpha; 2], at);
         let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
         assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
         round.check_samples(&format!("α {alpha}"), LobeSet::All);
         let wide = [f64::from(alpha); 2];
         check_values::<ConductorBxdf<false>>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
             let first = DVec3::new(1.0, 0.78, 0.34);
-            (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5)) * reference(o, i, wide)
+            (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5))
+                * reference_microfacet_brdf(o, i, wide)
         });
     }
 }
@@ -78,8 +81,11 @@ fn samples_follow_the_pdf() {
     // Test 21 lobes in five directions.
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
-            let subject =
-                Subject::<ConductorBxdf<true>>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
+            let subject = TestSurface::<ConductorBxdf<true>>::new(
+                &schlick(alphas),
+                alphas,
+                spherical_direction(cosine, 0.7),
+            );
             subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobeSet::All);
         }
     }
@@ -89,8 +95,9 @@ fn samples_follow_the_pdf() {
 fn sampled_albedos_match_quadrature() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
-            for point in [schlick(alphas), of_element(Element::Gold, alphas)] {
-                let subject = Subject::<ConductorBxdf<true>>::new(&point, alphas, direction(cosine, 0.3));
+            for point in [schlick(alphas), of_element(MetalElement::Gold, alphas)] {
+                let subject =
+                    TestSurface::<ConductorBxdf<true>>::new(&point, alphas, spherical_direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
@@ -102,11 +109,12 @@ fn sampled_albedos_match_quadrature() {
 
 #[test]
 fn narrow_lobes_approach_a_mirror() {
-    for element in Element::ALL {
+    for element in MetalElement::ALL {
         for cosine in [0.3, 0.7, 1.0] {
             let point = of_element(*element, [0.001; 2]);
-            let albedo = Subject::<ConductorBxdf<true>>::new(&point, [0.001; 2], direction(cosine, 0.0))
-                .sampled_albedo(64);
+            let albedo =
+                TestSurface::<ConductorBxdf<true>>::new(&point, [0.001; 2], spherical_direction(cosine, 0.0))
+                    .sampled_albedo(64);
             let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
             assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo}, not {mirror}");
         }
@@ -117,13 +125,13 @@ fn narrow_lobes_approach_a_mirror() {
 fn element_reflectances_match_reference_values() {
     // Reflectance at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
     for (element, known) in [
-        (Element::Gold, [0.968, 0.746, 0.372]),
-        (Element::Silver, [0.989, 0.984, 0.977]),
-        (Element::Copper, [0.921, 0.620, 0.520]),
-        (Element::Aluminium, [0.909, 0.916, 0.924]),
-        (Element::Iron, [0.528, 0.513, 0.493]),
-        (Element::Chromium, [0.550, 0.556, 0.555]),
-        (Element::Titanium, [0.614, 0.580, 0.541]),
+        (MetalElement::Gold, [0.968, 0.746, 0.372]),
+        (MetalElement::Silver, [0.989, 0.984, 0.977]),
+        (MetalElement::Copper, [0.921, 0.620, 0.520]),
+        (MetalElement::Aluminium, [0.909, 0.916, 0.924]),
+        (MetalElement::Iron, [0.528, 0.513, 0.493]),
+        (MetalElement::Chromium, [0.550, 0.556, 0.555]),
+        (MetalElement::Titanium, [0.614, 0.580, 0.541]),
     ] {
         let found = of_element(element, [1.0; 2]).fresnel.reflectance(1.0);
         assert!((found - Vec3::from_array(known)).abs().max_element() < 1e-3, "{element:?}: {found}");
@@ -133,9 +141,9 @@ fn element_reflectances_match_reference_values() {
 #[test]
 fn anisotropy_stretches_alpha() {
     // α/a along u and α·a along v, with a = √(1 − 0.9·|anisotropy|).
-    let [u, v] = microfacet::alphas(0.5, 0.8);
+    let [u, v] = microfacet::alphas_from_roughness(0.5, 0.8);
     let a = (1.0_f32 - 0.72).sqrt();
     assert!((u - 0.25 / a).abs() < 1e-6 && (v - 0.25 * a).abs() < 1e-6);
-    assert_eq!(microfacet::alphas(0.5, -0.8), [v, u]);
-    assert_eq!(microfacet::alphas(0.5, 0.0), [0.25; 2]);
+    assert_eq!(microfacet::alphas_from_roughness(0.5, -0.8), [v, u]);
+    assert_eq!(microfacet::alphas_from_roughness(0.5, 0.0), [0.25; 2]);
 }

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::PhongBsdf;
-use super::lobes::{Lobes, gloss};
+use super::lobes::{PhongLobes, phong_cosine_power};
 use crate::materials::bsdf::{LobeSet, NarrowLobe};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
 use crate::math::Vec3;
@@ -25,7 +25,7 @@ soa! {
 
 soa! {
     /// View-dependent values of a Phong surface.
-    pub struct PhongView in PhongViewPacket {
+    pub struct PhongViewTerms in PhongViewPacket {
         /// The view direction reflected about the normal. The cosine between this direction and a light
         /// direction equals the cosine between the view direction and the reflected light direction: (2(n·l)n
         /// − l)·v = (2(n·v)n − v)·l.
@@ -35,18 +35,18 @@ soa! {
 
 impl PhongBxdf {
     #[inline(always)]
-    fn lobes(&self, view: &PhongView, lobes: LobeSet, normal: Vec3) -> Lobes {
+    fn lobes(&self, view: &PhongViewTerms, lobes: LobeSet, normal: Vec3) -> PhongLobes {
         let [diffuse, specular] = match lobes {
             LobeSet::All => self.albedos,
             LobeSet::Narrow => [0.0, 1.0],
         };
-        Lobes { normal, mirrored_eye: view.reflected, diffuse, specular, shininess: self.shininess }
+        PhongLobes { normal, mirrored_eye: view.reflected, diffuse, specular, shininess: self.shininess }
     }
 }
 
 impl Bxdf for PhongBxdf {
     type Point = PhongBsdf;
-    type View = PhongView;
+    type View = PhongViewTerms;
 
     const TURNS_NORMALS: bool = false;
     const SENDS_RAYS: bool = false;
@@ -81,32 +81,40 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> PhongView {
+    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> PhongViewTerms {
         let &SurfaceDirections { normal, wo, .. } = directions;
-        PhongView { reflected: normal * (2.0 * normal.dot(wo)) - wo }
+        PhongViewTerms { reflected: normal * (2.0 * normal.dot(wo)) - wo }
     }
 
     #[inline(always)]
-    fn wide(&self, _: &PhongView, _: Vec3, _: BxdfFlags) -> LobeValue {
+    fn wide_lobe_value(&self, _: &PhongViewTerms, _: Vec3, _: BxdfFlags) -> LobeValue {
         LobeValue { f: self.diffuse, max: self.albedos[0] * FRAC_1_PI, shape: 0.0 }
     }
 
     #[inline(always)]
-    fn narrow(&self, view: &PhongView, wi: Vec3, _: BxdfFlags) -> LobeValue {
-        let gloss = gloss(view.reflected, wi, self.shininess);
+    fn narrow_lobe_value(&self, view: &PhongViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
+        let gloss = phong_cosine_power(view.reflected, wi, self.shininess);
         let peak = self.albedos[1] * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI));
         LobeValue { f: self.specular * gloss, max: peak * gloss, shape: gloss }
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &PhongView, lobes: LobeSet, normal: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
-        self.lobes(view, lobes, normal).density(wi, shape)
+    fn pdf(
+        &self,
+        view: &PhongViewTerms,
+        lobes: LobeSet,
+        normal: Vec3,
+        wi: Vec3,
+        shape: f32,
+        _: BxdfFlags,
+    ) -> f32 {
+        self.lobes(view, lobes, normal).pdf(wi, shape)
     }
 
     #[inline(always)]
     fn sample(
         &self,
-        view: &PhongView,
+        view: &PhongViewTerms,
         lobes: LobeSet,
         normal: Vec3,
         choice: f32,
@@ -118,7 +126,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn narrow_lobe(&self, view: &PhongView) -> Option<NarrowLobe> {
+    fn narrow_lobe(&self, view: &PhongViewTerms) -> Option<NarrowLobe> {
         // The normal is not used here.
         let lobes = self.lobes(view, LobeSet::All, Vec3::Z);
         let (axis, exponent) = (view.reflected, self.shininess);

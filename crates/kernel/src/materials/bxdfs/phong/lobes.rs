@@ -11,7 +11,7 @@ use crate::math::frame::Frame;
 
 /// The lobes of a Phong surface at a single point, for a single view direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobes {
+pub struct PhongLobes {
     /// Unit normal on the viewer's side.
     pub normal: Vec3,
     /// The view direction reflected about the normal.
@@ -24,7 +24,7 @@ pub struct Lobes {
     pub shininess: f32,
 }
 
-impl Lobes {
+impl PhongLobes {
     /// Samples a unit direction. `lobe` selects the lobe and `u` the direction within it. All random numbers
     /// are in [0, 1).
     #[inline(always)]
@@ -43,15 +43,15 @@ impl Lobes {
         direction_about_axis(Vec3::new(x, y, z), sine, cosine, u[1])
     }
 
-    /// [`Lobes::sample`] using only the diffuse lobe.
+    /// [`PhongLobes::sample`] using only the diffuse lobe.
     #[inline(always)]
     pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
         direction_about_axis(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
     }
 
-    /// Pdf in sr⁻¹ of a sampled direction with the given [`gloss`].
+    /// Pdf in sr⁻¹ of a sampled direction with the given [`phong_cosine_power`].
     #[inline(always)]
-    pub fn density(&self, direction: Vec3, gloss: f32) -> f32 {
+    pub fn pdf(&self, direction: Vec3, gloss: f32) -> f32 {
         let cosine = self.normal.dot(direction);
         let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
         let glossy = (self.shininess + 1.0) * (0.5 * FRAC_1_PI) * gloss;
@@ -59,7 +59,7 @@ impl Lobes {
         share * diffuse + (1.0 - share) * glossy
     }
 
-    /// f in sr⁻¹ of a gray surface with these albedos, given its [`gloss`].
+    /// f in sr⁻¹ of a gray surface with these albedos, given its [`phong_cosine_power`].
     #[inline(always)]
     pub fn value(&self, gloss: f32) -> f32 {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
@@ -86,7 +86,7 @@ pub fn direction_about_axis(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Ve
 /// the reflected view direction, to the power α, or 0 if the cosine is negative. The cosine is computed from
 /// the chord because cos θ loses precision in `f32` for small θ.
 #[inline(always)]
-pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
+pub fn phong_cosine_power(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());
     let is_ahead = cosine > 0.0;
     let left = pow_f64(if is_ahead { cosine } else { 1.0 }, f64::from(shininess)) as f32;

@@ -6,24 +6,24 @@ pub mod lobes;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::lookup::ParameterLookup;
-use crate::materials::texture::Color;
+use crate::materials::texture::ColorParameter;
 use crate::math::Vec3;
 pub use bxdf::PhongBxdf;
-use lobes::{Lobes, gloss};
+use lobes::{PhongLobes, phong_cosine_power};
 
 /// A material with diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
     /// Diffuse reflectance kd.
-    pub diffuse: Color,
+    pub diffuse: ColorParameter,
     /// Specular reflectance ks.
-    pub specular: Color,
+    pub specular: ColorParameter,
     /// Exponent α.
     pub shininess: f32,
     /// Ambient reflectance ka. Defaults to kd if `None`.
-    pub ambient: Option<Color>,
+    pub ambient: Option<ColorParameter>,
 }
 
 /// [`Phong`] at a point, after texture lookups.
@@ -39,7 +39,7 @@ pub struct PhongBsdf {
     pub ambient: Vec3,
 }
 
-impl RoughMaterial for Phong {
+impl BxdfMaterial for Phong {
     type Point = PhongBsdf;
 
     #[inline(always)]
@@ -63,19 +63,19 @@ impl RoughMaterial for Phong {
     }
 
     #[inline]
-    fn packet_color(&self) -> Option<&Color> {
+    fn packet_color(&self) -> Option<&ColorParameter> {
         Some(&self.diffuse)
     }
 }
 
-impl RoughPoint for PhongBsdf {
+impl BxdfParameters for PhongBsdf {
     #[inline]
     fn is_black(&self) -> bool {
         self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
     }
 
     #[inline]
-    fn ambient(&self) -> Vec3 {
+    fn ambient_reflectance(&self) -> Vec3 {
         self.ambient
     }
 
@@ -91,14 +91,14 @@ impl PhongBsdf {
     }
 
     /// f in sr⁻¹ for light from a direction.
-    pub fn value(&self, lobes: &Lobes, to_light: Vec3) -> Vec3 {
-        let gloss = gloss(lobes.mirrored_eye, to_light, self.shininess);
+    pub fn value(&self, lobes: &PhongLobes, to_light: Vec3) -> Vec3 {
+        let gloss = phong_cosine_power(lobes.mirrored_eye, to_light, self.shininess);
         self.diffuse_value() + self.specular_peak() * gloss
     }
 
     /// The lobes for a view direction. `normal` is the unit normal on that side.
-    pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> Lobes {
-        Lobes {
+    pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> PhongLobes {
+        PhongLobes {
             normal,
             // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
             mirrored_eye: normal * (2.0 * normal.dot(to_eye)) - to_eye,
@@ -116,7 +116,7 @@ impl PhongBsdf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lobe_tests::{LitFrom, check_shown_lobes};
+    use super::super::lobe_tests::{NarrowLightPath, check_shown_lobes};
     use super::*;
 
     fn glossy(shininess: f32) -> PhongBsdf {
@@ -128,7 +128,7 @@ mod tests {
         let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(0.5));
         let points = [0.0, 1.0, 40.0, 1e4, 1e6];
         let points = points.map(|shininess| PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO });
-        check_shown_lobes::<PhongBxdf>(&points, LitFrom::Mirrored);
+        check_shown_lobes::<PhongBxdf>(&points, NarrowLightPath::Mirrored);
     }
 
     fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {

@@ -2,11 +2,11 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use super::{PlasticPoint, base};
+use super::{PlasticPoint, base_layer_f};
 use crate::materials::bsdf::{LobeSet, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
-use crate::materials::fresnel::dielectric_outside;
-use crate::materials::lobe_albedo::{TERMS, evaluate};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
+use crate::materials::fresnel::dielectric_from_outside;
+use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
 use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
@@ -33,7 +33,7 @@ soa! {
 
 soa! {
     /// View-dependent values of plastic.
-    pub struct PlasticView in PlasticViewPacket {
+    pub struct PlasticViewTerms in PlasticViewPacket {
         /// Unit normal that faces the viewer.
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
@@ -51,10 +51,10 @@ const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 impl PlasticBxdf {
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
-    fn albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
-        let rough = evaluate(cosine, |number| self.terms[number]);
+    fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
+        let rough = evaluate_polynomial(cosine, |number| self.terms[number]);
         if any.contains(SMOOTH) {
-            let smooth = dielectric_outside(cosine, self.ior);
+            let smooth = dielectric_from_outside(cosine, self.ior);
             if self.alpha == 0.0 { smooth } else { rough }
         } else {
             rough
@@ -63,33 +63,33 @@ impl PlasticBxdf {
 
     /// The coat's transmittance in both directions. 0 for light from behind.
     #[inline(always)]
-    fn transmittance(&self, view: &PlasticView, wi: Vec3, any: BxdfFlags) -> f32 {
+    fn coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
         let cosine = view.normal.dot(wi);
         let is_ahead = cosine > 0.0;
-        let entering = 1.0 - self.albedo(if is_ahead { cosine } else { 0.0 }, any);
+        let entering = 1.0 - self.coat_albedo(if is_ahead { cosine } else { 0.0 }, any);
         if is_ahead { view.transmittance * entering } else { 0.0 }
     }
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(&self, view: &PlasticView, wi: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, view: &PlasticViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         let of = |direction| SmithTerms::isotropic(view.normal, direction, self.alpha);
         [of(view.wo), of(wi)]
     }
 
     /// The coat's D for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
-    fn distribution_and_fresnel(&self, view: &PlasticView, wi: Vec3) -> [f32; 2] {
-        let half = HalfVector::between(view.normal, view.wo, wi);
-        let distribution = half.isotropic(if self.alpha > 0.0 { self.alpha } else { 1.0 });
-        let fresnel = dielectric_outside(half.cosine(), self.ior);
+    fn distribution_and_fresnel(&self, view: &PlasticViewTerms, wi: Vec3) -> [f32; 2] {
+        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+        let distribution = half.isotropic_ggx(if self.alpha > 0.0 { self.alpha } else { 1.0 });
+        let fresnel = dielectric_from_outside(half.cosine(), self.ior);
         [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
     }
 }
 
 impl Bxdf for PlasticBxdf {
     type Point = PlasticPoint;
-    type View = PlasticView;
+    type View = PlasticViewTerms;
 
     const ALWAYS: BxdfFlags = BxdfFlags::WIDE;
 
@@ -101,7 +101,7 @@ impl Bxdf for PlasticBxdf {
 
     #[inline(always)]
     fn set_color(&mut self, point: &PlasticPoint, color: Vec3) {
-        self.base = base(color.min(Vec3::ONE), point.ior, &point.albedo);
+        self.base = base_layer_f(color.min(Vec3::ONE), point.ior, &point.albedo);
     }
 
     #[inline(always)]
@@ -115,33 +115,41 @@ impl Bxdf for PlasticBxdf {
     }
 
     #[inline(always)]
-    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PlasticView {
+    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PlasticViewTerms {
         let &SurfaceDirections { normal, wo, .. } = directions;
         let cosine = normal.dot(wo);
-        let albedo = self.albedo(if cosine > 0.0 { cosine } else { 0.0 }, any);
+        let albedo = self.coat_albedo(if cosine > 0.0 { cosine } else { 0.0 }, any);
         let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
         let coat = albedo * self.specular.max_element();
         let coat_share = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
-        PlasticView { normal, wo, transmittance: 1.0 - albedo, coat_share }
+        PlasticViewTerms { normal, wo, transmittance: 1.0 - albedo, coat_share }
     }
 
     #[inline(always)]
-    fn wide(&self, view: &PlasticView, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let transmittance = self.transmittance(view, wi, any);
+    fn wide_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let transmittance = self.coat_transmittance(view, wi, any);
         let max = self.base.max_element() * transmittance;
         LobeValue { f: self.base * transmittance, max, shape: 0.0 }
     }
 
     #[inline(always)]
-    fn narrow(&self, view: &PlasticView, wi: Vec3, _: BxdfFlags) -> LobeValue {
+    fn narrow_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let [distribution, fresnel] = self.distribution_and_fresnel(view, wi);
         let [eye, light] = self.smith_terms(view, wi);
-        let coat = fresnel * eye.reflected(&light, distribution);
+        let coat = fresnel * eye.reflection_term(&light, distribution);
         LobeValue { f: self.specular * coat, max: self.specular.max_element() * coat, shape: 0.0 }
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &PlasticView, lobes: LobeSet, normal: Vec3, wi: Vec3, _: f32, any: BxdfFlags) -> f32 {
+    fn pdf(
+        &self,
+        view: &PlasticViewTerms,
+        lobes: LobeSet,
+        normal: Vec3,
+        wi: Vec3,
+        _: f32,
+        any: BxdfFlags,
+    ) -> f32 {
         let mut coat = 0.0;
         if any.contains(BxdfFlags::NARROW) {
             let [distribution, _] = self.distribution_and_fresnel(view, wi);
@@ -160,7 +168,7 @@ impl Bxdf for PlasticBxdf {
     #[inline(always)]
     fn sample(
         &self,
-        view: &PlasticView,
+        view: &PlasticViewTerms,
         lobes: LobeSet,
         normal: Vec3,
         choice: f32,
@@ -176,14 +184,14 @@ impl Bxdf for PlasticBxdf {
             LobeSet::All => choice < view.coat_share,
             LobeSet::Narrow => self.alpha > 0.0,
         };
-        choose(is_coat, coat, diffuse)
+        select_vec3(is_coat, coat, diffuse)
     }
 
     #[inline(always)]
-    fn narrow_lobe(&self, view: &PlasticView) -> Option<NarrowLobe> {
+    fn narrow_lobe(&self, view: &PlasticViewTerms) -> Option<NarrowLobe> {
         let cosine = view.normal.dot(view.wo);
-        let reflectance = dielectric_outside(cosine, self.ior) * self.specular.max_element();
+        let reflectance = dielectric_from_outside(cosine, self.ior) * self.specular.max_element();
         let wide = view.transmittance * self.base.max_element() * (1.0 - self.mean);
-        Some(NarrowLobe::of_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
+        Some(NarrowLobe::from_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
     }
 }

@@ -8,12 +8,14 @@ mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 
-use crate::materials::bsdf::{RoughMaterial, RoughPoint};
-use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo, dielectric, under_coat};
+use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::lobe_albedo::{
+    AlbedoTable, LobeAlbedo, dielectric_reflectance, reflectance_under_coat,
+};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
-use crate::materials::scalar::Number;
-use crate::materials::texture::Color;
+use crate::materials::scalar::ScalarParameter;
+use crate::materials::texture::ColorParameter;
 use crate::math::Vec3;
 pub use bxdf::PlasticBxdf;
 
@@ -21,9 +23,9 @@ pub use bxdf::PlasticBxdf;
 /// [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
-    diffuse: Color,
-    specular: Color,
-    roughness: Number,
+    diffuse: ColorParameter,
+    specular: ColorParameter,
+    roughness: ScalarParameter,
     ior: f32,
     /// Albedos of the coat.
     albedos: AlbedoTable,
@@ -49,31 +51,40 @@ pub struct PlasticPoint {
 impl Plastic {
     /// Creates a plastic material from kd, a factor for the coat's reflectance, the square root of α, and an
     /// index of refraction of at least 1.
-    pub fn new(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Self {
-        let fresnel = |cosine: f64| dielectric(cosine, ior.into());
-        let is_smooth = roughness.constant() == Some(0.0);
+    pub fn new(
+        diffuse: ColorParameter,
+        specular: ColorParameter,
+        roughness: ScalarParameter,
+        ior: f32,
+    ) -> Self {
+        let fresnel = |cosine: f64| dielectric_reflectance(cosine, ior.into());
+        let is_smooth = roughness.as_constant() == Some(0.0);
         let albedos = if is_smooth {
-            AlbedoTable::single(LobeAlbedo::fit_with_exact_mean(fresnel))
+            AlbedoTable::from_albedo(LobeAlbedo::fit_with_exact_mean(fresnel))
         } else {
-            AlbedoTable::new(roughness.constant(), |one| microfacet::alphas(one, 0.0)[0], fresnel)
+            AlbedoTable::new(
+                roughness.as_constant(),
+                |one| microfacet::alphas_from_roughness(one, 0.0)[0],
+                fresnel,
+            )
         };
         Self { diffuse, specular, roughness, ior, albedos }
     }
 
     /// Whether the coat is smooth.
     fn is_smooth(&self) -> bool {
-        self.roughness.constant() == Some(0.0)
+        self.roughness.as_constant() == Some(0.0)
     }
 }
 
 /// Computes f in sr⁻¹ of a base from its kd, for light that passes through the coat in both directions.
-fn base(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
+fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;
-    under_coat(diffuse, returned) * (FRAC_1_PI / squared)
+    reflectance_under_coat(diffuse, returned) * (FRAC_1_PI / squared)
 }
 
-impl RoughMaterial for Plastic {
+impl BxdfMaterial for Plastic {
     type Point = PlasticPoint;
 
     #[inline(always)]
@@ -81,13 +92,13 @@ impl RoughMaterial for Plastic {
         let diffuse = lookup.color(&self.diffuse).min(Vec3::ONE);
         let specular = lookup.color(&self.specular).min(Vec3::ONE);
         let roughness = lookup.number(&self.roughness);
-        let (albedo, is_smooth) = (self.albedos.at(roughness), self.is_smooth());
+        let (albedo, is_smooth) = (self.albedos.lookup(roughness), self.is_smooth());
         PlasticPoint {
             diffuse,
-            base: base(diffuse, self.ior, &albedo),
+            base: base_layer_f(diffuse, self.ior, &albedo),
             specular: if is_smooth { Vec3::ZERO } else { specular },
             ior: self.ior,
-            alpha: if is_smooth { 0.0 } else { microfacet::alphas(roughness, 0.0)[0] },
+            alpha: if is_smooth { 0.0 } else { microfacet::alphas_from_roughness(roughness, 0.0)[0] },
             albedo,
         }
     }
@@ -102,25 +113,25 @@ impl RoughMaterial for Plastic {
     }
 
     #[inline]
-    fn packet_color(&self) -> Option<&Color> {
+    fn packet_color(&self) -> Option<&ColorParameter> {
         Some(&self.diffuse)
     }
 }
 
-impl RoughPoint for PlasticPoint {
+impl BxdfParameters for PlasticPoint {
     #[inline]
     fn is_black(&self) -> bool {
         self.base == Vec3::ZERO && self.specular == Vec3::ZERO
     }
 
     #[inline]
-    fn ambient(&self) -> Vec3 {
+    fn ambient_reflectance(&self) -> Vec3 {
         self.diffuse
     }
 
     fn tinted(self, color: Vec3) -> Self {
         let diffuse = (self.diffuse * color).min(Vec3::ONE);
-        Self { diffuse, base: base(diffuse, self.ior, &self.albedo), ..self }
+        Self { diffuse, base: base_layer_f(diffuse, self.ior, &self.albedo), ..self }
     }
 }
 

@@ -2,15 +2,16 @@
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::lookup::WhiteLookup;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
+    ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
+    spherical_direction,
 };
+use crate::materials::lookup::WhiteLookup;
 use crate::math::DVec3;
 
 fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
-    let [diffuse, specular] = [diffuse, Vec3::splat(specular)].map(Color::Constant);
-    Plastic::new(diffuse, specular, Number::Constant(alpha.sqrt()), ior)
+    let [diffuse, specular] = [diffuse, Vec3::splat(specular)].map(ColorParameter::Constant);
+    Plastic::new(diffuse, specular, ScalarParameter::Constant(alpha.sqrt()), ior)
 }
 
 fn point(plastic: &Plastic) -> PlasticPoint {
@@ -26,12 +27,13 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let (eta, wide) = (f64::from(ior), [f64::from(alpha); 2]);
         let mean = f64::from(point.albedo.mean);
         let returned = 1.0 - (1.0 - mean) / (eta * eta);
-        let left = |cosine: f64| 1.0 - f64::from(point.albedo.at(cosine as f32));
+        let left = |cosine: f64| 1.0 - f64::from(point.albedo.evaluate(cosine as f32));
         check_values::<PlasticBxdf>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
-            let fresnel = dielectric((o + i).length() * 0.5, eta);
+            let fresnel = dielectric_reflectance((o + i).length() * 0.5, eta);
             let kd = RED.as_dvec3();
             let base = kd / (DVec3::ONE - kd * returned) / (std::f64::consts::PI * eta * eta);
-            base * (left(o.z) * left(i.z)) + DVec3::splat(0.9 * fresnel * reference(o, i, wide))
+            base * (left(o.z) * left(i.z))
+                + DVec3::splat(0.9 * fresnel * reference_microfacet_brdf(o, i, wide))
         });
     }
 }
@@ -43,16 +45,16 @@ fn lanes_are_independent() {
         .flat_map(|alpha| [plastic(RED, 1.0, 1.5, alpha), plastic(Vec3::ZERO, 0.8, 1.3, alpha)])
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PlasticBxdf>(&points);
+    check_lane_independence::<PlasticBxdf>(&points);
 }
 
 #[test]
 fn samples_follow_the_pdf() {
     for (alpha, cosine) in ALPHAS.into_iter().flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine))) {
-        let subject = Subject::<PlasticBxdf>::new(
+        let subject = TestSurface::<PlasticBxdf>::new(
             &point(&plastic(RED, 1.0, 1.5, alpha)),
             [alpha; 2],
-            direction(cosine, 0.7),
+            spherical_direction(cosine, 0.7),
         );
         subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
         // For narrow lobes, the map's cells are too large for the diffuse lobe.
@@ -68,11 +70,12 @@ fn white_furnace_and_albedos_match_quadrature() {
         for cosine in COSINES {
             let what = format!("α {alpha}, η {ior} at a cosine of {cosine}");
             let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
-            let subject = Subject::<PlasticBxdf>::new(&white, [alpha; 2], direction(cosine, 0.3));
+            let subject =
+                TestSurface::<PlasticBxdf>::new(&white, [alpha; 2], spherical_direction(cosine, 0.3));
             let furnace = subject.sampled_albedo(192).x;
             assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: white plastic reflects {furnace}");
             let red = point(&plastic(RED, 1.0, ior, alpha));
-            let subject = Subject::<PlasticBxdf>::new(&red, [alpha; 2], direction(cosine, 0.3));
+            let subject = TestSurface::<PlasticBxdf>::new(&red, [alpha; 2], spherical_direction(cosine, 0.3));
             let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
             assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} instead of {exact}");
         }
@@ -84,8 +87,9 @@ fn base_under_smooth_coat_gets_transmitted_light() {
     for ior in [1.0, 1.3, 1.5, 3.0] {
         for cosine in COSINES {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));
-            let subject = Subject::<PlasticBxdf>::new(&base, [1.0; 2], direction(cosine, 0.3));
-            let (albedo, fresnel) = (subject.sampled_albedo(192).x, dielectric(cosine, ior.into()));
+            let subject = TestSurface::<PlasticBxdf>::new(&base, [1.0; 2], spherical_direction(cosine, 0.3));
+            let (albedo, fresnel) =
+                (subject.sampled_albedo(192).x, dielectric_reflectance(cosine, ior.into()));
             assert!((albedo + fresnel - 1.0).abs() < 1e-3, "η {ior}: {albedo} and {fresnel}");
         }
     }

@@ -4,9 +4,9 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, PrincipledPoint};
 use crate::materials::bsdf::{LobeSet, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::lobe_albedo::{TERMS, evaluate};
+use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
 use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
@@ -47,7 +47,7 @@ soa! {
 
 soa! {
     /// View-dependent values of a principled material.
-    pub struct PrincipledView in PrincipledViewPacket {
+    pub struct PrincipledViewTerms in PrincipledViewPacket {
         /// Unit normal that faces the viewer. For transmitted light, it is on the other side.
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer. For transmitted light, it is mirrored to the other side.
@@ -82,20 +82,23 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Albedo of the coat at a cosine ≥ 0, including the coat's weight.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32) -> f32 {
-        self.coat * evaluate(cosine, |number| self.coat_terms[number])
+        self.coat * evaluate_polynomial(cosine, |number| self.coat_terms[number])
     }
 
     /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
     /// grazing angles.
     #[inline(always)]
-    fn albedos(&self, cosine: f32) -> [f32; 2] {
-        [evaluate(cosine, |number| self.terms[number]), evaluate(cosine, |number| self.grazing_terms[number])]
+    fn specular_albedos(&self, cosine: f32) -> [f32; 2] {
+        [
+            evaluate_polynomial(cosine, |number| self.terms[number]),
+            evaluate_polynomial(cosine, |number| self.grazing_terms[number]),
+        ]
     }
 
     /// Fraction of the light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
     fn specular_transmittance(&self, cosine: f32) -> Vec3 {
-        let [normal, grazing] = self.albedos(cosine);
+        let [normal, grazing] = self.specular_albedos(cosine);
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
         // result negative.
@@ -104,13 +107,13 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(view: &PrincipledView, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
+    fn smith_terms(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
         [SmithTerms::isotropic(view.normal, view.wo, alpha), SmithTerms::isotropic(view.normal, wi, alpha)]
     }
 
     /// The coat's transmittance in both directions.
     #[inline(always)]
-    fn coat_transmittance(&self, view: &PrincipledView, cosine: f32, any: BxdfFlags) -> f32 {
+    fn coat_transmittance(&self, view: &PrincipledViewTerms, cosine: f32, any: BxdfFlags) -> f32 {
         if any.contains(COATED) {
             view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative(cosine)))
         } else {
@@ -120,16 +123,16 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// f of the specular lobe and of the coat. 0 for light from behind.
     #[inline(always)]
-    fn reflected(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = HalfVector::between(view.normal, view.wo, wi);
+    fn reflection_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
+        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
-        let white = eye.reflected(&light, half.isotropic(self.alpha));
+        let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
         let specular = reflectance * (white * self.coat_transmittance(view, light.cosine, any));
         if any.contains(COATED) {
             let [eye, light] = Self::smith_terms(view, wi, self.coat_alpha);
-            let white = eye.reflected(&light, half.isotropic(self.coat_alpha));
+            let white = eye.reflection_term(&light, half.isotropic_ggx(self.coat_alpha));
             let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
             specular + Vec3::splat(self.coat * reflectance * white)
         } else {
@@ -139,29 +142,29 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// f of transmitted light.
     #[inline(always)]
-    fn transmitted(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = HalfVector::between(view.normal, view.wo, wi);
+    fn transmission_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
+        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
         let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
-        let white = eye.reflected(&light, half.isotropic(self.alpha));
+        let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
         self.transmission * rest * (white * self.coat_transmittance(view, light.cosine, any))
     }
 
     /// Pdf of a direction that is sampled from a lobe with this α.
     #[inline(always)]
-    fn lobe_pdf(view: &PrincipledView, wi: Vec3, alpha: f32) -> f32 {
-        let half = HalfVector::between(view.normal, view.wo, wi);
+    fn lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
+        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = Self::smith_terms(view, wi, alpha);
-        let pdf = eye.pdf(half.isotropic(alpha));
+        let pdf = eye.pdf(half.isotropic_ggx(alpha));
         if light.is_above_surface() { pdf } else { 0.0 }
     }
 }
 
 impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     type Point = PrincipledPoint;
-    type View = PrincipledView;
+    type View = PrincipledViewTerms;
 
     const IS_TRANSMISSION: bool = THROUGH;
     const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
@@ -194,14 +197,14 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PrincipledView {
+    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PrincipledViewTerms {
         let &SurfaceDirections { normal, wo, .. } = directions;
         let mirrored = wo - normal * (2.0 * normal.dot(wo));
         let wo = if THROUGH { mirrored } else { wo };
         let cosine = nonnegative(normal.dot(wo));
         let coat = self.coat_albedo(cosine);
         let transmittance = self.specular_transmittance(cosine);
-        let [at_normal, at_grazing] = self.albedos(cosine);
+        let [at_normal, at_grazing] = self.specular_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
         let diffuse = self.diffuse * transmittance.max_element();
         let mut all = specular + diffuse;
@@ -212,7 +215,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             all += transmission;
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
-        PrincipledView {
+        PrincipledViewTerms {
             normal,
             wo,
             transmittance,
@@ -226,7 +229,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn wide(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> LobeValue {
+    fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
         let transmittance = self.specular_transmittance(nonnegative(cosine)) * view.transmittance;
         let coat = if cosine > 0.0 { self.coat_transmittance(view, cosine, any) } else { 0.0 };
@@ -235,22 +238,22 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn narrow(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let f = if THROUGH { self.transmitted(view, wi, any) } else { self.reflected(view, wi, any) };
+    fn narrow_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let f = if THROUGH { self.transmission_f(view, wi, any) } else { self.reflection_f(view, wi, any) };
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }
 
     #[inline(always)]
     fn pdf(
         &self,
-        view: &PrincipledView,
+        view: &PrincipledViewTerms,
         lobes: LobeSet,
         normal: Vec3,
         wi: Vec3,
         _: f32,
         any: BxdfFlags,
     ) -> f32 {
-        let PrincipledView { specular_share, coat_share, transmission_share, .. } = *view;
+        let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
         let specular = Self::lobe_pdf(view, wi, self.alpha);
         let coat = if any.contains(COATED) { Self::lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
         let narrow = if THROUGH {
@@ -273,14 +276,14 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn sample(
         &self,
-        view: &PrincipledView,
+        view: &PrincipledViewTerms,
         lobes: LobeSet,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
         _: BxdfFlags,
     ) -> Vec3 {
-        let PrincipledView { specular_share, coat_share, transmission_share, .. } = *view;
+        let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
         let choice = match lobes {
             LobeSet::All => choice,
             LobeSet::Narrow => choice * (specular_share + coat_share + transmission_share),
@@ -300,13 +303,13 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
-        choose(is_through == THROUGH, choose(is_wide, wide, narrow), -view.normal)
+        select_vec3(is_through == THROUGH, select_vec3(is_wide, wide, narrow), -view.normal)
     }
 
     #[inline(always)]
-    fn narrow_lobe(&self, view: &PrincipledView) -> Option<NarrowLobe> {
+    fn narrow_lobe(&self, view: &PrincipledViewTerms) -> Option<NarrowLobe> {
         let reflectance = self.facets.max_element();
         let wide = if THROUGH { 0.0 } else { (self.base * view.transmittance).max_element() };
-        Some(NarrowLobe::of_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
+        Some(NarrowLobe::from_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
     }
 }

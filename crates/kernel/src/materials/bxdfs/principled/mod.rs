@@ -16,13 +16,13 @@ mod bxdf;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::{Arc, LazyLock};
 
-use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
-use crate::materials::scalar::Number;
-use crate::materials::texture::{Color, Texture};
+use crate::materials::scalar::ScalarParameter;
+use crate::materials::texture::{ColorParameter, Texture};
 use crate::math::Vec3;
 pub use bxdf::PrincipledBxdf;
 
@@ -41,23 +41,23 @@ pub struct Principled {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipledInputs {
     /// Diffuse reflectance, and reflectance of the metal at normal incidence.
-    pub color: Color,
+    pub color: ColorParameter,
     /// Weight of the metallic part.
-    pub metallic: Number,
+    pub metallic: ScalarParameter,
     /// The square root of α.
-    pub roughness: Number,
+    pub roughness: ScalarParameter,
     /// Index of refraction. At least 1.
     pub ior: f32,
     /// Factor for the dielectric's reflectance.
-    pub specular: Number,
+    pub specular: ScalarParameter,
     /// Factor for the dielectric's reflectance at normal incidence.
-    pub specular_color: Color,
+    pub specular_color: ColorParameter,
     /// Fraction of the light that enters the dielectric and is transmitted instead of scattered.
-    pub transmission: Number,
+    pub transmission: ScalarParameter,
     /// Weight of the clear coat.
-    pub clearcoat: Number,
+    pub clearcoat: ScalarParameter,
     /// The square root of the clear coat's α.
-    pub clearcoat_roughness: Number,
+    pub clearcoat_roughness: ScalarParameter,
 }
 
 /// [`Principled`] at a point, after texture lookups.
@@ -109,20 +109,20 @@ pub struct SchlickAlbedo {
 
 impl SchlickAlbedo {
     /// The albedos for a constant roughness.
-    fn of(roughness: f32) -> Self {
+    fn from_roughness(roughness: f32) -> Self {
         let [normal, grazing] = albedo_tables(Some(roughness));
-        Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
+        Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
     }
 
     /// The albedos for any roughness, interpolated from tables.
-    fn between(roughness: f32) -> Self {
+    fn from_tables(roughness: f32) -> Self {
         static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| albedo_tables(None));
         let [normal, grazing] = &*TABLES;
-        Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
+        Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
     }
 
     /// Albedo of a coat with this reflectance at normal incidence and a reflectance of 1 at grazing angles.
-    fn of_coat(&self, reflectance: f32) -> LobeAlbedo {
+    fn coat_albedo(&self, reflectance: f32) -> LobeAlbedo {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
         LobeAlbedo {
             terms: std::array::from_fn(|i| sum(self.normal.terms[i], self.grazing.terms[i])),
@@ -135,44 +135,46 @@ impl SchlickAlbedo {
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionCoat {
     /// Weight of the coat.
-    weight: Number,
+    weight: ScalarParameter,
     /// The square root of the coat's α.
-    roughness: Number,
+    roughness: ScalarParameter,
     /// The coat's albedo. `None` if the roughness varies.
     albedo: Option<LobeAlbedo>,
 }
 
 impl EmissionCoat {
     /// A coat with the given weight and roughness. `None` if the weight is 0.
-    pub fn new(weight: Number, roughness: Number) -> Option<Self> {
-        if weight.constant() == Some(0.0) {
+    pub fn new(weight: ScalarParameter, roughness: ScalarParameter) -> Option<Self> {
+        if weight.as_constant() == Some(0.0) {
             return None;
         }
-        let albedo = roughness.constant().map(|one| SchlickAlbedo::of(one).of_coat(COAT_REFLECTANCE));
+        let albedo = roughness
+            .as_constant()
+            .map(|one| SchlickAlbedo::from_roughness(one).coat_albedo(COAT_REFLECTANCE));
         Some(Self { weight, roughness, albedo })
     }
 
     /// Transmittance for light that leaves the surface at the given cosine. Counts texture lookups in
     /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
-        let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
-        let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
+        let weight = self.weight.evaluate(at, lookups).clamp(0.0, 1.0);
+        let between = |roughness: f32| SchlickAlbedo::from_tables(roughness.clamp(0.0, 1.0));
         let albedo = match self.albedo {
             Some(albedo) => albedo,
-            None => between(self.roughness.at(at, lookups)).of_coat(COAT_REFLECTANCE),
+            None => between(self.roughness.evaluate(at, lookups)).coat_albedo(COAT_REFLECTANCE),
         };
-        1.0 - weight * albedo.at(cosine.abs())
+        1.0 - weight * albedo.evaluate(cosine.abs())
     }
 
     /// All textures of the coat.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        [&self.weight, &self.roughness].into_iter().filter_map(Number::texture)
+        [&self.weight, &self.roughness].into_iter().filter_map(ScalarParameter::texture)
     }
 }
 
 /// The two tables of [`SchlickAlbedo`].
 fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
-    let alpha = |roughness: f32| microfacet::alphas(roughness, 0.0)[0];
+    let alpha = |roughness: f32| microfacet::alphas_from_roughness(roughness, 0.0)[0];
     let weight = |cosine: f64| {
         let rest = 1.0 - cosine;
         rest * rest * rest * rest * rest
@@ -184,22 +186,23 @@ fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
 impl Principled {
     /// Creates a material from its parameters.
     pub fn new(inputs: PrincipledInputs) -> Self {
-        let has_coat = inputs.clearcoat.constant() != Some(0.0);
-        let coat = inputs.clearcoat_roughness.constant().filter(|_| has_coat);
-        let albedos = [inputs.roughness.constant(), coat].map(|roughness| roughness.map(SchlickAlbedo::of));
+        let has_coat = inputs.clearcoat.as_constant() != Some(0.0);
+        let coat = inputs.clearcoat_roughness.as_constant().filter(|_| has_coat);
+        let albedos = [inputs.roughness.as_constant(), coat]
+            .map(|roughness| roughness.map(SchlickAlbedo::from_roughness));
         // The albedo is irrelevant if the coat has no weight.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
 }
 
-impl RoughMaterial for Principled {
+impl BxdfMaterial for Principled {
     type Point = PrincipledPoint;
 
     #[inline]
     fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PrincipledPoint {
         let inputs = &self.inputs;
-        let mut unit = |number: &'m Number| lookup.number(number).clamp(0.0, 1.0);
+        let mut unit = |number: &'m ScalarParameter| lookup.number(number).clamp(0.0, 1.0);
         let (metallic, roughness) = (unit(&inputs.metallic), unit(&inputs.roughness));
         let (specular, through) = (unit(&inputs.specular), unit(&inputs.transmission));
         let (coat, coat_roughness) = (unit(&inputs.clearcoat), unit(&inputs.clearcoat_roughness));
@@ -208,8 +211,8 @@ impl RoughMaterial for Principled {
         let specular_color = lookup.color(&inputs.specular_color);
         let reflectance = (specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
         let [specular_albedo, coat_albedo] = self.albedos;
-        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::between(roughness));
-        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedo::between(coat_roughness));
+        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::from_tables(roughness));
+        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedo::from_tables(coat_roughness));
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
         let below = color * (1.0 - metallic);
         let diffuse = below * (1.0 - through);
@@ -220,11 +223,11 @@ impl RoughMaterial for Principled {
             grazing: specular + (1.0 - specular) * metallic,
             dielectric: (reflectance, specular),
             transmission: below * through,
-            alpha: microfacet::alphas(roughness, 0.0)[0],
+            alpha: microfacet::alphas_from_roughness(roughness, 0.0)[0],
             albedo,
             coat,
-            coat_alpha: microfacet::alphas(coat_roughness, 0.0)[0],
-            coat_albedo: coat_albedo.of_coat(COAT_REFLECTANCE),
+            coat_alpha: microfacet::alphas_from_roughness(coat_roughness, 0.0)[0],
+            coat_albedo: coat_albedo.coat_albedo(COAT_REFLECTANCE),
             ambient: diffuse,
         }
     }
@@ -242,11 +245,11 @@ impl RoughMaterial for Principled {
     }
 
     fn is_transmissive(&self) -> bool {
-        self.inputs.transmission.constant() != Some(0.0)
+        self.inputs.transmission.as_constant() != Some(0.0)
     }
 }
 
-impl RoughPoint for PrincipledPoint {
+impl BxdfParameters for PrincipledPoint {
     #[inline]
     fn is_black(&self) -> bool {
         let is_dark = self.base == Vec3::ZERO && self.facets == Vec3::ZERO && !self.transmits();
@@ -254,7 +257,7 @@ impl RoughPoint for PrincipledPoint {
     }
 
     #[inline]
-    fn ambient(&self) -> Vec3 {
+    fn ambient_reflectance(&self) -> Vec3 {
         self.ambient
     }
 

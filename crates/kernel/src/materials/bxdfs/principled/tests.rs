@@ -3,11 +3,11 @@
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::lookup::WhiteLookup;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, LitFrom, Subject, check_neighbors, check_neighbors_lit, check_values, direction,
-    reference,
+    ALPHAS, COSINES, NarrowLightPath, TestSurface, check_lane_independence, check_lane_independence_with,
+    check_values, reference_microfacet_brdf, spherical_direction,
 };
+use crate::materials::lookup::WhiteLookup;
 use crate::math::DVec3;
 
 fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Principled {
@@ -15,14 +15,14 @@ fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Princip
 }
 
 fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
-    let number = Number::Constant;
+    let number = ScalarParameter::Constant;
     Principled::new(PrincipledInputs {
-        color: Color::Constant(color),
+        color: ColorParameter::Constant(color),
         metallic: number(metallic),
         roughness: number(alpha.sqrt()),
         ior: 1.6,
         specular: number(0.8),
-        specular_color: Color::Constant(Vec3::new(1.0, 0.6, 1.2)),
+        specular_color: ColorParameter::Constant(Vec3::new(1.0, 0.6, 1.2)),
         transmission: number(transmission),
         clearcoat: number(coat[0]),
         clearcoat_roughness: number(coat[1].sqrt()),
@@ -53,13 +53,13 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let (color, m) = (RED.as_dvec3(), f64::from(metallic));
         let albedo = |cosine: f64| {
             let [normal, grazing] =
-                [point.albedo.normal, point.albedo.grazing].map(|one| f64::from(one.at(cosine as f32)));
+                [point.albedo.normal, point.albedo.grazing].map(|one| f64::from(one.evaluate(cosine as f32)));
             f0 * normal + DVec3::splat(0.8 * grazing)
         };
         let mean = f0 * f64::from(point.albedo.normal.mean)
             + DVec3::splat(0.8 * f64::from(point.albedo.grazing.mean));
         let c = f64::from(coat[0]);
-        let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at(cosine as f32));
+        let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.evaluate(cosine as f32));
         check_values::<PrincipledBxdf<false>>(
             &format!("α {alpha}, metallic {metallic}"),
             &point,
@@ -69,12 +69,14 @@ fn values_match_the_formulas_and_are_reciprocal() {
                 let schlick =
                     |normal: DVec3, grazing: f64| normal + (DVec3::splat(grazing) - normal) * weight;
                 let fresnel = schlick(f0, 0.8) * (1.0 - m) + schlick(color, 1.0) * m;
-                let specular = fresnel * reference(o, i, [f64::from(alpha); 2]);
+                let specular = fresnel * reference_microfacet_brdf(o, i, [f64::from(alpha); 2]);
                 let diffuse = color * (1.0 - m) / std::f64::consts::PI
                     * (DVec3::ONE - albedo(o.z))
                     * (DVec3::ONE - albedo(i.z))
                     / (DVec3::ONE - mean);
-                let clear = c * (0.04 + 0.96 * weight) * reference(o, i, [f64::from(point.coat_alpha); 2]);
+                let clear = c
+                    * (0.04 + 0.96 * weight)
+                    * reference_microfacet_brdf(o, i, [f64::from(point.coat_alpha); 2]);
                 (specular + diffuse) * (through(o.z) * through(i.z)) + DVec3::splat(clear)
             },
         );
@@ -89,7 +91,7 @@ fn lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PrincipledBxdf<false>>(&points);
+    check_lane_independence::<PrincipledBxdf<false>>(&points);
 }
 
 #[test]
@@ -97,7 +99,11 @@ fn samples_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects() {
         for cosine in COSINES {
             let point = point(&principled(RED, metallic, alpha, coat));
-            let subject = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], direction(cosine, 0.7));
+            let subject = TestSurface::<PrincipledBxdf<false>>::new(
+                &point,
+                [alpha; 2],
+                spherical_direction(cosine, 0.7),
+            );
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             subject.check_samples(&what, LobeSet::Narrow);
             if alpha >= 0.2 {
@@ -113,8 +119,11 @@ fn albedos_match_quadrature_and_stay_below_1() {
         for cosine in COSINES {
             for color in [RED, Vec3::ONE] {
                 let point = point(&principled(color, metallic, alpha, coat));
-                let subject =
-                    Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], direction(cosine, 0.3));
+                let subject = TestSurface::<PrincipledBxdf<false>>::new(
+                    &point,
+                    [alpha; 2],
+                    spherical_direction(cosine, 0.3),
+                );
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!(
                     "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} instead of {exact}"
@@ -129,21 +138,24 @@ fn albedos_match_quadrature_and_stay_below_1() {
 #[test]
 fn fully_reflective_facets_have_bounded_weights() {
     for alpha in [0.001_f32, 0.002, 0.01, 0.05] {
-        let number = Number::Constant;
+        let number = ScalarParameter::Constant;
         let white = Principled::new(PrincipledInputs {
-            color: Color::Constant(Vec3::ONE),
+            color: ColorParameter::Constant(Vec3::ONE),
             metallic: number(0.0),
             roughness: number(alpha.sqrt()),
             ior: 1.5,
             specular: number(1.0),
-            specular_color: Color::Constant(Vec3::splat(25.0)),
+            specular_color: ColorParameter::Constant(Vec3::splat(25.0)),
             transmission: number(0.0),
             clearcoat: number(0.0),
             clearcoat_roughness: number(0.0),
         });
         for cosine in [0.01, 0.05, 0.3, 1.0] {
-            let subject =
-                Subject::<PrincipledBxdf<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
+            let subject = TestSurface::<PrincipledBxdf<false>>::new(
+                &point(&white),
+                [alpha; 2],
+                spherical_direction(cosine, 0.7),
+            );
             let (largest, mean) = (subject.largest_weight(128), subject.sampled_albedo(128).x);
             assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample has weight {largest}");
             assert!(mean < 1.0 + 3e-3, "α {alpha} at a cosine of {cosine}: {mean}");
@@ -162,14 +174,19 @@ fn transmission_is_the_mirrored_specular_lobe() {
         let point = point(&transmitting(RED, metallic, transmission, alpha, coat));
         let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
         let c = f64::from(coat[0]);
-        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at(cosine as f32));
+        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.evaluate(cosine as f32));
         let (part, m) = (f64::from(transmission), f64::from(metallic));
         for (number, cosine) in COSINES.into_iter().enumerate() {
-            let to_eye = direction(cosine, 0.7).as_vec3().as_dvec3();
-            let subject = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], to_eye, LitFrom::Through);
+            let to_eye = spherical_direction(cosine, 0.7).as_vec3().as_dvec3();
+            let subject = TestSurface::<PrincipledBxdf<true>>::with_light_path(
+                &point,
+                [alpha; 2],
+                to_eye,
+                NarrowLightPath::Through,
+            );
             for trial in 0..40_u32 {
                 let (y, turn) = (f64::from(trial) / 41.0, f64::from(trial) * 2.4 + number as f64);
-                let Some((light, _)) = subject.at_half_vector(y, turn) else { continue };
+                let Some((light, _)) = subject.map_to_direction(y, turn) else { continue };
                 let light = light.as_vec3().as_dvec3();
                 if light.z > -0.02 {
                     continue;
@@ -177,9 +194,9 @@ fn transmission_is_the_mirrored_specular_lobe() {
                 let (o, i) = (to_eye.normalize(), DVec3::new(light.x, light.y, -light.z).normalize());
                 let weight = (1.0 - (o + i).length() * 0.5).powi(5);
                 let fresnel = f0 + (DVec3::splat(0.8) - f0) * weight;
-                let lobe = reference(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
+                let lobe = reference_microfacet_brdf(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
                 let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
-                let found = subject.values(LobeSet::All, &[light])[0].0;
+                let found = subject.evaluate(LobeSet::All, &[light])[0].0;
                 let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
                 let what = format!("α {alpha}, {transmission}, {cosine}: {found} instead of {exact}");
                 assert!((found - exact).abs().max_element() <= error * exact.max_element(), "{what}");
@@ -193,9 +210,14 @@ fn samples_on_both_sides_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
         for cosine in COSINES {
             let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
-            let at = direction(cosine, 0.7);
-            let behind = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
-            let front = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
+            let at = spherical_direction(cosine, 0.7);
+            let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
+                &point,
+                [alpha; 2],
+                at,
+                NarrowLightPath::Through,
+            );
+            let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             for lobes in [LobeSet::Narrow, LobeSet::All] {
                 behind.check_samples(&format!("other side, {lobes:?}, {what}"), lobes);
@@ -214,9 +236,14 @@ fn two_sided_albedos_match_quadrature() {
     {
         for cosine in COSINES {
             let point = point(&transmitting(Vec3::ONE, metallic, transmission, alpha, coat));
-            let at = direction(cosine, 0.3);
-            let behind = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
-            let front = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
+            let at = spherical_direction(cosine, 0.3);
+            let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
+                &point,
+                [alpha; 2],
+                at,
+                NarrowLightPath::Through,
+            );
+            let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
             let sampled = front.sampled_albedo(192) + behind.sampled_albedo(192);
             let exact = front.albedo() + behind.albedo();
             let what =
@@ -235,6 +262,6 @@ fn transmissive_lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PrincipledBxdf<false>>(&points);
-    check_neighbors_lit::<PrincipledBxdf<true>>(&points, LitFrom::Through);
+    check_lane_independence::<PrincipledBxdf<false>>(&points);
+    check_lane_independence_with::<PrincipledBxdf<true>>(&points, NarrowLightPath::Through);
 }

@@ -1,9 +1,9 @@
 //! The lobes of rough glass.
 
-use super::GlassPoint;
+use super::RoughDielectricPoint;
 use crate::materials::bsdf::{LobeSet, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
-use crate::materials::fresnel::{dielectric_either, transmittance};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
+use crate::materials::fresnel::{dielectric_from_either_side, transmittance};
 use crate::materials::microfacet::{HalfVector, SmithTerms, reflect_at, refract_at, sample_visible_normal};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -12,18 +12,18 @@ use glimt_base::soa;
 soa! {
     /// Reflection from rough glass, or transmission through it.
     pub struct DielectricBxdf<const THROUGH: bool> in DielectricPacket {
-        /// [`GlassPoint::near`].
+        /// [`RoughDielectricPoint::near`].
         near: f32 = 1.0,
-        /// [`GlassPoint::far`].
+        /// [`RoughDielectricPoint::far`].
         far: f32 = 1.5,
-        /// [`GlassPoint::alpha`].
+        /// [`RoughDielectricPoint::alpha`].
         alpha: f32 = 1.0,
     }
 }
 
 soa! {
     /// View-dependent values of rough glass.
-    pub struct DielectricView in DielectricViewPacket {
+    pub struct DielectricViewTerms in DielectricViewPacket {
         /// Unit normal that faces the viewer.
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
@@ -36,7 +36,7 @@ const MIN_COSINE: f32 = 1e-6;
 
 /// A sampled direction on either side of rough glass.
 #[derive(Clone, Copy, Debug)]
-pub struct SideSample {
+pub struct DielectricSample {
     /// Unit direction.
     pub wi: Vec3,
     /// Pdf of the direction in sr⁻¹. 0 for directions from which no light arrives.
@@ -51,34 +51,34 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
     /// side.
     #[inline(always)]
-    fn smith_terms(&self, view: &DielectricView, wi: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         let lit = if THROUGH { -view.normal } else { view.normal };
         [SmithTerms::isotropic(view.normal, view.wo, self.alpha), SmithTerms::isotropic(lit, wi, self.alpha)]
     }
 
     /// Samples the normal of a visible facet.
     #[inline(always)]
-    fn sample_facet(&self, view: &DielectricView, u: [f32; 2]) -> Vec3 {
+    fn sample_facet(&self, view: &DielectricViewTerms, u: [f32; 2]) -> Vec3 {
         sample_visible_normal(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u)
     }
 
     /// f of the lobe.
     #[inline(always)]
-    fn f(&self, view: &DielectricView, wi: Vec3) -> f32 {
+    fn f(&self, view: &DielectricViewTerms, wi: Vec3) -> f32 {
         let [eye, light] = self.smith_terms(view, wi);
         if !THROUGH {
-            let half = HalfVector::between(view.normal, view.wo, wi);
-            let reflectance = dielectric_either(half.cosine(), self.far / self.near);
-            return reflectance * eye.reflected(&light, half.isotropic(self.alpha));
+            let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+            let reflectance = dielectric_from_either_side(half.cosine(), self.far / self.near);
+            return reflectance * eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
         }
         let indices = [self.near, self.far];
-        let (half, sum) = HalfVector::refracted(view.normal, [view.wo, wi], indices);
+        let (half, sum) = HalfVector::from_refraction(view.normal, [view.wo, wi], indices);
         // The facet must face the viewer if the surface does, and light must come from behind both.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * view.wo.dot(sum), -scale * wi.dot(sum)];
         let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
         let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
-        let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha)));
+        let value = 4.0 * (by_facet * eye.reflection_term(&light, half.isotropic_ggx(self.alpha)));
         let value = value * (self.far * self.far);
         // If the indices are nearly equal, there is no usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
@@ -87,16 +87,21 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     /// Samples a facet, and randomly chooses reflection or refraction. All formulas use the facet's normal,
     /// which is the half vector in both cases.
     #[inline(always)]
-    pub fn sample_side(&self, view: &DielectricView, choice: f32, u: [f32; 2]) -> SideSample {
-        let &DielectricView { normal, wo } = view;
+    pub fn sample_either_side(
+        &self,
+        view: &DielectricViewTerms,
+        choice: f32,
+        u: [f32; 2],
+    ) -> DielectricSample {
+        let &DielectricViewTerms { normal, wo } = view;
         let half = self.sample_facet(view, u);
         let indices = [self.near, self.far];
         let eta = indices[1] / indices[0];
         let cosine = half.dot(wo);
-        let reflectance = dielectric_either(cosine, eta);
+        let reflectance = dielectric_from_either_side(cosine, eta);
         let is_reflected = choice < reflectance;
         let refracted = refract_at(half, wo, eta);
-        let wi = choose(is_reflected, reflect_at(half, wo), refracted);
+        let wi = select_vec3(is_reflected, reflect_at(half, wo), refracted);
         // Compute the facet's scattering per solid angle.
         let behind = -half.dot(refracted);
         let sum = indices[0] * cosine - indices[1] * behind;
@@ -109,14 +114,14 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let light = SmithTerms::isotropic(normal * side, wi, self.alpha);
         let along = normal.dot(half);
         let half = HalfVector { squared: 1.0, along, across: half - normal * along };
-        let pdf = by_facet * eye.pdf(half.isotropic(self.alpha));
+        let pdf = by_facet * eye.pdf(half.isotropic_ggx(self.alpha));
         let is_seen = light.is_above_surface()
             & eye.is_above_surface()
             & (is_reflected | is_through)
             & (pdf < f32::MAX);
         let weight =
             light.cosine * (eye.cosine + eye.slope) / (eye.cosine * light.slope + light.cosine * eye.slope);
-        SideSample {
+        DielectricSample {
             wi,
             pdf: if is_seen { pdf } else { 0.0 },
             weight: if is_seen { weight } else { 0.0 },
@@ -126,15 +131,15 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
 }
 
 impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
-    type Point = GlassPoint;
-    type View = DielectricView;
+    type Point = RoughDielectricPoint;
+    type View = DielectricViewTerms;
 
     const IS_TRANSMISSION: bool = THROUGH;
     const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
 
     #[inline(always)]
-    fn new(point: &GlassPoint, _: Vec3) -> Self {
-        let &GlassPoint { near, far, alpha } = point;
+    fn new(point: &RoughDielectricPoint, _: Vec3) -> Self {
+        let &RoughDielectricPoint { near, far, alpha } = point;
         Self { near, far, alpha }
     }
 
@@ -144,27 +149,35 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> DielectricView {
+    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> DielectricViewTerms {
         let &SurfaceDirections { normal, wo, .. } = directions;
-        DielectricView { normal: if THROUGH { -normal } else { normal }, wo }
+        DielectricViewTerms { normal: if THROUGH { -normal } else { normal }, wo }
     }
 
     #[inline(always)]
-    fn narrow(&self, view: &DielectricView, wi: Vec3, _: BxdfFlags) -> LobeValue {
+    fn narrow_lobe_value(&self, view: &DielectricViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let f = self.f(view, wi);
         LobeValue { f: Vec3::splat(f), max: f, shape: f }
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &DielectricView, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(
+        &self,
+        view: &DielectricViewTerms,
+        _: LobeSet,
+        _: Vec3,
+        wi: Vec3,
+        shape: f32,
+        _: BxdfFlags,
+    ) -> f32 {
         let [eye, light] = self.smith_terms(view, wi);
-        eye.pdf_from_reflected(&light, shape)
+        eye.pdf_from_reflection_term(&light, shape)
     }
 
     #[inline(always)]
     fn sample(
         &self,
-        view: &DielectricView,
+        view: &DielectricViewTerms,
         _: LobeSet,
         _: Vec3,
         choice: f32,
@@ -173,27 +186,27 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     ) -> Vec3 {
         let half = self.sample_facet(view, u);
         let eta = self.far / self.near;
-        let is_reflected = choice < dielectric_either(half.dot(view.wo), eta);
+        let is_reflected = choice < dielectric_from_either_side(half.dot(view.wo), eta);
         let wi = if THROUGH { refract_at(half, view.wo, eta) } else { reflect_at(half, view.wo) };
         // If the other side is chosen, the path continues at that side's vertex, and this direction is not
         // used.
         let unused = if THROUGH { view.normal } else { -view.normal };
-        choose(is_reflected == THROUGH, unused, wi)
+        select_vec3(is_reflected == THROUGH, unused, wi)
     }
 
     #[inline(always)]
-    fn narrow_lobe(&self, view: &DielectricView) -> Option<NarrowLobe> {
-        let &DielectricView { normal, wo } = view;
+    fn narrow_lobe(&self, view: &DielectricViewTerms) -> Option<NarrowLobe> {
+        let &DielectricViewTerms { normal, wo } = view;
         let eta = self.far / self.near;
-        let reflectance = dielectric_either(normal.dot(wo), eta);
+        let reflectance = dielectric_from_either_side(normal.dot(wo), eta);
         if !THROUGH {
-            return Some(NarrowLobe::of_microfacets(normal, wo, self.alpha, reflectance, 0.0));
+            return Some(NarrowLobe::from_microfacets(normal, wo, self.alpha, reflectance, 0.0));
         }
         // At normal incidence, rotating a facet by an angle rotates the refracted direction by 1 − 1/η times
         // this angle, and a reflected direction by twice this angle.
         let alpha = 0.5 * (1.0 - 1.0 / eta).abs() * self.alpha;
         let axis = refract_at(normal, wo, eta);
-        let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, wo, alpha, 1.0, 0.0) };
+        let lobe = NarrowLobe { axis, ..NarrowLobe::from_microfacets(normal, wo, alpha, 1.0, 0.0) };
         (reflectance < 1.0).then_some(lobe)
     }
 }

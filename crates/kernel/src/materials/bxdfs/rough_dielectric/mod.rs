@@ -15,13 +15,13 @@
 
 mod bxdf;
 
-use crate::materials::bsdf::RoughPoint;
+use crate::materials::bsdf::BxdfParameters;
 use crate::math::Vec3;
 pub use bxdf::DielectricBxdf;
 
 /// Rough glass at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GlassPoint {
+pub struct RoughDielectricPoint {
     /// Index of refraction on the viewer's side.
     pub near: f32,
     /// Index of refraction on the other side. Must differ from `near`.
@@ -30,14 +30,14 @@ pub struct GlassPoint {
     pub alpha: f32,
 }
 
-impl RoughPoint for GlassPoint {
+impl BxdfParameters for RoughDielectricPoint {
     #[inline]
     fn is_black(&self) -> bool {
         false
     }
 
     #[inline]
-    fn ambient(&self) -> Vec3 {
+    fn ambient_reflectance(&self) -> Vec3 {
         Vec3::ZERO
     }
 

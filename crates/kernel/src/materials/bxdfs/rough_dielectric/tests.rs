@@ -5,34 +5,35 @@ use crate::materials::bsdf::LobeSet;
 use crate::materials::bxdf::Bxdf;
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbors, check_neighbors_lit, direction, reference,
+    ALPHAS, COSINES, NarrowLightPath, TestSurface, TwoSidedSample, check_lane_independence,
+    check_lane_independence_with, reference_microfacet_brdf, spherical_direction,
 };
 use crate::materials::fresnel::dielectric;
 use crate::math::DVec3;
-use crate::math::random::unit as random;
+use crate::math::random::unit_generator as random;
 
 use std::f64::consts::{PI, TAU};
 
 /// Indices of refraction on the viewer's side and on the other side.
 const INDICES: [[f32; 2]; 5] = [[1.0, 1.5], [1.5, 1.0], [1.0, 1.33], [2.4, 1.0], [1.5, 1.33]];
 
-fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
-    GlassPoint { near, far, alpha }
+fn glass([near, far]: [f32; 2], alpha: f32) -> RoughDielectricPoint {
+    RoughDielectricPoint { near, far, alpha }
 }
 
 /// The reflection and the transmission of a surface that is seen from a direction.
 fn parts(
-    point: &GlassPoint,
+    point: &RoughDielectricPoint,
     to_eye: DVec3,
-) -> (Subject<DielectricBxdf<false>>, Subject<DielectricBxdf<true>>) {
+) -> (TestSurface<DielectricBxdf<false>>, TestSurface<DielectricBxdf<true>>) {
     let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
-    let reflection = Subject::new(point, alphas, to_eye);
-    (reflection, Subject::lit(point, alphas, to_eye, LitFrom::Refracted(eta)))
+    let reflection = TestSurface::new(point, alphas, to_eye);
+    (reflection, TestSurface::with_light_path(point, alphas, to_eye, NarrowLightPath::Refracted(eta)))
 }
 
 /// Computes f for transmission of basic radiance, as in Walter et al. (equations 16, 20, 21, and 33, with our
 /// G).
-fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
+fn transmission(point: &RoughDielectricPoint, o: DVec3, i: DVec3) -> f64 {
     let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
     let half = -(i * far + o * near).normalize();
     let half = half * half.z.signum();
@@ -65,16 +66,25 @@ fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
 }
 
 /// Returns a pair of directions. The second one is either near the lobe's peak or arbitrary.
-fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (DVec3, Option<DVec3>) {
-    let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
+fn ways(
+    next: &mut impl FnMut() -> f32,
+    point: &RoughDielectricPoint,
+    is_near: bool,
+) -> (DVec3, Option<DVec3>) {
+    let to_eye =
+        spherical_direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
     if is_near {
         let eta = f64::from(point.far) / f64::from(point.near);
-        let there =
-            Subject::<DielectricBxdf<true>>::lit(point, [point.alpha; 2], to_eye, LitFrom::Refracted(eta));
-        (to_eye, there.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3()))
+        let there = TestSurface::<DielectricBxdf<true>>::with_light_path(
+            point,
+            [point.alpha; 2],
+            to_eye,
+            NarrowLightPath::Refracted(eta),
+        );
+        (to_eye, there.map_to_direction(y, turn).map(|(way, _)| way.as_vec3().as_dvec3()))
     } else {
-        let way = direction(f64::from(0.05 + 0.95 * next()), turn);
+        let way = spherical_direction(f64::from(0.05 + 0.95 * next()), turn);
         (to_eye, Some(DVec3::new(way.x, way.y, -way.z).as_vec3().as_dvec3()))
     }
 }
@@ -94,11 +104,16 @@ fn transmission_matches_the_formulas() {
                 continue;
             }
             let eta = f64::from(indices[1]) / f64::from(indices[0]);
-            let subject = |point: &GlassPoint, eye: DVec3, eta: f64| {
-                Subject::<DielectricBxdf<true>>::lit(point, [alpha; 2], eye, LitFrom::Refracted(eta))
+            let subject = |point: &RoughDielectricPoint, eye: DVec3, eta: f64| {
+                TestSurface::<DielectricBxdf<true>>::with_light_path(
+                    point,
+                    [alpha; 2],
+                    eye,
+                    NarrowLightPath::Refracted(eta),
+                )
             };
-            let value = |point: &GlassPoint, eye: DVec3, light: DVec3, eta: f64| {
-                subject(point, eye, eta).values(LobeSet::All, &[light])[0].0.x
+            let value = |point: &RoughDielectricPoint, eye: DVec3, light: DVec3, eta: f64| {
+                subject(point, eye, eta).evaluate(LobeSet::All, &[light])[0].0.x
             };
             let there = value(&point, to_eye, light, eta);
             // Flip both directions to the other side.
@@ -125,22 +140,24 @@ fn reflection_matches_the_formulas() {
         let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 5e-3) };
         for _ in 0..200 {
             let place = |next: &mut dyn FnMut() -> f32| {
-                direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3()
+                spherical_direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU)
+                    .as_vec3()
+                    .as_dvec3()
             };
             let to_eye = place(&mut next);
-            let subject = Subject::<DielectricBxdf<false>>::new(&point, [alpha; 2], to_eye);
+            let subject = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], to_eye);
             let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
-            let near = subject.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
+            let near = subject.map_to_direction(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
             for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
-                let there = subject.values(LobeSet::All, &[light])[0].0.x;
-                let back = Subject::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
-                let back = back.values(LobeSet::All, &[to_eye])[0].0.x;
+                let there = subject.evaluate(LobeSet::All, &[light])[0].0.x;
+                let back = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
+                let back = back.evaluate(LobeSet::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
                 assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
                 let (o, i) = (to_eye.normalize(), light.normalize());
                 let eta = f64::from(point.far) / f64::from(point.near);
                 let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
-                let exact = fresnel * reference(o, i, [f64::from(alpha); 2]);
+                let exact = fresnel * reference_microfacet_brdf(o, i, [f64::from(alpha); 2]);
                 // Near total reflection, the slope of the reflectance is unbounded.
                 let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
                 assert!(
@@ -157,7 +174,7 @@ fn samples_on_both_sides_follow_the_pdf() {
     // 210 cases: three boundaries, seven lobes, five directions, and both sides.
     for (indices, alpha) in INDICES[..3].iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
-            let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.7));
+            let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.7));
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}");
             reflection.check_samples(&format!("reflection, {what}"), LobeSet::All);
             transmission.check_samples(&format!("transmission, {what}"), LobeSet::All);
@@ -169,7 +186,7 @@ fn samples_on_both_sides_follow_the_pdf() {
 fn two_sided_albedos_match_quadrature() {
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         for cosine in COSINES {
-            let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.3));
+            let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.3));
             let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
             // Use fine steps because the integrand changes abruptly where total reflection begins.
             let exact = [reflection.albedo_by_rings(1000).x, transmission.albedo_by_rings(1000).x];
@@ -188,7 +205,7 @@ fn two_sided_albedos_match_quadrature() {
 fn narrow_lobes_approach_smooth_glass() {
     for indices in INDICES {
         for cosine in [0.3, 0.7, 1.0] {
-            let (reflection, transmission) = parts(&glass(indices, 0.001), direction(cosine, 0.2));
+            let (reflection, transmission) = parts(&glass(indices, 0.001), spherical_direction(cosine, 0.2));
             let smooth = f64::from(dielectric(cosine as f32, indices[1] / indices[0]).0);
             let (reflected, through) = (reflection.sampled_albedo(128).x, transmission.sampled_albedo(128).x);
             assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected}, not {smooth}");
@@ -203,8 +220,11 @@ fn narrow_lobes_approach_smooth_glass() {
 #[test]
 fn paths_continue_on_exactly_one_side() {
     for indices in INDICES {
-        let (reflection, transmission) = parts(&glass(indices, 0.4), direction(0.5, 0.3));
-        let (up, down) = (reflection.samples(LobeSet::All, 32), transmission.samples(LobeSet::All, 32));
+        let (reflection, transmission) = parts(&glass(indices, 0.4), spherical_direction(0.5, 0.3));
+        let (up, down) = (
+            reflection.sample_directions(LobeSet::All, 32),
+            transmission.sample_directions(LobeSet::All, 32),
+        );
         let mut reflected = 0;
         for (up, down) in up.into_iter().zip(down) {
             // Both sides use the same random numbers. The unused side returns a direction into the surface.
@@ -221,16 +241,19 @@ fn two_sided_samples_match_one_sided_samples() {
     for (indices, alpha) in INDICES.iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let point = glass(indices, alpha);
-            let (reflection, transmission) = parts(&point, direction(cosine, 0.3));
-            let alone = [reflection.samples(LobeSet::All, 16), transmission.samples(LobeSet::All, 16)];
-            let rows: [Vec<SideSample>; 2] = [
-                reflection.side_samples(16, BxdfPacket::sample_sides),
-                transmission.side_samples(16, BxdfPacket::sample_sides),
+            let (reflection, transmission) = parts(&point, spherical_direction(cosine, 0.3));
+            let alone = [
+                reflection.sample_directions(LobeSet::All, 16),
+                transmission.sample_directions(LobeSet::All, 16),
+            ];
+            let rows: [Vec<TwoSidedSample>; 2] = [
+                reflection.sample_either_side(16, BxdfPacket::sample_either_side),
+                transmission.sample_either_side(16, BxdfPacket::sample_either_side),
             ];
             let directions: Vec<DVec3> = rows[0].iter().map(|sample| sample.direction).collect();
             let by_directions = [
-                reflection.values(LobeSet::All, &directions),
-                transmission.values(LobeSet::All, &directions),
+                reflection.evaluate(LobeSet::All, &directions),
+                transmission.evaluate(LobeSet::All, &directions),
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
@@ -245,10 +268,13 @@ fn two_sided_samples_match_one_sided_samples() {
                 // and for facets near total reflection.
                 let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
                 let there = if side == 0 { indices[0] } else { indices[1] };
-                let half = (direction(cosine, 0.3) * f64::from(indices[0]) + up.direction * f64::from(there))
-                    .normalize();
-                let (eta, at_facet) =
-                    (f64::from(indices[1]) / f64::from(indices[0]), direction(cosine, 0.3).dot(half));
+                let half = (spherical_direction(cosine, 0.3) * f64::from(indices[0])
+                    + up.direction * f64::from(there))
+                .normalize();
+                let (eta, at_facet) = (
+                    f64::from(indices[1]) / f64::from(indices[0]),
+                    spherical_direction(cosine, 0.3).dot(half),
+                );
                 let refracted = (eta * eta - 1.0 + at_facet * at_facet).abs();
                 let rounding = 2.0 * f64::from(f32::EPSILON) / refracted.max(1e-9);
                 let error = 0.5 / least * (1e-4 + 3e-6 / f64::from(alpha) + rounding);
@@ -270,9 +296,9 @@ fn two_sided_samples_match_one_sided_samples() {
 
 #[test]
 fn lanes_are_independent() {
-    let points: Vec<GlassPoint> =
+    let points: Vec<RoughDielectricPoint> =
         INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
-    check_neighbors::<DielectricBxdf<false>>(&points);
-    check_neighbors_lit::<DielectricBxdf<true>>(&points, LitFrom::Through);
+    check_lane_independence::<DielectricBxdf<false>>(&points);
+    check_lane_independence_with::<DielectricBxdf<true>>(&points, NarrowLightPath::Through);
     const { assert!(<DielectricBxdf<true> as Bxdf>::SENDS_RAYS) };
 }

@@ -13,9 +13,9 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
-/// Implements [`WideBvh::any_packet`]. Returns `None` if the rays are not coherent.
+/// Implements [`WideBvh::any_hit_packet`]. Returns `None` if the rays are not coherent.
 #[inline(always)]
-pub fn any<V: SimdVector>(
+pub fn any_hit<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -26,7 +26,7 @@ pub fn any<V: SimdVector>(
     let Some(rows) = RaySoa::new(rays, ends) else { return Some(0) };
     let packet = SimdRayPacket::new(&rows, &tree.bounds, like)?;
     let frustum = Frustum::new(&packet, like8);
-    let mut t_max = like.gather(&rows.ends);
+    let mut t_max = like.load_slice(&rows.ends);
     let pad = like.splat_like(SLAB_PAD);
     let mut end = t_max.max_lane() * SLAB_PAD;
     let all = rows.traced;
@@ -52,7 +52,7 @@ pub fn any<V: SimdVector>(
                         if pack.ids[lane] == u32::MAX {
                             break;
                         }
-                        let hits = packet.hits(pack, lane, t_max);
+                        let hits = packet.intersect_triangle(pack, lane, t_max);
                         let mut rest = (hits.hit | hits.doubtful) & all & !found;
                         if rest != 0 {
                             rest &= !packet.lanes_starting_on(pack.ids[lane]);
@@ -76,7 +76,7 @@ pub fn any<V: SimdVector>(
                     return Some(found);
                 }
                 if before != found {
-                    t_max = like.splat_like(-1.0).select(V::mask(found, t_max), t_max);
+                    t_max = like.splat_like(-1.0).select(V::mask_from_bits(found, t_max), t_max);
                     end = t_max.max_lane() * SLAB_PAD;
                 }
             }

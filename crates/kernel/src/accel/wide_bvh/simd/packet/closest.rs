@@ -13,9 +13,9 @@ use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
-/// Implements [`WideBvh::closest_packet`]. Returns false if the rays are not coherent.
+/// Implements [`WideBvh::closest_hit_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
-pub fn closest<V: SimdVector>(
+pub fn closest_hit<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -26,7 +26,7 @@ pub fn closest<V: SimdVector>(
     let Some(rows) = RaySoa::new(rays, ends) else { return true };
     let Some(packet) = SimdRayPacket::new(&rows, &tree.bounds, like) else { return false };
     let frustum = Frustum::new(&packet, like8);
-    let t_max = like.gather(&rows.ends);
+    let t_max = like.load_slice(&rows.ends);
     let pad = like.splat_like(SLAB_PAD);
     let mut best = NearestHits::new(t_max);
     let mut end = t_max.max_lane() * SLAB_PAD;
@@ -40,7 +40,7 @@ pub fn closest<V: SimdVector>(
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = frustum.box_entries(node, like8.splat_like(end));
-                push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
+                push_children_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
                 let mut any = 0;
@@ -64,7 +64,7 @@ pub fn closest<V: SimdVector>(
 
 /// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
 #[inline(always)]
-fn push_ordered<V: SimdVector>(
+fn push_children_ordered<V: SimdVector>(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,
@@ -83,7 +83,7 @@ fn push_ordered<V: SimdVector>(
             continue;
         }
         prefetch(tree, node.children[slot]);
-        stack.insert(sort_key(entries[slot], node.children[slot]), pushed);
+        stack.insert_sorted(sort_key(entries[slot], node.children[slot]), pushed);
         pushed += 1;
     }
 }

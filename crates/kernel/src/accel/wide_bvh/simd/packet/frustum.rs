@@ -41,8 +41,8 @@ impl Frustum {
         let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
             let [least, greatest] = self.inverse[axis];
-            let to_near = end.gather(&node.rows[self.near[axis]]) - self.near_origin[axis];
-            let to_far = end.gather(&node.rows[self.near[axis] ^ 1]) - self.far_origin[axis];
+            let to_near = end.load_slice(&node.rows[self.near[axis]]) - self.near_origin[axis];
+            let to_far = end.load_slice(&node.rows[self.near[axis] ^ 1]) - self.far_origin[axis];
             near = (to_near * least).min(to_near * greatest).max(near);
             far = ((to_far * least).max(to_far * greatest) * pad).min(far);
         }

@@ -35,7 +35,7 @@ impl<V: SimdVector> NearestHits<V> {
         lane: usize,
         rays: &[Ray],
     ) -> u32 {
-        let hits = packet.hits(pack, lane, self.t);
+        let hits = packet.intersect_triangle(pack, lane, self.t);
         if hits.hit | hits.doubtful == 0 {
             return 0;
         }
@@ -56,7 +56,7 @@ impl<V: SimdVector> NearestHits<V> {
         let as_near = hits.hit & V::movemask(hits.t.eq(self.t));
         let mut taken = hits.hit & !as_near;
         if taken != 0 {
-            let mask = V::mask(taken, self.t);
+            let mask = V::mask_from_bits(taken, self.t);
             self.t = hits.t.select(mask, self.t);
             self.u = hits.u.select(mask, self.u);
             self.v = hits.v.select(mask, self.v);
@@ -89,8 +89,8 @@ impl<V: SimdVector> NearestHits<V> {
             return 0;
         }
         (t[ray], u[ray], v[ray], id[ray]) = (hit.t, hit.u, hit.v, f32::from_bits(number));
-        (self.t, self.u) = (self.t.gather(&t), self.t.gather(&u));
-        (self.v, self.id) = (self.t.gather(&v), self.t.gather(&id));
+        (self.t, self.u) = (self.t.load_slice(&t), self.t.load_slice(&u));
+        (self.v, self.id) = (self.t.load_slice(&v), self.t.load_slice(&id));
         self.found |= 1 << ray;
         1 << ray
     }

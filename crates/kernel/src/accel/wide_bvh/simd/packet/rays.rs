@@ -42,7 +42,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
             inverse: [like; 3],
             sheared_origin: [like; 3],
             shear: [like; 3],
-            start: like.gather(&rows.start),
+            start: like.load_slice(&rows.start),
             axes,
             near: [0; 3],
             origins: [[0.0; 2]; 3],
@@ -50,7 +50,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
         };
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
         for (axis, origin) in origin.iter_mut().enumerate() {
-            *origin = like.gather(&rows.origin[axis]);
+            *origin = like.load_slice(&rows.origin[axis]);
             own.origins[axis] = [origin.min_lane(), origin.max_lane()];
         }
         let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
@@ -59,7 +59,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
         let (zero, one) = (like.splat_like(0.0), like.splat_like(1.0));
         let all = V::movemask(zero.eq(zero));
         for axis in 0..3 {
-            direction[axis] = like.gather(&rows.direction[axis]);
+            direction[axis] = like.load_slice(&rows.direction[axis]);
             size[axis] = direction[axis].abs();
             own.inverse[axis] = one.div(direction[axis]);
             let up = V::movemask(
@@ -113,9 +113,13 @@ impl<V: SimdVector> SimdRayPacket<V> {
 
     /// Tests the triangle in a lane of a pack against all rays, including rays that start on it.
     #[inline(always)]
-    pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
-        let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
-        triangle::hits(&[a, b, c], self.shear[2], t_max, false)
+    pub fn intersect_triangle(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
+        let (a, b, c) = (
+            self.sheared_corner(pack, 0, lane),
+            self.sheared_corner(pack, 3, lane),
+            self.sheared_corner(pack, 6, lane),
+        );
+        triangle::intersect(&[a, b, c], self.shear[2], t_max, false)
     }
 
     /// Mask of the rays that start on the triangle with this index.
@@ -126,15 +130,15 @@ impl<V: SimdVector> SimdRayPacket<V> {
 
     /// A corner in each ray's sheared coordinates. `row` is the corner's first row.
     #[inline(always)]
-    fn corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
-        let z = self.coordinate(pack, row, 2, lane);
-        let x = self.coordinate(pack, row, 0, lane) - self.shear[0] * z;
-        let y = self.coordinate(pack, row, 1, lane) - self.shear[1] * z;
+    fn sheared_corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
+        let z = self.relative_coordinate(pack, row, 2, lane);
+        let x = self.relative_coordinate(pack, row, 0, lane) - self.shear[0] * z;
+        let y = self.relative_coordinate(pack, row, 1, lane) - self.shear[1] * z;
         [x, y, z]
     }
 
     #[inline(always)]
-    fn coordinate(&self, pack: &TrianglePack, row: usize, i: usize, lane: usize) -> V {
+    fn relative_coordinate(&self, pack: &TrianglePack, row: usize, i: usize, lane: usize) -> V {
         let axis = self.axes[i] % 3;
         self.shear[0].splat_like(pack.rows[row + axis][lane]) - self.sheared_origin[i]
     }

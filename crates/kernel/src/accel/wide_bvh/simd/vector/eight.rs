@@ -106,7 +106,7 @@ impl SimdVector for SimdF32x8 {
     }
 
     #[inline(always)]
-    fn mask(bits: u32, _like: Self) -> Mask8 {
+    fn mask_from_bits(bits: u32, _like: Self) -> Mask8 {
         // SAFETY: as above.
         unsafe {
             let own = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);

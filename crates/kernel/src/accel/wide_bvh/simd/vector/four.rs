@@ -106,7 +106,7 @@ impl SimdVector for SimdF32x4 {
     }
 
     #[inline(always)]
-    fn mask(bits: u32, _like: Self) -> Mask4 {
+    fn mask_from_bits(bits: u32, _like: Self) -> Mask4 {
         // SAFETY: as above.
         unsafe {
             let own = _mm_setr_epi32(1, 2, 4, 8);

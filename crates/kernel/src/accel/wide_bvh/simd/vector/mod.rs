@@ -46,7 +46,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
 
     /// Loads the first [`SimdVector::COUNT`] floats of a slice.
     #[inline(always)]
-    fn gather(self, from: &[f32]) -> Self {
+    fn load_slice(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
         // SAFETY: a value of this type exists, and the length was checked.
         unsafe { Self::load(from.as_ptr()) }
@@ -77,7 +77,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Converts a mask to bits, one per lane.
     fn movemask(mask: Self::Mask) -> u32;
     /// Converts bits to a mask. `like` proves that the processor has the instructions.
-    fn mask(bits: u32, like: Self) -> Self::Mask;
+    fn mask_from_bits(bits: u32, like: Self) -> Self::Mask;
     /// Maximum of all lanes.
     fn max_lane(self) -> f32;
     /// Minimum of all lanes.

@@ -127,8 +127,8 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn mask(bits: u32, like: Self) -> Self::Mask {
-        VectorPair(V::mask(bits, like.0), V::mask(bits >> V::COUNT, like.1))
+    fn mask_from_bits(bits: u32, like: Self) -> Self::Mask {
+        VectorPair(V::mask_from_bits(bits, like.0), V::mask_from_bits(bits >> V::COUNT, like.1))
     }
 
     #[inline(always)]

@@ -122,7 +122,7 @@ impl SimdVector for SimdF32x16 {
     }
 
     #[inline(always)]
-    fn mask(bits: u32, _like: Self) -> Mask16 {
+    fn mask_from_bits(bits: u32, _like: Self) -> Mask16 {
         Mask16(bits as u16)
     }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
-use crate::math::random::unit as random;
+use crate::math::random::unit_generator as random;
 
 fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongBsdf {
     let [diffuse, specular] = [diffuse, specular].map(Vec3::splat);
@@ -23,7 +23,7 @@ fn at_angle(normal: Vec3, degrees: f32) -> Vec3 {
 
 const SAMPLES: u32 = 200_000;
 
-fn sample(lobes: &Lobes, next: &mut impl FnMut() -> f32) -> Vec3 {
+fn sample(lobes: &PhongLobes, next: &mut impl FnMut() -> f32) -> Vec3 {
     let lobe = next();
     lobes.sample(lobe, [next(), next()])
 }
@@ -69,7 +69,8 @@ fn glossy_samples_follow_the_pdf() {
                     let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
                     counts[ring.min(15) * 16 + ((phi * 16.0) as usize).min(15)] += 1;
-                    let density = lobes.density(direction, gloss(lobes.mirrored_eye, direction, shininess));
+                    let density =
+                        lobes.pdf(direction, phong_cosine_power(lobes.mirrored_eye, direction, shininess));
                     let exact = n / std::f64::consts::TAU * power;
                     let is_near = (f64::from(density) - exact).abs() <= 2e-3 * exact + 1e-6 * n;
                     assert!(is_near, "α {shininess} at {degrees}°: {density} instead of {exact}");
@@ -87,7 +88,7 @@ const RINGS: usize = 24;
 const STEPS: usize = 24;
 
 /// Integral of the pdf over each of the sphere's equal-area cells.
-fn integrals(lobes: &Lobes) -> Vec<f64> {
+fn integrals(lobes: &PhongLobes) -> Vec<f64> {
     const FINE: usize = 24;
     let cell = |ring: usize, step: usize| {
         let places = (0..FINE * FINE).map(|i| {
@@ -98,7 +99,9 @@ fn integrals(lobes: &Lobes) -> Vec<f64> {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * part(step, i % FINE, STEPS));
             let r = (1.0 - z * z).sqrt();
             let direction = Vec3::new((r * cos) as f32, (r * sin) as f32, z as f32);
-            f64::from(lobes.density(direction, gloss(lobes.mirrored_eye, direction, lobes.shininess)))
+            f64::from(
+                lobes.pdf(direction, phong_cosine_power(lobes.mirrored_eye, direction, lobes.shininess)),
+            )
         });
         places.sum::<f64>() / (FINE * FINE) as f64 * 2.0 * std::f64::consts::TAU / (RINGS * STEPS) as f64
     };
@@ -140,10 +143,10 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
     let lobes = bsdf.lobes(normal, at_angle(normal, degrees));
     let one = |_| {
         let direction = sample(&lobes, &mut next);
-        let gloss = gloss(lobes.mirrored_eye, direction, lobes.shininess);
+        let gloss = phong_cosine_power(lobes.mirrored_eye, direction, lobes.shininess);
         let cosine = normal.dot(direction).max(0.0);
         assert!((lobes.value(gloss) - bsdf.value(&lobes, direction).x).abs() <= 1e-6 * lobes.value(gloss));
-        f64::from(lobes.value(gloss) * cosine / lobes.density(direction, gloss))
+        f64::from(lobes.value(gloss) * cosine / lobes.pdf(direction, gloss))
     };
     (0..SAMPLES).map(one).sum::<f64>() / f64::from(SAMPLES)
 }
