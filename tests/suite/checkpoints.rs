@@ -30,9 +30,29 @@ fn said(dir: &TestDir, line: &str, code: i32) -> String {
     dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// Sends a signal and returns the exit code. On a busy machine, the program may not have installed its signal
+/// handlers yet, so this waits for them first.
 fn end(mut child: Child, signal: Signal) -> Option<i32> {
+    if signal != Signal::SIGKILL {
+        wait_for_handler(&mut child, signal);
+    }
     kill(Pid::from_raw(child.id() as i32), signal).expect("failed to signal the process");
     child.wait().expect("a child").code()
+}
+
+/// Waits until a process handles a signal, or until it has ended.
+fn wait_for_handler(child: &mut Child, signal: Signal) {
+    let handles_signal = |status: String| {
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"))?;
+        let mask = u64::from_str_radix(mask.trim(), 16).ok()?;
+        Some(mask >> (signal as i32 - 1) & 1 == 1)
+    };
+    let status = format!("/proc/{}/status", child.id());
+    while fs::read_to_string(&status).ok().and_then(handles_signal) == Some(false)
+        && child.try_wait().expect("a child").is_none()
+    {
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }
 
 /// Checks that no temporary files from killed processes remain after the next write.
