@@ -27,7 +27,7 @@ use std::time::Instant;
 
 use embree::{Embree, EmbreeScene};
 use glimt::accel::wide_bvh::{InstructionSet, Quality};
-use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_t_max};
+use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_ray_ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -198,9 +198,9 @@ fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit:
         let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
             if any_hit {
-                return tree.any_hit_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
+                return tree.any_hit_packet(some, &packet_ray_ends(some), &[]).count_ones() as usize;
             }
-            tree.closest_hit_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
+            tree.closest_hit_packet(some, &packet_ray_ends(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
         rays.chunks(PACKET_SIZE).map(&mut found).sum()
@@ -240,13 +240,14 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     let closest = |rays: &[Ray]| {
         let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
-            tree.closest_hit_packet(some, &packet_t_max(some), &mut hits[..some.len()]);
+            tree.closest_hit_packet(some, &packet_ray_ends(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
         rays.chunks(PACKET_SIZE).map(&mut found).sum()
     };
     let any = |rays: &[Ray]| {
-        let found = |some: &[Ray]| tree.any_hit_packet(some, &packet_t_max(some), &[]).count_ones() as usize;
+        let found =
+            |some: &[Ray]| tree.any_hit_packet(some, &packet_ray_ends(some), &[]).count_ones() as usize;
         rays.chunks(PACKET_SIZE).map(found).sum()
     };
     line("primary", "Mrays/s", chunks(&rays.primary, &closest), None);
@@ -321,14 +322,15 @@ fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays)
         let mut found = 0;
         let mut hits = [None; PACKET_SIZE];
         for sixteen in rays.chunks(PACKET_SIZE) {
-            tree.closest_hit_packet(sixteen, &packet_t_max(sixteen), &mut hits[..sixteen.len()]);
+            tree.closest_hit_packet(sixteen, &packet_ray_ends(sixteen), &mut hits[..sixteen.len()]);
             found += hits.iter().filter(|hit| hit.is_some()).count();
         }
         found
     };
     let mut any = |rays: &[Ray]| {
-        let found =
-            |sixteen: &[Ray]| tree.any_hit_packet(sixteen, &packet_t_max(sixteen), &[]).count_ones() as usize;
+        let found = |sixteen: &[Ray]| {
+            tree.any_hit_packet(sixteen, &packet_ray_ends(sixteen), &[]).count_ones() as usize
+        };
         rays.chunks(PACKET_SIZE).map(found).sum()
     };
     println!("  {:?}, packets of {PACKET_SIZE}", tree.instruction_set());

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Srgb8Image;
 use glimt::pipeline::protocol::PreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Fidelity, FrameTiming, PacingAdvice, Painter, advise};
+use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, advise};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -161,7 +161,7 @@ impl Window {
         let (mut bytes, mut pictures) = (first_bytes, 1);
         let (mut aimed, mut at) = (first.samples, first.seconds);
         for shot in &shots[1..] {
-            let moment = FrameTiming {
+            let moment = PacingInputs {
                 bytes_per_second: None,
                 cells: cells as u32,
                 samples: shot.samples,

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use glimt::accel::wide_bvh::InstructionSet;
-use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_t_max};
+use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_ray_ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -101,10 +101,10 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
         });
         if i % 2 == 0 {
             let mut hits = [None; PACKET_SIZE];
-            tree.closest_hit_packet(&packet, &packet_t_max(&packet), &mut hits);
+            tree.closest_hit_packet(&packet, &packet_ray_ends(&packet), &mut hits);
             leaks += hits.iter().filter(|hit| hit.is_none()).count();
-            leaks +=
-                PACKET_SIZE - tree.any_hit_packet(&packet, &packet_t_max(&packet), &[]).count_ones() as usize;
+            leaks += PACKET_SIZE
+                - tree.any_hit_packet(&packet, &packet_ray_ends(&packet), &[]).count_ones() as usize;
         } else {
             leaks += packet
                 .iter()
@@ -329,8 +329,8 @@ fn hits_close_to_the_ray_origin_are_found() {
         let (rays, mut hits) = ([ray; PACKET_SIZE], [None; PACKET_SIZE]);
         let mut answers = vec![planes.any_hit(&ray, None), planes.closest_hit(&ray).is_some()];
         for tree in &trees {
-            tree.closest_hit_packet(&rays, &packet_t_max(&rays), &mut hits);
-            let any = tree.any_hit_packet(&rays, &packet_t_max(&rays), &[]) != 0;
+            tree.closest_hit_packet(&rays, &packet_ray_ends(&rays), &mut hits);
+            let any = tree.any_hit_packet(&rays, &packet_ray_ends(&rays), &[]) != 0;
             answers.extend([
                 tree.any_hit(&ray, None),
                 tree.closest_hit(&ray).is_some(),

@@ -360,8 +360,8 @@ pub struct CompareArgs {
     #[arg(long)]
     pub json: bool,
     /// Show the images and their difference: auto, on, off
-    #[arg(long, value_parser = choice_parser::<ImageDisplayMode>(), hide_possible_values = true, long_help = choice_long_help::<ImageDisplayMode>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub pictures: ImageDisplayMode,
+    #[arg(long, value_parser = choice_parser::<ImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<ImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub pictures: ImageVisibility,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
@@ -430,16 +430,16 @@ pub struct RenderArgs {
     pub memory: Option<u64>,
 
     /// Width in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("width"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("width"), help_heading = "Image")]
     pub width: Option<u32>,
     /// Height in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("height"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("height"), help_heading = "Image")]
     pub height: Option<u32>,
     /// Maximum samples per pixel
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
     /// Noise threshold for finishing a tile; 0 disables it
-    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = render_number_parser("error", ERROR), help_heading = "Image")]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_override_parser("error", ERROR), help_heading = "Image")]
     pub error: Option<f32>,
     /// Stop after this time
     ///
@@ -465,14 +465,14 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_turntable_frames, help_heading = "Image")]
     pub turntable: Option<u32>,
     /// Random seed
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("seed"), help_heading = "Image")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("seed"), help_heading = "Image")]
     pub seed: Option<u32>,
 
     /// Integrator: whitted, path
     #[arg(long, value_parser = choice_parser::<Integrator>(), hide_possible_values = true, long_help = choice_long_help::<Integrator>("Integrator"), value_name = "NAME", help_heading = "Rendering")]
     pub integrator: Option<Integrator>,
     /// Maximum bounces per path; 1 is direct light only
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("max_depth"), help_heading = "Rendering")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("max_depth"), help_heading = "Rendering")]
     pub max_depth: Option<u32>,
     /// Shadows: off, hard, soft
     #[arg(long, value_parser = choice_parser::<ShadowMode>(), hide_possible_values = true, long_help = choice_long_help::<ShadowMode>("Shadows, in whitted"), value_name = "HOW", help_heading = "Rendering")]
@@ -480,7 +480,7 @@ pub struct RenderArgs {
     /// Limit indirect radiance per bounce (removes fireflies, biased)
     ///
     /// Applies after the first diffuse or glossy reflection of a path. 0 disables the limit.
-    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = render_number_parser("clamp", CLAMP), help_heading = "Rendering")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_override_parser("clamp", CLAMP), help_heading = "Rendering")]
     pub clamp: Option<f32>,
     /// Photon mapping in whitted: indirect light and caustics
     #[arg(long, value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
@@ -579,7 +579,7 @@ choice! {
 
 choice! {
     /// Whether `compare` shows images.
-    pub enum ImageDisplayMode {
+    pub enum ImageVisibility {
         /// On a terminal with at least 30 columns.
         Auto = "auto",
         /// Always; 80 columns wide without a terminal.
@@ -650,7 +650,7 @@ fn parse_u32(text: &str) -> Result<u32, String> {
 }
 
 /// Parses an option that overrides an integer key in `[render]`.
-fn render_integer_parser(
+fn integer_override_parser(
     key: &'static str,
 ) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| match RenderOptions::find_key_spec(key).map(|key| key.range) {
@@ -663,7 +663,7 @@ fn render_integer_parser(
 
 /// Parses an option that overrides a number key in `[render]`. `expected` is the error message for an invalid
 /// value.
-fn render_number_parser(
+fn number_override_parser(
     key: &'static str,
     expected: &'static str,
 ) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {

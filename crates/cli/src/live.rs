@@ -88,7 +88,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         news,
     });
     let waits = |ended: &TuiOutcome| {
-        ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
+        ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_in_write_stage())
     };
     let has_ended = if worker.stop_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
         worker.stop_or_abandon(Duration::ZERO)
@@ -213,7 +213,7 @@ impl SharedWriteLog {
         self.lock_log().has_written
     }
 
-    fn is_last_stage(&self) -> bool {
+    fn is_in_write_stage(&self) -> bool {
         self.lock_log().is_last_stage
     }
 
@@ -285,7 +285,7 @@ impl SharedWriteLog {
     /// scene and quit at once.
     fn is_image_outdated(&self, contents: &FileHashCache) -> bool {
         let files = self.lock_log().image_files.take();
-        let now = |path: &Path| contents.read(path, &CancelToken::new());
+        let now = |path: &Path| contents.read_content_id(path, &CancelToken::new());
         files.is_none_or(|files| files.iter().any(|file| now(&file.path) != Ok(file.content)))
     }
 
@@ -426,7 +426,7 @@ mod tests {
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "1").expect("written");
         let (writes, contents) = (SharedWriteLog::default(), FileHashCache::default());
-        let content = contents.read(&path, &CancelToken::new()).expect("never canceled");
+        let content = contents.read_content_id(&path, &CancelToken::new()).expect("never canceled");
         let read = || Event::Files {
             generation: 1,
             files: vec![FileRead { path: path.clone(), content }],

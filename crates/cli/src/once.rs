@@ -65,7 +65,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Use one reporter per image to clear the progress of the previous frame.
     let reporter = || progress::create_reporter(order.progress, order.overrides.time_seconds, console);
     let mut image_reporter = reporter();
-    for overrides in render_requests(&order.overrides) {
+    for overrides in overrides_per_frame(&order.overrides) {
         let turn = overrides.turn;
         if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
             console.print_message(&format!("frame {} of {of}", number + 1));
@@ -94,14 +94,17 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     if !reporter.reports_diagnostics()
         && let Some(signal) = ended.signal_number().and_then(signals::signal_name)
     {
-        console.print_message(&format!("terminated by {signal}: {}", describe_written(is_whole, &written)));
+        console.print_message(&format!(
+            "terminated by {signal}: {}",
+            describe_images_so_far(is_whole, &written)
+        ));
     }
     worker.stop_or_abandon(deadline.time_left(Instant::now()));
     ended.signal_number().map_or(exit, Exit::from_signal)
 }
 
 /// Returns the render requests: a single request, or one per turntable frame.
-fn render_requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+fn overrides_per_frame(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
         let turn = overrides.turn.map(|turn| TurntableFrame { number, ..turn });
@@ -110,7 +113,7 @@ fn render_requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
 }
 
 /// Describes the images written before a signal. `is_whole` means that all images were written.
-fn describe_written(is_whole: bool, written: &ImagesWrittenSoFar) -> String {
+fn describe_images_so_far(is_whole: bool, written: &ImagesWrittenSoFar) -> String {
     let names: Vec<_> = written.images.iter().map(|path| path.display().to_string()).collect();
     let kept = written
         .checkpoint
@@ -207,7 +210,7 @@ fn handle_events(
         } else if let Event::Checkpoint { news, .. } = &event {
             report_checkpoint(news, &mut call_warnings, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
-            call_warnings.push(warning(message, "use -o FILE to keep the old file"));
+            call_warnings.push(create_argument_warning(message, "use -o FILE to keep the old file"));
         } else if let Event::Done { warnings, .. } = &mut event {
             warnings.append(&mut call_warnings);
             warnings.retain(|_| is_first);
@@ -288,9 +291,9 @@ fn report_checkpoint(
     };
     let mut warn = |message: &str, help: &str| {
         if reporter.reports_diagnostics() {
-            call_warnings.push(warning(message, help));
+            call_warnings.push(create_argument_warning(message, help));
         } else {
-            console.print_diagnostics(&[warning(message, help)]);
+            console.print_diagnostics(&[create_argument_warning(message, help)]);
         }
     };
     match news {
@@ -321,7 +324,7 @@ fn report_checkpoint(
 }
 
 /// Creates a warning about the arguments.
-fn warning(message: &str, help: &str) -> Diagnostic {
+fn create_argument_warning(message: &str, help: &str) -> Diagnostic {
     Diagnostic {
         severity: Severity::Warning,
         message: message.to_owned(),
@@ -336,11 +339,11 @@ fn warning(message: &str, help: &str) -> Diagnostic {
 fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` in [camera], for example to 0.1";
-        warning("--dof on has no effect: the camera's aperture is 0", help)
+        create_argument_warning("--dof on has no effect: the camera's aperture is 0", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
         let help = "use `--integrator whitted`";
-        warning("--photons on has no effect: photons work with whitted only", help)
+        create_argument_warning("--photons on has no effect: photons work with whitted only", help)
     });
     dof.into_iter().chain(photons).collect()
 }

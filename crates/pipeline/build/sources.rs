@@ -11,8 +11,8 @@ pub fn source_hash(roots: &[PathBuf]) -> u64 {
     for root in roots {
         for file in list_files(root) {
             let name = file.strip_prefix(root).unwrap_or(&file);
-            hash.add(name.to_string_lossy().as_bytes());
-            hash.add(&fs::read(&file).unwrap_or_default());
+            hash.add_text(name.to_string_lossy().as_bytes());
+            hash.add_text(&fs::read(&file).unwrap_or_default());
         }
     }
     hash.0
@@ -44,7 +44,7 @@ impl Default for Fnv1a {
 
 impl Fnv1a {
     /// Hashes the bytes, skipping carriage returns, followed by a terminator that never occurs in UTF-8 text.
-    fn add(&mut self, bytes: &[u8]) {
+    fn add_text(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'\r').chain(&[0xff]) {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
         }

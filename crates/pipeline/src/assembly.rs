@@ -7,7 +7,7 @@ use super::keys;
 use super::stages::accel::AccelResult;
 use super::stages::textures::Textures;
 use super::turntable::TurntableFrame;
-use crate::assets::OrbiterCamera;
+use crate::assets::GkitOrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
@@ -22,11 +22,11 @@ pub(super) type KeyedWorld = (Fingerprint, Arc<World>);
 pub(super) struct RequestCamera {
     pub(super) camera: Camera,
     /// Contents of the orbiter file, if the camera uses one.
-    pub(super) orbiter: Option<OrbiterCamera>,
+    pub(super) orbiter: Option<GkitOrbiterCamera>,
 }
 
 impl RequestCamera {
-    pub(super) fn new(scene: &Scene, orbiter: Option<OrbiterCamera>, change: &CameraChange) -> Self {
+    pub(super) fn new(scene: &Scene, orbiter: Option<GkitOrbiterCamera>, change: &CameraChange) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.has_changes() {
             Self { camera: own.viewpoint().with_change(change).into(), orbiter: None }

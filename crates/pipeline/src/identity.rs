@@ -31,20 +31,20 @@ pub(super) struct ImageDependencies<'a> {
 impl ImageDependencies<'_> {
     /// Returns the names and values of everything that affects the image.
     pub(super) fn names_and_values(&self) -> Vec<Dependency> {
-        let mut traits = vec![Dependency::setting("glimt", BUILD)];
+        let mut traits = vec![Dependency::from_setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
         traits.extend(
             others.map(|file| Dependency::file(&relative_path(&file.path, scene_path), hash_or_reason(file))),
         );
-        traits.push(Dependency::combined_hash(self.fingerprint().to_string()));
+        traits.push(Dependency::from_combined_hash(self.fingerprint().to_string()));
         traits
     }
 
     fn add_settings(&self, traits: &mut Vec<Dependency>) {
-        let RenderSettings { render, dof, view, photons } = self.plan.settings.effective();
-        let mut add = |name: &str, value: String| traits.push(Dependency::setting(name, value));
+        let RenderSettings { render, dof, view, photons } = self.plan.settings.without_ineffective_settings();
+        let mut add = |name: &str, value: String| traits.push(Dependency::from_setting(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
         add("error", render.error.to_string());

@@ -90,7 +90,7 @@ impl ProtectedInputs {
     }
 
     /// Adds the inputs of another scene.
-    pub(super) fn add(&mut self, others: Self) {
+    pub(super) fn merge(&mut self, others: Self) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }

@@ -19,7 +19,7 @@ pub(crate) fn fingerprint_context<'a>(
 
 /// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
 /// the entire mesh emissive.
-pub(crate) fn distinct_lights_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
+pub(crate) fn separated_emitter_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
     FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
@@ -92,7 +92,7 @@ pub(crate) fn glass_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerpri
     let mut key = FingerprintHasher::new("glass");
     key.add_fingerprint(&shapes_key(scene, of));
     for object in &scene.objects {
-        let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_key());
+        let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_identity());
         key.add_bool(object.material.is_some()).add_bool(substance.is_some());
         for part in substance.into_iter().flatten() {
             key.add_u64(part);
@@ -137,7 +137,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
-                for number in material.emission_coat().iter().flatten() {
+                for number in material.emitter_coat_parameters().iter().flatten() {
                     key.add(number, of);
                 }
             }
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn trees_of_meshes_with_distinct_lights_differ() {
         let mesh = FingerprintHasher::new("mesh").finish();
-        let distinct = [false, true].map(|is_emissive| Some(distinct_lights_mesh_key(&mesh, is_emissive)));
+        let distinct = [false, true].map(|is_emissive| Some(separated_emitter_mesh_key(&mesh, is_emissive)));
         let trees =
             [None, distinct[0], distinct[1]].map(|distinct| mesh_accel_key(&mesh, Accel::Bvh, distinct));
         assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);

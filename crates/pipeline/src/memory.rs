@@ -50,8 +50,11 @@ impl MemoryEstimate {
     pub(super) fn for_image(plan: &RenderPlan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
-        let (film, picture) =
-            Film::memory_for((render.width, render.height), plan.crop.unwrap_or(whole), sum_order(plan));
+        let (film, picture) = Film::memory_for(
+            (render.width, render.height),
+            plan.crop.unwrap_or(whole),
+            sample_sum_order(plan),
+        );
         let threads = plan.threads as u64 * THREAD;
         let mut items = vec![
             ("the program", PROGRAM),
@@ -83,7 +86,7 @@ impl MemoryEstimate {
         items.push(("meshes", of_meshes));
         items.push(("trees", triangles * triangle + scene.objects.len() as u64 * OBJECT));
         items.push(("textures", texture_bytes));
-        if let Some(PhotonSettings { count, .. }) = plan.settings.effective().photons {
+        if let Some(PhotonSettings { count, .. }) = plan.settings.without_ineffective_settings().photons {
             let kept =
                 (u64::from(count) * u64::from(plan.settings.render.samples)).saturating_mul(PHOTON / 4);
             items.push(("photons", u64::from(count) * PHOTON + kept.min(KEPT_MAPS)));
@@ -173,7 +176,7 @@ impl MemoryEstimate {
 
 /// Returns the order in which samples are summed. If photons are enabled, assumes that some are emitted,
 /// because this is not known yet.
-fn sum_order(plan: &RenderPlan) -> SumOrder {
+fn sample_sum_order(plan: &RenderPlan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {
         Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).sum_order(),

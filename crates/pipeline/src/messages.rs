@@ -35,6 +35,6 @@ pub const MODEL_MISSING: &str = "does not exist: its scene was not written";
 pub const ALREADY_EXISTS: &str = "already exists";
 
 /// Explains why a checkpoint with more than `samples` samples per pixel is not used.
-pub fn too_many_samples_message(samples: u32) -> String {
+pub fn oversampled_checkpoint_message(samples: u32) -> String {
     format!("it already has more than {samples} samples")
 }

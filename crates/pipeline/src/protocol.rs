@@ -17,7 +17,7 @@ pub use super::answers::{
     CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickResult, PickedObject, SceneFileEdit,
 };
 pub use super::report::{
-    Counters, ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, SampleCounts,
+    ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, SampleCounts, WorkCounters,
 };
 use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
 use super::watch::content::FileRead;

@@ -19,19 +19,19 @@ use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
-use crate::scene::{LoadedScene, is_mesh, is_model, read_current_text};
+use crate::scene::{LoadedScene, has_mesh_extension, is_model, read_current_text};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
 /// A query or edit requested by the user.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Query {
+pub(super) enum QueryOrEdit {
     KeepCamera(MovedCamera),
     UndoCamera(SceneFileEdit),
     Pick(ImagePosition),
 }
 
-impl Query {
+impl QueryOrEdit {
     /// Reports why the query cannot be answered.
     pub(super) fn report_failure(&self, why: &str, sink: &EventSink) {
         let generation = sink.generation;
@@ -62,18 +62,20 @@ pub(super) struct QueryContext {
 impl QueryContext {
     pub(super) fn run(
         &self,
-        query: &Query,
+        query: &QueryOrEdit,
         state: Option<&FilmState>,
         inputs: &ProtectedInputs,
         sink: &EventSink,
     ) {
         let generation = sink.generation;
         sink.send(match query {
-            Query::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, state)) },
-            Query::KeepCamera(camera) => {
+            QueryOrEdit::Pick(spot) => {
+                Event::Picked { generation, picked: Box::new(self.pick(*spot, state)) }
+            }
+            QueryOrEdit::KeepCamera(camera) => {
                 Event::CameraKept { generation, outcome: self.save_camera(camera, inputs) }
             }
-            Query::UndoCamera(edit) => {
+            QueryOrEdit::UndoCamera(edit) => {
                 Event::CameraUndone { generation, outcome: undo_camera_edit(edit, inputs) }
             }
         });
@@ -130,7 +132,7 @@ impl QueryContext {
         if is_model(&path) {
             return write_model_scene(loaded, camera);
         }
-        if is_mesh(&path) && path.symlink_metadata().is_err() {
+        if has_mesh_extension(&path) && path.symlink_metadata().is_err() {
             return Err(format!("{} {MODEL_MISSING}", path.display()));
         }
         let read = loaded.source.file_text();
@@ -204,7 +206,7 @@ fn replace_scene_text(
         sweep: None,
         losses: AttributeLossPolicy::Refuse,
     };
-    write::atomic_replace(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
+    write::atomic_if_unchanged(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
         .map_err(|error| error.to_string())
 }
 

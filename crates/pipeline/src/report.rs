@@ -6,7 +6,7 @@ mod marks;
 pub(super) use self::marks::ReportSignature;
 use super::protocol::StageReport;
 use super::settings::EffectiveSettings;
-use crate::film::SampleStats;
+use crate::film::SampleCountStats;
 
 /// Report of a finished request. `--report` writes it as JSON.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -26,7 +26,7 @@ pub struct Report {
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
     /// Work counters.
-    pub counters: Counters,
+    pub counters: WorkCounters,
     /// Wall-clock time of the request.
     pub seconds: f64,
     /// Peak resident memory of the process so far.
@@ -70,8 +70,8 @@ pub struct SampleCounts {
     pub max: u32,
 }
 
-impl From<SampleStats> for SampleCounts {
-    fn from(SampleStats { min, mean, max }: SampleStats) -> Self {
+impl From<SampleCountStats> for SampleCounts {
+    fn from(SampleCountStats { min, mean, max }: SampleCountStats) -> Self {
         Self { min, mean, max }
     }
 }
@@ -132,7 +132,7 @@ pub enum LightSelectionMode {
 
 /// Work counters of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Counters {
+pub struct WorkCounters {
     /// Triangles in all mesh instances, plus standalone triangles.
     pub triangles: u64,
     /// Shapes of all kinds. A mesh instance counts as one.

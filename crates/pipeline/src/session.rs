@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 pub use super::engine::{RenderFailure, RenderedImage};
 use super::protocol::{PreviewSize, PreviewSlot, Request, WriteMode};
-use super::queries::Query;
+use super::queries::QueryOrEdit;
 use super::settings::Overrides;
 use super::sink::EventSink;
 use crate::control::CancelToken;
@@ -77,7 +77,7 @@ impl PendingCommands for NoPendingCommands {
         None
     }
 
-    fn take_query(&self) -> Option<Query> {
+    fn take_query(&self) -> Option<QueryOrEdit> {
         None
     }
 

@@ -39,7 +39,7 @@ impl EventSink {
         Self { within: Some(ends), ..self.clone() }
     }
 
-    pub(super) fn progress(&self, mut progress: RenderProgress) {
+    pub(super) fn send_progress(&self, mut progress: RenderProgress) {
         if let Some([begin, end]) = self.within {
             progress.fraction = begin + progress.fraction * (end - begin);
             // The duration of any later parts is unknown.
@@ -52,7 +52,7 @@ impl EventSink {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
-    pub(super) fn image_written(
+    pub(super) fn send_image_written(
         &self,
         path: &Path,
         bytes: u64,
@@ -67,16 +67,16 @@ impl EventSink {
         self.send(Event::OwnImage { generation: self.generation, state });
     }
 
-    pub(super) fn write_done(&self, paths: Vec<PathBuf>) {
+    pub(super) fn send_write_done(&self, paths: Vec<PathBuf>) {
         self.send(Event::WriteDone { generation: self.generation, paths });
     }
 
-    pub(super) fn write_failed(&self, path: Option<&Path>, message: String) {
+    pub(super) fn send_write_failed(&self, path: Option<&Path>, message: String) {
         let path = path.map(Path::to_owned);
         self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
-    pub(super) fn metadata_lost(&self, message: String) {
+    pub(super) fn send_metadata_lost(&self, message: String) {
         self.send(Event::NotKept { generation: self.generation, message });
     }
 
@@ -84,11 +84,11 @@ impl EventSink {
         self.send(Event::Checkpoint { generation: self.generation, news });
     }
 
-    pub(super) fn write_conflicts(&self, conflicts: Vec<Diagnostic>) {
+    pub(super) fn send_write_conflicts(&self, conflicts: Vec<Diagnostic>) {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
-    pub(super) fn preview(
+    pub(super) fn send_preview(
         &self,
         picture: Srgb8Image,
         range: Option<[f32; 2]>,
@@ -107,7 +107,7 @@ impl EventSink {
     }
 
     /// Sends a preview without light from photons, before the photons are traced.
-    pub(super) fn preview_without_photons(&self, picture: Srgb8Image) {
+    pub(super) fn send_preview_without_photons(&self, picture: Srgb8Image) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
         self.replace_preview(LatestPreview {

@@ -16,7 +16,7 @@ use crate::output::{
     AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, may_replace_image, may_replace_json,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -119,7 +119,7 @@ pub(super) fn write_guarded<'a, T>(
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep,
-        losses: AttributeLossPolicy::Report(&|what| sink.metadata_lost(what)),
+        losses: AttributeLossPolicy::Report(&|what| sink.send_metadata_lost(what)),
     })
 }
 
@@ -159,7 +159,7 @@ fn find_conflict<'a>(
         if let Some(twin) = twin(target, &identity) {
             return Some(same_file_error(plan, target, twin.path));
         }
-        if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
+        if let Some(output) = plan.outputs.first().filter(|output| is_checkpoint_for(output, &identity)) {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint for {output}");
             return Some(command_line_error(message, Some(conflict_help(plan, target.kind).to_owned())));
@@ -169,7 +169,7 @@ fn find_conflict<'a>(
 }
 
 /// Whether a file is the checkpoint for an output.
-fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
+fn is_checkpoint_for(output: &Path, identity: &FileIdentity) -> bool {
     FileIdentity::from_path(&checkpoint_path(output)).as_ref() == Some(identity)
 }
 
@@ -248,7 +248,7 @@ fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
         TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"
         }
-        TargetKind::Picture(OutputNameSource::Default) if is_mesh(Path::new(&plan.name)) => {
+        TargetKind::Picture(OutputNameSource::Default) if has_mesh_extension(Path::new(&plan.name)) => {
             "name a file with -o FILE"
         }
         TargetKind::Picture(OutputNameSource::CommandLine) => "name another file with -o FILE",

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Pixels, TILE_SIZE, TileSamples};
+use crate::film::{SelectedPixels, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
@@ -19,7 +19,7 @@ pub(super) type TileKernel = fn(
     Option<&PhotonMaps>,
     &World,
     &RenderSettings,
-    Pixels,
+    SelectedPixels,
     Range<u32>,
     &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
@@ -49,7 +49,7 @@ pub(super) struct Tracer<'a> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TileJob {
     pub(super) tile: usize,
-    pub(super) pixels: Pixels,
+    pub(super) pixels: SelectedPixels,
     pub(super) samples: Range<u32>,
 }
 

@@ -28,12 +28,12 @@ pub(super) fn settings_warnings(
     settings: &RenderSettings,
     overrides: &Overrides,
 ) -> Vec<Diagnostic> {
-    let place = |(cause, message)| locate_setting(cause, message, loaded, overrides);
+    let place = |(cause, message)| warning_at_setting(cause, message, loaded, overrides);
     find_warnings(scene, settings).into_iter().map(place).collect()
 }
 
 /// Adds the location of the setting that caused a warning.
-fn locate_setting(
+fn warning_at_setting(
     cause: WarningCause,
     message: String,
     loaded: &LoadedScene,
@@ -82,7 +82,7 @@ impl WarningCause {
 }
 
 fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarningCause, String)> {
-    let RenderSettings { render, photons, .. } = &settings.effective();
+    let RenderSettings { render, photons, .. } = &settings.without_ineffective_settings();
     let finds_all_light = render.integrator.properties().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta_lobe();
     // These surfaces block shadow rays, and path tracing has no other way to sample light that passes

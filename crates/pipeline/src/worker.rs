@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, WriteMode};
-use super::queries::Query;
+use super::queries::QueryOrEdit;
 use super::settings::Overrides;
 use super::sink::EventSink;
 use super::watch::content::FileHashCache;
@@ -123,7 +123,7 @@ struct Mailbox {
     shown: Overrides,
     /// Pending preview size change.
     preview: Option<Option<PreviewSize>>,
-    queries: VecDeque<Query>,
+    queries: VecDeque<QueryOrEdit>,
     /// Whether the newest request is paused.
     paused: bool,
     /// Whether the current render is being stopped so that it can be resumed later.
@@ -150,7 +150,7 @@ enum Task {
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
-    Query(Query),
+    Query(QueryOrEdit),
     Quit,
 }
 
@@ -165,11 +165,11 @@ impl CommandSender {
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
             }
             Command::Preview(size) => mailbox.preview = Some(size),
-            Command::KeepCamera(camera) => mailbox.queries.push_back(Query::KeepCamera(camera)),
-            Command::UndoCamera(edit) => mailbox.queries.push_back(Query::UndoCamera(edit)),
+            Command::KeepCamera(camera) => mailbox.queries.push_back(QueryOrEdit::KeepCamera(camera)),
+            Command::UndoCamera(edit) => mailbox.queries.push_back(QueryOrEdit::UndoCamera(edit)),
             Command::Pick(position) => {
-                mailbox.queries.retain(|query| !matches!(query, Query::Pick(_)));
-                mailbox.queries.push_back(Query::Pick(position));
+                mailbox.queries.retain(|query| !matches!(query, QueryOrEdit::Pick(_)));
+                mailbox.queries.push_back(QueryOrEdit::Pick(position));
             }
             Command::Cancel => {
                 mailbox.token.cancel();
@@ -226,7 +226,7 @@ impl CommandSender {
     /// Postpones a write order until the pending request runs. Does so if the order was meant for that
     /// request, or if the current image is incomplete and the pending request has the same settings. Returns
     /// whether the order was postponed.
-    fn postpone_write(&self, can_write: bool) -> bool {
+    fn postpone_write_if_needed(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
         let postponed = mailbox
@@ -285,7 +285,7 @@ impl PendingCommands for CommandSender {
         self.lock().preview.take()
     }
 
-    fn take_query(&self) -> Option<Query> {
+    fn take_query(&self) -> Option<QueryOrEdit> {
         self.lock().queries.pop_front()
     }
 
@@ -322,12 +322,14 @@ impl Worker {
                     engine.checkpoint_saved_scene_image(&sink, self.remote.interruption());
                     break;
                 }
-                Task::Write if self.remote.postpone_write(engine.can_write()) => continue,
+                Task::Write if self.remote.postpone_write_if_needed(engine.has_sample_in_every_pixel()) => {
+                    continue;
+                }
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
                 Task::Preview(size, token) => {
-                    catch_unwind(AssertUnwindSafe(|| engine.show_preview_now(size, &sink, &token)))
+                    catch_unwind(AssertUnwindSafe(|| engine.send_resized_preview(size, &sink, &token)))
                 }
-                Task::Query(query) => catch_unwind(AssertUnwindSafe(|| engine.query(&query, &sink))),
+                Task::Query(query) => catch_unwind(AssertUnwindSafe(|| engine.answer_query(&query, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
                     let context = RequestContext::new(&token, &writing, &self.remote);
@@ -430,7 +432,7 @@ mod tests {
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
         assert!(matches!(remote.wait_for_task(), Task::Write));
-        assert!(!remote.postpone_write(false), "no request should be pending");
+        assert!(!remote.postpone_write_if_needed(false), "no request should be pending");
         assert!(matches!(remote.wait_for_task(), Task::Quit));
     }
 
@@ -471,7 +473,7 @@ mod tests {
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.wait_for_task(), Task::Write));
         assert!(
-            !remote.postpone_write(false),
+            !remote.postpone_write_if_needed(false),
             "the order should not be postponed, so that an error is reported"
         );
         // An order sent after the view was requested applies to the view, even if the first image is
@@ -479,7 +481,7 @@ mod tests {
         remote.send(Command::Write);
         assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
         assert!(matches!(remote.wait_for_task(), Task::Write));
-        assert!(remote.postpone_write(true));
+        assert!(remote.postpone_write_if_needed(true));
     }
 
     #[test]
@@ -492,11 +494,14 @@ mod tests {
             matches!(remote.wait_for_task(), Task::Write),
             "the order should apply to the shown image first"
         );
-        assert!(remote.postpone_write(false), "the order should be postponed for an incomplete image");
+        assert!(
+            remote.postpone_write_if_needed(false),
+            "the order should be postponed for an incomplete image"
+        );
         assert!(matches!(remote.wait_for_task(), Task::Render(..)));
         assert!(remote.take_write(), "the request should take the order");
         assert!(!remote.take_write());
         assert!(matches!(remote.wait_for_task(), Task::Preview(None, _)));
-        assert!(!remote.postpone_write(false), "no request should be pending");
+        assert!(!remote.postpone_write_if_needed(false), "no request should be pending");
     }
 }

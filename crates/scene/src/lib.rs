@@ -229,7 +229,7 @@ pub fn is_model(path: &Path) -> bool {
 }
 
 /// Whether a file has a mesh extension.
-pub fn is_mesh(path: &Path) -> bool {
+pub fn has_mesh_extension(path: &Path) -> bool {
     document::has_mesh_extension(path)
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::key_path;
 use super::keys::all_tables;
-use super::keys::key::{KeyInfo, TableInfo, TableSyntax, TypeInfo};
+use super::keys::key::{KeyInfo, TableInfo, TableSyntax, TableTypeInfo};
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 
 /// A table with a known definition.
@@ -15,7 +15,7 @@ pub struct OutlineTable {
     pub info: &'static TableInfo,
     /// The type that the key `type` selects, or the default type. `None` if the definition has no types or if
     /// the type is unknown.
-    pub kind: Option<&'static TypeInfo>,
+    pub kind: Option<&'static TableTypeInfo>,
     /// `NAME` in `[materials.NAME]`, or a shape's `name`.
     pub name: Option<SpannedName>,
     /// 1-based position in a list of tables. 1 for other tables.

@@ -135,7 +135,7 @@ fn render_diagnostic(
         group = group.element(Level::HELP.message(sanitize_and_wrap(help, width.saturating_sub(14))));
     }
     let rendered = remove_repeated_origin(&renderer.render(&[group]));
-    if has_origin { rendered } else { remove_matching_lines(&rendered, "|") }
+    if has_origin { rendered } else { remove_lines_equal_to(&rendered, "|") }
 }
 
 /// Removes color escape sequences and surrounding whitespace from a rendered line.
@@ -148,7 +148,7 @@ fn strip_color_codes(line: &str) -> String {
 }
 
 /// Removes the rendered lines that contain nothing but `text`.
-fn remove_matching_lines(rendered: &str, text: &str) -> String {
+fn remove_lines_equal_to(rendered: &str, text: &str) -> String {
     rendered.split_inclusive('\n').filter(|line| strip_color_codes(line) != text).collect()
 }
 

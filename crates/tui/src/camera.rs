@@ -26,7 +26,7 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let (sine, cosine) = libm::sincos(right.to_radians());
     let level = level * cosine + axis.cross(level) * sine;
     let (sine, cosine) = libm::sincos(lifted.to_radians());
-    with_eye_at(pose, (level * sine + axis * cosine) * distance)
+    with_eye_offset(pose, (level * sine + axis * cosine) * distance)
 }
 
 /// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
@@ -35,7 +35,7 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
     let wanted = (distance * factor).clamp((own / REACH).min(distance), (own * REACH).max(distance));
-    if wanted == distance { *pose } else { with_eye_at(pose, arm * (wanted / distance)) }
+    if wanted == distance { *pose } else { with_eye_offset(pose, arm * (wanted / distance)) }
 }
 
 /// Multiplies the field of view by `factor`, within limits.
@@ -45,7 +45,7 @@ pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
 }
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
-fn with_eye_at(pose: &Pose, arm: DVec3) -> Pose {
+fn with_eye_offset(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| round_to_step(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }

@@ -8,13 +8,13 @@ use ratatui::layout::Rect;
 use super::color::ColorDepth;
 use super::connection::{QueryKind, TerminalConnection};
 use super::event::PreviewSendReport;
-use super::graphics::{ImagePlacement, TerminalImages};
+use super::graphics::{TerminalImage, TerminalImages};
 use super::paint::{Fidelity, LinksAndDelayedText, Painter};
 use super::preview_kind::PreviewKind;
 use super::terminal;
 use super::terminal_replies::TerminalQueries;
 use super::terminal_replies::TerminalReply;
-use super::window_title::WindowTitle;
+use super::window_title::TitleAndProgress;
 
 /// Query for synchronized output (mode 2026).
 pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
@@ -67,7 +67,7 @@ pub(super) struct Display {
     /// Whether the target has been sent completely.
     is_complete: bool,
     /// The current window title and the one sent last.
-    window_titles: [WindowTitle; 2],
+    window_titles: [TitleAndProgress; 2],
     /// Notifications and clipboard text to send.
     asides: Vec<u8>,
     /// Bytes sent since the newest preview's render began.
@@ -111,7 +111,7 @@ impl Display {
     /// Resets the screen and connection after another program has used the terminal.
     pub(super) fn restart(&mut self, now: Instant) {
         self.invalidate();
-        self.window_titles[1] = WindowTitle::default();
+        self.window_titles[1] = TitleAndProgress::default();
         self.connection = self.link.new_connection(now);
         let questions = [SYNCHRONIZED, &self.link.ask.query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
@@ -140,7 +140,7 @@ impl Display {
     }
 
     /// Places a preview drawn as pixels. `None` if the preview is drawn as cells.
-    pub(super) fn place_pixels(&mut self, wanted: Option<ImagePlacement>, is_still: bool) {
+    pub(super) fn place_pixels(&mut self, wanted: Option<TerminalImage>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -168,7 +168,7 @@ impl Display {
     }
 
     /// Sets the window title, which is sent after the preview.
-    pub(super) fn set_title(&mut self, title: WindowTitle) {
+    pub(super) fn set_title_and_progress(&mut self, title: TitleAndProgress) {
         self.window_titles[0] = title;
     }
 
@@ -187,7 +187,7 @@ impl Display {
         let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
-            bytes.extend_from_slice(terminal::title_saving_bytes());
+            bytes.extend_from_slice(terminal::take_title_saving_bytes());
         }
         if wanted.bar.is_some() {
             terminal::mark_progress_bar_used();
@@ -322,7 +322,7 @@ impl Display {
 
     /// How long to wait for pending replies before exiting, so that the shell does not receive them as input.
     /// `None` if no replies are pending.
-    pub(super) fn reply_timeout(&self) -> Option<Duration> {
+    pub(super) fn reply_wait_before_exit(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
         const MAX: Duration = Duration::from_secs(1);
         let round_trip = self.connection.round_trip().unwrap_or_default();

@@ -26,14 +26,14 @@ pub(super) fn detect_terminal_environment(variable: impl Fn(&str) -> Option<Stri
 }
 
 /// Whether the terminal may print unknown escape sequences, as the Linux console and Apple's Terminal do.
-pub(super) fn is_plain_terminal(variable: impl Fn(&str) -> Option<String>) -> bool {
+pub(super) fn may_print_unknown_escapes(variable: impl Fn(&str) -> Option<String>) -> bool {
     let term = variable("TERM").unwrap_or_default();
     ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
 }
 
 /// Returns the image protocol for the user's preview choice.
-fn image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
+fn requested_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
         PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
         PreviewChoice::Sixel => Some(ImageProtocol::Sixel),
@@ -59,7 +59,7 @@ pub(super) fn terminal_queries(
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     let is_outermost = !detect_terminal_environment(&variable).is_multiplexed;
-    let is_plain = is_plain_terminal(&variable);
+    let is_plain = may_print_unknown_escapes(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::from_choice(preview, depth) == PreviewKind::Ascii;
     TerminalQueries {
@@ -68,7 +68,7 @@ pub(super) fn terminal_queries(
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: image_protocol(preview)
+        pixels: requested_protocol(preview)
             .map(|protocol| ImageProtocolRequest::new(protocol, &variable, is_plain)),
     }
 }

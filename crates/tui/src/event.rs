@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::options::{ContentChange, OutputChange, WatchUpdate};
+use super::options::{ContentChange, OutputChange, WatchEvent};
 use super::terminal_replies::TerminalReply;
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{self, NormalizedRect, PreviewSource};
@@ -67,11 +67,11 @@ pub(super) enum Event {
 
 impl Event {
     /// Wraps a file watcher event.
-    pub(super) fn from_watcher(news: WatchUpdate) -> Self {
+    pub(super) fn from_watcher(news: WatchEvent) -> Self {
         match news {
-            WatchUpdate::Changed(changed) => Self::Changed(changed),
-            WatchUpdate::Settled => Self::Settled,
-            WatchUpdate::Output(change) => Self::Output(change),
+            WatchEvent::Changed(changed) => Self::Changed(changed),
+            WatchEvent::Settled => Self::Settled,
+            WatchEvent::Output(change) => Self::Output(change),
         }
     }
 }

@@ -14,7 +14,7 @@ pub(super) fn summary_text(state: &State) -> String {
     match &state.saving.write_failed {
         Some(failed) => describe_write_failure(state, failed),
         None if state.saving.written.is_empty() => reason_for_no_image(state),
-        None => describe_files(&state.saving.written) + &events_since_writing(state),
+        None => describe_files(&state.saving.written) + &describe_events_since_writing(state),
     }
 }
 
@@ -65,7 +65,7 @@ fn reason_for_no_image(state: &State) -> String {
 const NEXT_RENDER: &str = "the next render";
 
 /// Describes what has happened since the files were written.
-fn events_since_writing(state: &State) -> String {
+fn describe_events_since_writing(state: &State) -> String {
     if is_scene_broken(state) {
         return format!("; {} has errors since", scene_name(state));
     }
@@ -446,7 +446,7 @@ mod tests {
         own(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
         ui.finish_render([200, 30, 30]);
         assert_eq!(summary_text(&ui.state), "cornell.png not finished (10 %)");
-        let said = crate::view::status_line::unsaved_messages(&ui.state);
+        let said = crate::view::status_line::unsaved_image_messages(&ui.state);
         assert_eq!(
             said,
             [messages::NOT_SAVED.to_owned(), messages::scene_image_unfinished("cornell.png", 10)]

@@ -19,8 +19,8 @@ use super::view;
 use crate::film::Srgb8Image;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{
-    self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
-    SampleCounts, Stage, StageReport, Status, Viewpoint,
+    self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, SampleCounts, Stage,
+    StageReport, Status, Viewpoint, WorkCounters,
 };
 use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
@@ -261,7 +261,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
             memory_bytes: 0,
         },
         stages: Stage::ALL.iter().map(|name| stage_report(*name, Status::Done, 0.25, "")).collect(),
-        counters: Counters::default(),
+        counters: WorkCounters::default(),
         seconds: 1.93,
         peak_memory_bytes: 0,
     };

@@ -108,7 +108,7 @@ impl RenderHistory {
             Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
             Some(changes) => changes.join("; "),
         };
-        past.with_stopped_label(words)
+        past.prefix_if_stopped(words)
     }
 
     /// Records that a camera that has been moved with keys since request `since` was written to the scene.
@@ -122,7 +122,7 @@ impl RenderHistory {
     }
 
     /// Reassigns a request's entry to the next request, which shows the same image differently.
-    pub(super) fn reassign_to_next_request(&mut self, generation: u64) {
+    pub(super) fn move_to_next_request(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
@@ -145,14 +145,14 @@ impl RenderHistory {
                 // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
                 let origin = if is_same { past.origin.merged_with_later(origin) } else { origin };
-                self.replace(at, (shown, time), origin);
+                self.replace_entry_image(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
             None => {
                 let edits = self.read_edits;
                 let (run, changes, small) = (None, None, OnceCell::new());
                 self.past.push_back(HistoryEntry { shown, time, edits, origin, run, changes, small });
-                self.compare_with_previous(self.past.len() - 1);
+                self.update_entry_changes(self.past.len() - 1);
             }
         }
         while self.past.len() > 1 && self.memory_bytes() > MAX_BYTES {
@@ -161,7 +161,12 @@ impl RenderHistory {
     }
 
     /// Replaces an entry's image with a newer version.
-    fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageProvenance) {
+    fn replace_entry_image(
+        &mut self,
+        at: usize,
+        (shown, time): (ShownImage, Instant),
+        origin: ImageProvenance,
+    ) {
         let Some(past) = self.past.get_mut(at) else { return };
         let is_other_picture = past.shown.picture != shown.picture;
         if is_other_picture {
@@ -173,8 +178,8 @@ impl RenderHistory {
         let is_other = past.origin != origin;
         (past.shown, past.origin) = (shown, origin);
         if is_other {
-            self.compare_with_previous(at);
-            self.compare_with_previous(at + 1);
+            self.update_entry_changes(at);
+            self.update_entry_changes(at + 1);
         }
     }
 
@@ -199,7 +204,7 @@ impl RenderHistory {
         {
             past.changes = None;
         }
-        self.compare_with_previous(before);
+        self.update_entry_changes(before);
     }
 
     fn remove(&mut self, at: usize) {
@@ -250,7 +255,7 @@ impl RenderHistory {
     }
 
     /// Compares an entry's scene and settings with those of the previous entry.
-    fn compare_with_previous(&mut self, at: usize) {
+    fn update_entry_changes(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.describe_file_changes(&before.origin);
@@ -339,7 +344,7 @@ impl RenderHistory {
 
     /// Describes the changes since the previous entry: edits first, then keys. An entry still being rendered
     /// is not marked as stopped.
-    pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
+    pub(super) fn describe_changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
             None => vec![messages::OPENED.to_owned()],
@@ -385,7 +390,7 @@ impl HistoryEntry {
     }
 
     /// Prefixes `words` with a label if the render was stopped.
-    fn with_stopped_label(&self, words: String) -> String {
+    fn prefix_if_stopped(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
@@ -608,7 +613,7 @@ mod tests {
     }
 
     fn changes(history: &RenderHistory) -> Vec<String> {
-        (0..history.len()).map(|at| history.changes(at, false).join("; ")).collect()
+        (0..history.len()).map(|at| history.describe_changes(at, false).join("; ")).collect()
     }
 
     #[test]

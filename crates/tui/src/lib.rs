@@ -57,7 +57,7 @@ pub use color::{ColorChoice, ColorDepth, xterm_rgb};
 pub use editor::editor_and_variable;
 pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
-pub use options::{ContentChange, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchUpdate};
+pub use options::{ContentChange, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
 pub use probe::{ProbeReplies, TerminalProbe, probe_terminal};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use super::fixtures::{
     asset_progress, camera, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
-use super::{ColorChoice, ContentChange, Options, PreviewChoice, WatchUpdate, run};
+use super::{ColorChoice, ContentChange, Options, PreviewChoice, WatchEvent, run};
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{
     Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
@@ -55,15 +55,15 @@ fn interactive_session() {
     }
 }
 
-fn watch_scene(scene: &PathBuf, news: &Sender<WatchUpdate>) {
+fn watch_scene(scene: &PathBuf, news: &Sender<WatchEvent>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
         let now = std::fs::read(scene).ok();
         if now != last {
             last = now;
-            let changed = WatchUpdate::Changed(ContentChange { noticed: Instant::now() });
-            if [changed, WatchUpdate::Settled].into_iter().any(|said| news.send(said).is_err()) {
+            let changed = WatchEvent::Changed(ContentChange { noticed: Instant::now() });
+            if [changed, WatchEvent::Settled].into_iter().any(|said| news.send(said).is_err()) {
                 return;
             }
         }

@@ -101,14 +101,14 @@ pub fn unnumbered_render(state: &str) -> String {
 pub const OLDER: &str = "older";
 
 /// Position of the displayed render among the finished renders.
-pub fn render_position(number: u64, count: u64) -> String {
+pub fn render_number_label(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
 /// Word for stages that were not run again.
 pub const CACHED: &str = "cached";
 /// Number of stages that were not run again, with a label.
-pub fn cached_stages(stages: &str) -> String {
+pub fn cached_stage_count(stages: &str) -> String {
     format!("{stages} {CACHED}")
 }
 
@@ -222,7 +222,7 @@ pub fn checkpoint_ignored(file: &str, why: &str) -> String {
 }
 
 /// Shown when another program modified an output file.
-pub fn output_changed(file: &str, how: &str) -> String {
+pub fn output_modified_externally(file: &str, how: &str) -> String {
     format!("{file} {how} · w: write it again")
 }
 

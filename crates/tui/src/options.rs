@@ -8,7 +8,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{ContentChange, ExternalChange, OutputChange, WatchUpdate};
+pub use crate::pipeline::watch::{ContentChange, ExternalChange, OutputChange, WatchEvent};
 
 choice! {
     /// How to draw the preview.
@@ -58,7 +58,7 @@ pub struct Options {
     /// Slot for previews from the worker.
     pub previews: PreviewSlot,
     /// Events from the file watcher. If the channel closes, the front end shows a message.
-    pub news: Receiver<WatchUpdate>,
+    pub news: Receiver<WatchEvent>,
 }
 
 /// The program's exit code.

@@ -12,12 +12,12 @@ use ratatui::layout::Rect;
 use super::display::Display;
 use super::event::Event;
 use super::file_urls::FileUrlBuilder;
-use super::paint::{Fidelity, FrameTiming, Hyperlink, LinksAndDelayedText, PacingAdvice, advise};
+use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, advise};
 use super::state::State;
 use super::view;
 use super::view::FileLinksAndDelayedText;
 use super::view::layout::Layout;
-use super::window_title::WindowTitle;
+use super::window_title::TitleAndProgress;
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
@@ -70,7 +70,12 @@ impl Presenter {
 
     /// Handles a new preview in the slot. If it should be drawn, takes it out of the slot. Otherwise it stays
     /// there until a newer one replaces it, so previews never queue up.
-    pub(super) fn handle_preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
+    pub(super) fn take_preview_if_due(
+        &mut self,
+        generation: u64,
+        state: &State,
+        now: Instant,
+    ) -> Option<Event> {
         let is_same_request = generation == self.drawn.generation && !self.is_preview_incompatible(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
@@ -91,15 +96,15 @@ impl Presenter {
 
     /// Whether to draw a newer preview of the same request.
     fn pacing_advice(&self, state: &State, now: Instant) -> PacingAdvice {
-        advise(&self.frame_timing(state, now))
+        advise(&self.pacing_inputs(state, now))
     }
 
-    fn frame_timing(&self, state: &State, now: Instant) -> FrameTiming {
+    fn pacing_inputs(&self, state: &State, now: Instant) -> PacingInputs {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_fast = self.display.is_fast();
         let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_complete() };
-        FrameTiming {
+        PacingInputs {
             bytes_per_second: self.display.bytes_per_second(),
             cells: picture.map_or(0, |picture| self.preview_cell_count(state, picture)),
             samples: samples_per_pixel(state),
@@ -152,14 +157,14 @@ impl Presenter {
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
-        if let Some(title) = WindowTitle::for_state(state, self.display.bytes_per_second().is_some()) {
-            self.display.set_title(title);
+        if let Some(title) = TitleAndProgress::for_state(state, self.display.bytes_per_second().is_some()) {
+            self.display.set_title_and_progress(title);
         }
         let is_new = self.record_preview(state, now);
         // A preview counts as the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::for_state(state).preview;
-        self.display.place_pixels(view::preview::image_placement(state, area), is_final_preview(state));
+        self.display.place_pixels(view::preview::terminal_image(state, area), is_final_preview(state));
         let extras = self.links_and_delayed_text(state, drawn);
         self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
@@ -231,7 +236,7 @@ impl Presenter {
             .drawn
             .at
             .filter(|_| self.drawn.is_old)
-            .and_then(|at| self.frame_timing(state, now).next_due_time(at));
+            .and_then(|at| self.pacing_inputs(state, now).next_due_time(at));
         let refine = self.has_room_to_refine(state).then_some(now);
         let due = due.into_iter().chain(refine);
         next_wake(state, self.next_frame).into_iter().chain(self.display.next_send_time(now)).chain(due).min()

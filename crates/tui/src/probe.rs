@@ -9,7 +9,7 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
-use super::environment::{detect_terminal_environment, is_plain_terminal};
+use super::environment::{detect_terminal_environment, may_print_unknown_escapes};
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
@@ -81,7 +81,7 @@ pub fn probe_terminal() -> Option<TerminalProbe> {
     }
     let variable = |name: &str| std::env::var(name).ok();
     let (window, link) = (terminal::query_window(None), detect_terminal_environment(variable));
-    let questions = if is_plain_terminal(variable) || link.is_multiplexed {
+    let questions = if may_print_unknown_escapes(variable) || link.is_multiplexed {
         Vec::new()
     } else {
         let ask = TerminalQueries {

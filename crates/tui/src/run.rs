@@ -45,7 +45,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
     if capabilities.focus {
-        terminal::mark_focus_reports_used();
+        terminal::keep_focus_reports_enabled();
     }
     let screen = TerminalSession::open()?;
     let link = TerminalEnvironment {
@@ -171,8 +171,11 @@ impl EventLoop {
     /// text.
     fn leave_screen(&mut self) {
         self.screen.leave_screen();
-        let deadline = self.presenter.display.reply_timeout().map(|patience| Instant::now() + patience);
-        while let Some(deadline) = deadline.filter(|_| self.presenter.display.reply_timeout().is_some()) {
+        let deadline =
+            self.presenter.display.reply_wait_before_exit().map(|patience| Instant::now() + patience);
+        while let Some(deadline) =
+            deadline.filter(|_| self.presenter.display.reply_wait_before_exit().is_some())
+        {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(Event::TerminalReply(answer)) => {
                     self.presenter.display.handle_reply(answer, Instant::now());
@@ -210,7 +213,7 @@ impl EventLoop {
     fn handle_event(&mut self, event: Event) -> Option<LoopEnd> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => {
-                let taken = self.presenter.handle_preview(generation, &self.state, Instant::now());
+                let taken = self.presenter.take_preview_if_due(generation, &self.state, Instant::now());
                 return taken.and_then(|picture| self.apply_event(picture));
             }
             Event::TerminalReply(answer) => {

@@ -5,7 +5,7 @@ fn channel_close_is_reported_last() {
     let (from, receiver) = mpsc::channel();
     let (sender, events) = mpsc::channel();
     forward_channel("test", receiver, &sender, Event::from_watcher, EventSource::Watcher).expect("a thread");
-    from.send(super::super::WatchUpdate::Settled).expect("a receiver");
+    from.send(super::super::WatchEvent::Settled).expect("a receiver");
     drop(from);
     assert!(matches!(events.recv(), Ok(Event::Settled)));
     assert!(matches!(events.recv(), Ok(Event::Lost(EventSource::Watcher))));

@@ -42,12 +42,12 @@ const OTHER_SIGNALS: [i32; 9] =
 
 /// Linux-specific signals that terminate the program, including real-time signals.
 #[cfg(target_os = "linux")]
-fn linux_signals() -> impl Iterator<Item = i32> {
+fn linux_terminating_signals() -> impl Iterator<Item = i32> {
     [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
 }
 
 #[cfg(not(target_os = "linux"))]
-fn linux_signals() -> impl Iterator<Item = i32> {
+fn linux_terminating_signals() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
@@ -64,7 +64,7 @@ impl SignalListener {
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new(
-            HANDLED_SIGNALS.into_iter().chain(OTHER_SIGNALS).chain(linux_signals()).chain([MARK]),
+            HANDLED_SIGNALS.into_iter().chain(OTHER_SIGNALS).chain(linux_terminating_signals()).chain([MARK]),
         )?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
         spawn("signals", move || {
@@ -311,7 +311,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn real_time_signals_are_handled() {
-        let heard: Vec<i32> = linux_signals().collect();
+        let heard: Vec<i32> = linux_terminating_signals().collect();
         assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
         assert_eq!(exit_status_for(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }

@@ -125,7 +125,7 @@ impl TerminalSession {
 
     /// Enables focus reports.
     pub(super) fn request_focus_reports(&mut self) {
-        mark_focus_reports_used();
+        keep_focus_reports_enabled();
         writer::queue_slice(FOCUS_ON.as_bytes().to_vec());
     }
 
@@ -181,7 +181,7 @@ fn leave_screen() {
         return;
     }
     let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
-    if !writer::discard_queued(STUCK) {
+    if !writer::discard_queued_and_wait(STUCK) {
         let _ = drop_kept();
     }
     let mut bytes = Vec::new();
@@ -190,7 +190,7 @@ fn leave_screen() {
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
         .and_then(|()| writer::open_output())
-        .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
+        .and_then(|mut out| writer::write_until_given_up(&mut out, &bytes, is_late));
 }
 
 /// Restores the terminal from another thread, since the thread that owns it may be blocked. Does not block:
@@ -200,7 +200,7 @@ pub(super) fn restore_from_other_thread() {
         let _ = disable_raw_mode();
     }
     if TAKEN.swap(false, Ordering::AcqRel) {
-        writer::discard_queued(Duration::ZERO);
+        writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
             let tty = std::fs::OpenOptions::new().write(true).open("/dev/tty");
             tty.and_then(|mut tty| write_restore(&mut tty))
@@ -245,7 +245,7 @@ fn restore_on_abort() {
             if HAS_IMAGES.load(Ordering::Acquire) {
                 let _ = nix::unistd::write(&out, &words.delete_images);
             }
-            for bytes in undo_bytes() {
+            for bytes in take_undo_bytes() {
                 let _ = nix::unistd::write(&out, bytes);
             }
             let _ = nix::unistd::write(&out, &words.leave);
@@ -264,13 +264,13 @@ pub(super) fn mark_images_used() {
 }
 
 /// Enables focus reports each time the terminal is set up.
-pub(super) fn mark_focus_reports_used() {
+pub(super) fn keep_focus_reports_enabled() {
     FOCUS.store(true, Ordering::Release);
 }
 
 /// Bytes to send before setting a window title. The first call returns the sequence that saves the original
 /// title. Later calls return nothing.
-pub(super) fn title_saving_bytes() -> &'static [u8] {
+pub(super) fn take_title_saving_bytes() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
 
@@ -286,7 +286,7 @@ pub(super) fn mark_links_used() {
 
 /// Bytes that undo the changes listed in [`CHANGES`]. Each change is undone only once, except for modes,
 /// which are enabled again when the terminal is set up.
-fn undo_bytes() -> impl Iterator<Item = &'static [u8]> {
+fn take_undo_bytes() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
         let is_mode = std::ptr::eq(*flag, &FOCUS);
@@ -316,7 +316,7 @@ fn write_restore(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
         write_image_deletion(out)?;
     }
-    undo_bytes().try_for_each(|bytes| out.write_all(bytes))?;
+    take_undo_bytes().try_for_each(|bytes| out.write_all(bytes))?;
     write_frame_end_and_leave(out)
 }
 
@@ -465,14 +465,14 @@ mod tests {
     #[test]
     fn title_progress_and_links_are_undone_once() {
         let _alone = exclusive_access();
-        let all = || undo_bytes().collect::<Vec<_>>();
+        let all = || take_undo_bytes().collect::<Vec<_>>();
         assert!(all().is_empty());
-        assert_eq!((title_saving_bytes(), title_saving_bytes()), (KEEP_TITLE, &b""[..]));
+        assert_eq!((take_title_saving_bytes(), take_title_saving_bytes()), (KEEP_TITLE, &b""[..]));
         mark_progress_bar_used();
         mark_links_used();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(title_saving_bytes(), KEEP_TITLE, "the new title should be saved again");
+        assert_eq!(take_title_saving_bytes(), KEEP_TITLE, "the new title should be saved again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 

@@ -50,12 +50,12 @@ impl ProgressBar {
 
 /// Window title and progress bar, if supported by the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct WindowTitle {
+pub(super) struct TitleAndProgress {
     pub(super) title: Option<String>,
     pub(super) bar: Option<ProgressBar>,
 }
 
-impl WindowTitle {
+impl TitleAndProgress {
     /// Determines the title and progress bar for the state. If `is_slow`, the percentage changes in larger
     /// steps. `None` leaves both unchanged.
     pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
@@ -142,8 +142,8 @@ mod tests {
         ui
     }
 
-    fn sent(before: &mut WindowTitle, ui: &TestUi, is_slow: bool) -> String {
-        let now = WindowTitle::for_state(&ui.state, is_slow).unwrap_or_else(|| before.clone());
+    fn sent(before: &mut TitleAndProgress, ui: &TestUi, is_slow: bool) -> String {
+        let now = TitleAndProgress::for_state(&ui.state, is_slow).unwrap_or_else(|| before.clone());
         let bytes = before.update_sequence(&now);
         *before = now;
         String::from_utf8(bytes).expect("UTF-8")
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn title_and_progress_bar_show_the_render() {
-        let (mut ui, mut shown_title) = (ui(), WindowTitle::default());
+        let (mut ui, mut shown_title) = (ui(), TitleAndProgress::default());
         assert_eq!(sent(&mut shown_title, &ui, false), "", "short renders should not be shown");
         ui.advance_clock(600);
         let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn unsupported_terminals_get_no_title() {
-        let (mut ui, mut shown_title) = (TestUi::new(), WindowTitle::default());
+        let (mut ui, mut shown_title) = (TestUi::new(), TitleAndProgress::default());
         assert_eq!(ui.state.display.capabilities, Capabilities::default());
         ui.finish_render([200, 30, 30]);
         assert_eq!(sent(&mut shown_title, &ui, false), "");
@@ -187,7 +187,7 @@ mod tests {
         let mut ui = ui();
         ui.state.request.scene = "a\x1b\\\x07b.toml".into();
         ui.finish_render([200, 30, 30]);
-        let title = sent(&mut WindowTitle::default(), &ui, false);
+        let title = sent(&mut TitleAndProgress::default(), &ui, false);
         assert_eq!(title, "\x1b]2;a␛\\␇b.toml: done · glimt\x1b\\");
         let bytes = notification_bytes(&ui.state, NotificationProtocol::Osc777, Duration::from_secs(95));
         let words = String::from_utf8(bytes).expect("UTF-8");

@@ -67,7 +67,7 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
     let write = move || {
         loop {
             let slice = QUEUE.wait_for_slice();
-            let outcome = write_all(&mut out, &slice, || QUEUE.lock().is_given_up);
+            let outcome = write_until_given_up(&mut out, &slice, || QUEUE.lock().is_given_up);
             QUEUE.finish_slice();
             let event = match &outcome {
                 Ok(()) => Event::Written { bytes: slice.len() },
@@ -106,7 +106,7 @@ pub(super) fn queue_slice(slice: Vec<u8>) {
 
 /// Drops queued slices and waits for the slice being written. If this takes longer than `patience`, also
 /// drops the rest of that slice and returns false.
-pub(super) fn discard_queued(patience: Duration) -> bool {
+pub(super) fn discard_queued_and_wait(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
     let wait = |waiting, patience| {
@@ -125,7 +125,11 @@ pub(super) fn discard_queued(patience: Duration) -> bool {
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes all bytes, but stops if `is_given_up` returns true.
-pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn() -> bool) -> io::Result<()> {
+pub(super) fn write_until_given_up(
+    out: &mut File,
+    mut bytes: &[u8],
+    is_given_up: impl Fn() -> bool,
+) -> io::Result<()> {
     while !bytes.is_empty() {
         match out.write(bytes) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),

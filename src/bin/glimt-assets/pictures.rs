@@ -31,7 +31,7 @@ fn encode_png(side: u32, pixels: &[u8]) -> Vec<u8> {
 }
 
 /// Noise, quantized because invisible detail would only make the file larger.
-fn grain_noise(u: f64, v: f64, seed: u64) -> f64 {
+fn quantized_noise(u: f64, v: f64, seed: u64) -> f64 {
     let fine = fractal_noise([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
     (fine * 24.0).round() / 24.0
 }
@@ -54,8 +54,8 @@ pub(crate) fn bricks() -> Vec<u8> {
         let ([x, y], inside) = brick_at(u, v);
         let tint = lattice_random([x, y, 0], 17);
         let clay = mix([0.52, 0.21, 0.15], [0.72, 0.37, 0.25], tint);
-        let clay = scale(clay, 0.82 + 0.3 * grain_noise(u, v, 31));
-        let mortar = scale([0.70, 0.67, 0.62], 0.85 + 0.2 * grain_noise(u, v, 47));
+        let clay = scale(clay, 0.82 + 0.3 * quantized_noise(u, v, 31));
+        let mortar = scale([0.70, 0.67, 0.62], 0.85 + 0.2 * quantized_noise(u, v, 47));
         mix(mortar, clay, inside).map(|value| value.min(1.0))
     });
     encode_png(SIDE, &pixels)

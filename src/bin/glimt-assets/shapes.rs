@@ -33,7 +33,11 @@ pub(crate) fn rope() -> Surface {
             let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
-        let tube = weld(Surface::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)), 512, 12);
+        let tube = weld_grid_seams(
+            Surface::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)),
+            512,
+            12,
+        );
         let base = whole.positions.len() as u32;
         whole.positions.extend(tube.positions);
         whole.faces.extend(tube.faces.into_iter().map(|face| face.into_iter().map(|v| v + base).collect()));
@@ -180,7 +184,7 @@ fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vec
 }
 
 /// Closes a grid in both directions by merging its seam vertices.
-fn weld(grid: Surface, columns: u32, rows: u32) -> Surface {
+fn weld_grid_seams(grid: Surface, columns: u32, rows: u32) -> Surface {
     let welded = |vertex: u32| {
         let (column, row) = (vertex / (rows + 1), vertex % (rows + 1));
         (column % columns) * rows + row % rows

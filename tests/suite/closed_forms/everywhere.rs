@@ -82,7 +82,7 @@ fn half_opacity_halves_the_light() {
 fn half_opacity_halves_two_sided_emission() {
     for (name, material) in materials() {
         for (sides, of_back) in [(EmissionSides::Both, 1.0), (EmissionSides::Front, 0.0)] {
-            let emission = EmissionSource { sides, ..EmissionSource::constant(Vec3::splat(2.0)) };
+            let emission = EmissionSource { sides, ..EmissionSource::from_constant(Vec3::splat(2.0)) };
             let opacity = OpacitySource { value: NumberSource::Constant(0.5), cutoff: 0.0 };
             let shining = Material { emission, opacity, ..uncoated(material.clone()) };
             // On the axis of a disk, E = π·r²/(r² + h²)·L, here π/5·2. Half opacity halves it, on either

@@ -274,7 +274,7 @@ fn clear_coat_attenuates_emission() {
         if let MaterialKind::Principled { clearcoat_roughness, specular, .. } = &mut lamp.kind {
             (*clearcoat_roughness, *specular) = (NumberSource::Constant(0.02), NumberSource::Constant(0.0));
         }
-        lamp.emission = EmissionSource::constant(Vec3::splat(radiance));
+        lamp.emission = EmissionSource::from_constant(Vec3::splat(radiance));
         lamp
     };
     for cosine in [1.0_f64, 0.6, 0.3] {

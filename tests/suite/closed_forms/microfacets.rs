@@ -219,7 +219,7 @@ fn coarse_smooth_meshes_conserve_energy() {
 fn metal_emission_adds_to_its_reflection() {
     let mut lamp = metal(0.9, 0.5, 0.0);
     let dark = mean_and_error(&in_the_open(lamp.clone(), 1).values(256, 16));
-    lamp.emission = EmissionSource::constant(Vec3::splat(2.0));
+    lamp.emission = EmissionSource::from_constant(Vec3::splat(2.0));
     let lit = mean_and_error(&in_the_open(lamp, 1).values(256, 16));
     assert!((lit.0 - dark.0 - 2.0).abs() < 5.0 * dark.1.hypot(lit.1) + 1e-5, "{lit:?} {dark:?}");
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::LightSamplingPurpose;
+use glimt::lights::LightTransportKind;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -21,7 +21,8 @@ fn grays(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2
 }
 
 fn shining(texture: usize, scale: f32) -> Material {
-    let emission = EmissionSource { texture: Some(texture), ..EmissionSource::constant(Vec3::splat(scale)) };
+    let emission =
+        EmissionSource { texture: Some(texture), ..EmissionSource::from_constant(Vec3::splat(scale)) };
     Material { emission, ..phong(0.0, 0.0, 1.0, 0.0) }
 }
 
@@ -197,7 +198,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler(LightSamplingPurpose::Eye).is_some());
+    assert!(build.world().lights.sampler(LightTransportKind::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

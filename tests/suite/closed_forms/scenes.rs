@@ -289,7 +289,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 /// Photon maps for `samples` samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
-    settings.effective().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
+    settings.without_ineffective_settings().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
         let photons = integrators::PhotonMapper::new(world, settings, of_photons, &ignore_progress, &token);
         let (photons, _) = photons.expect("not cancelled");
         photons.trace_passes(world, settings, 0..samples, &token).expect("not cancelled")
@@ -327,7 +327,7 @@ pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Mate
     let gray = |x| ColorSource::Constant(Vec3::splat(x));
     let kind =
         MaterialKind::Phong { diffuse: gray(diffuse), specular: gray(specular), shininess, ambient: None };
-    Material { emission: EmissionSource::constant(Vec3::splat(emission)), ..plain(kind) }
+    Material { emission: EmissionSource::from_constant(Vec3::splat(emission)), ..plain(kind) }
 }
 
 pub fn matte(reflectance: f32) -> Material {

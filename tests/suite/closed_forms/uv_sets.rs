@@ -47,7 +47,7 @@ fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     if let MaterialKind::Principled { roughness, .. } = &mut rough.kind {
         *roughness = number();
     }
-    let emission = EmissionSource { texture: Some(texture), ..EmissionSource::constant(Vec3::ONE) };
+    let emission = EmissionSource { texture: Some(texture), ..EmissionSource::from_constant(Vec3::ONE) };
     let bump = Some(Bump { texture, channel: None, scale: 0.2 });
     vec![
         ("a color", Material { kind: colored, ..matte(0.5) }),
@@ -131,7 +131,7 @@ fn one_material_can_use_both_uv_sets() {
                 shininess: 1.0,
                 ambient: None,
             },
-            emission: EmissionSource { texture: Some(light), ..EmissionSource::constant(Vec3::ONE) },
+            emission: EmissionSource { texture: Some(light), ..EmissionSource::from_constant(Vec3::ONE) },
             normal_map: has_relief.then_some(NormalMap { texture: flat, strength: 1.0 }),
             ..matte(0.5)
         };

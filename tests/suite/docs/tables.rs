@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
-use glimt::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind};
+use glimt::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind};
 use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 
@@ -51,7 +51,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
         };
         return vec![DefinedTable { head: format!("{head}\n"), headings, keys }];
     }
-    let of_type = |kind: &'static TypeInfo| {
+    let of_type = |kind: &'static TableTypeInfo| {
         let code = format!("type = \"{}\"", kind.name);
         // Opacity applies only to surfaces.
         let is_solid = |info: &KeyInfo| kind.name == "glass" && info.name.starts_with("opacity");

@@ -61,7 +61,7 @@ fn edits_rerun_only_dependent_stages() {
 
     folder.write("scene.toml", &own.replace("[camera]", "# the eye\n\n[camera]"));
     terminal.wait_for(&format!("unchanged · {}", messages::render_number(1)));
-    terminal.wait_for(&messages::cached_stages("6 stages"));
+    terminal.wait_for(&messages::cached_stage_count("6 stages"));
     assert_eq!(stages(&folder, "render").0, "drrrrsrr");
 
     let edits = [
@@ -89,7 +89,7 @@ fn edits_rerun_only_dependent_stages() {
             // The full text, or the short text if the line is too narrow.
             let count = statuses.matches('r').count();
             let words = [count.to_string(), format!("{count} stages"), "1 stage".to_owned()]
-                .map(|it| messages::cached_stages(&it));
+                .map(|it| messages::cached_stage_count(&it));
             terminal.wait("reused stages", |screen| {
                 let text = screen.contents();
                 words[..2 + usize::from(count == 1)].iter().any(|words| text.contains(words))
@@ -99,7 +99,7 @@ fn edits_rerun_only_dependent_stages() {
     folder.write("bark.ppm", &paint("50 150 100"));
     terminal.wait_for_render(renders + 1);
     terminal.wait("reused stages", |screen| {
-        ["4 stages", "4"].iter().any(|count| screen.contents().contains(&messages::cached_stages(count)))
+        ["4 stages", "4"].iter().any(|count| screen.contents().contains(&messages::cached_stage_count(count)))
     });
     assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 cached".to_owned()));
 }

@@ -82,10 +82,10 @@ fn history_shows_images_and_their_changes() {
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
     terminal.wait("the red image", |screen| colors_from(screen, 0)[0] > 500);
-    terminal.wait_for(&messages::render_position(1, 3));
+    terminal.wait_for(&messages::render_number_label(1, 3));
     terminal.wait("its mark", |screen| beside(screen, PANEL.into()).contains("▸1"));
     terminal.press("N");
-    terminal.wait_for(&messages::render_position(2, 3));
+    terminal.wait_for(&messages::render_number_label(2, 3));
     terminal.wait("its change", |screen| {
         words(screen).contains("materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
     });

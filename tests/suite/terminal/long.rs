@@ -47,7 +47,7 @@ fn ignored_checkpoint_is_reported() {
     let folder = with_checkpoint(8);
     folder.write("scene.toml", &scene(3, ""));
     let long = terminal(&folder, &[]);
-    is_fine(&long, &[&glimt::pipeline::messages::too_many_samples_message(3)]);
+    is_fine(&long, &[&glimt::pipeline::messages::oversampled_checkpoint_message(3)]);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "the image must not contain its samples");
     assert!(folder.path("scene.png.checkpoint").exists(), "it has more samples than the image");
     drop(long);

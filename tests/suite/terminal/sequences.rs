@@ -256,7 +256,7 @@ fn external_change_to_image_is_reported() {
     terminal.wait_for_render(1);
     let image = folder.bytes("scene.png");
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
-    terminal.wait_for(&messages::output_changed("scene.png", "was removed"));
+    terminal.wait_for(&messages::output_modified_externally("scene.png", "was removed"));
     terminal.press("w");
     terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), image);

@@ -298,7 +298,11 @@ impl Convergence {
 
     /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the
     /// specified halves of a tile.
-    pub(super) fn predicted_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
+    pub(super) fn predicted_next_reduction(
+        steps: &SquaredMeanChanges,
+        level: usize,
+        halves: &[usize],
+    ) -> f64 {
         expected_variance_reduction(
             Self::variance_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),

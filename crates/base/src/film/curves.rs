@@ -25,9 +25,9 @@ pub(super) fn aces(color: Vec3) -> Vec3 {
 /// 2023). This implementation evaluates the exact sigmoid instead of his polynomial fit. The result is
 /// linearized with a display gamma of 2.2.
 pub(super) fn agx(color: Vec3) -> Vec3 {
-    let inset = apply_color_matrix(&AGX_INSET, color);
+    let inset = apply_gray_preserving_matrix(&AGX_INSET, color);
     let encoded = Vec3::from_array(inset.to_array().map(agx_tone_curve));
-    let outset = clamp(apply_color_matrix(&AGX_OUTSET, encoded));
+    let outset = clamp(apply_gray_preserving_matrix(&AGX_OUTSET, encoded));
     Vec3::from_array(outset.to_array().map(|x| pow(x, 2.2)))
 }
 
@@ -65,7 +65,7 @@ fn agx_sigmoid(x: f32) -> f32 {
 
 /// Applies a matrix with its rows normalized to a sum of 1, so that gray stays gray (the published digits are
 /// off by 1e-4).
-fn apply_color_matrix(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
+fn apply_gray_preserving_matrix(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
     let [a, b, c] = *columns;
     (a * v.x + b * v.y + c * v.z) / (a + b + c)
 }
@@ -95,7 +95,8 @@ mod tests {
     #[test]
     fn agx_matrices_are_inverses() {
         for color in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE] {
-            let back = apply_color_matrix(&AGX_OUTSET, apply_color_matrix(&AGX_INSET, color));
+            let back =
+                apply_gray_preserving_matrix(&AGX_OUTSET, apply_gray_preserving_matrix(&AGX_INSET, color));
             assert!((back - color).abs().max_element() < 1e-3, "{color}: {back}");
         }
     }

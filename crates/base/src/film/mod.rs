@@ -25,15 +25,15 @@ mod sums;
 pub mod tone;
 
 pub use convergence::Convergence;
-pub use noise::{CellHalfNoise, ImageNoise, samples_to_reduce_error};
-pub use pixel_subset::{PixelSubset, Pixels};
+pub use noise::{CellHalfNoise, ImageNoise, total_samples_to_reduce_error};
+pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepass, PREPASS_SAMPLES};
 pub use preview::Previewer;
 pub use quantity::Quantity;
-pub use srgb::linear_to_srgb8;
+pub use srgb::linear_to_srgb8_by_table;
 pub use stored::{Malformed, StoredTile};
 pub use sum_order::{BLOCK_SIZE, SumOrder};
-pub use sums::{Film, FilmError, SampleStats};
+pub use sums::{Film, FilmError, SampleCountStats};
 
 use crate::math::Vec3;
 
@@ -93,21 +93,21 @@ fn intersect_intervals(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
 #[derive(Clone, Debug)]
 pub struct TileSamples {
     /// Sampled pixels.
-    pub pixels: Pixels,
+    pub pixels: SelectedPixels,
     /// Samples per pixel.
     pub samples: u32,
     /// `pixels.count() · samples` radiances, at positions drawn in proportion to the pixel filter's absolute
     /// value.
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
-    pub negative: Option<NegativeLobes>,
+    pub negative: Option<NegativeLobeSamples>,
 }
 
 /// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other
 /// samples − `weight` · mean of the samples in negative lobes. A constant image therefore stays constant
 /// regardless of the sample positions.
 #[derive(Clone, Debug)]
-pub struct NegativeLobes {
+pub struct NegativeLobeSamples {
     /// Weight of the negative lobes: −∫min(f, 0)/∫f for the filter f.
     pub weight: f64,
     /// Whether each sample is in a negative lobe.

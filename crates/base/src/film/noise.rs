@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::convergence::{Convergence, luminance};
-use super::{CELLS, Film, PixelSubset, Pixels, is_in_thread_pool};
+use super::{CELLS, Film, PixelSubset, SelectedPixels, is_in_thread_pool};
 
 /// Sample count at which the standard error drops to `part` times its value at `count` samples, if the
 /// variance falls with this power of the sample count.
-pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
+pub fn total_samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
@@ -154,7 +154,7 @@ impl Film {
 
     /// Noise in one half of every cell in a tile. `None` under the same conditions as
     /// [`Film::cell_half_noise`].
-    pub fn tile_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
+    pub fn tile_half_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.half_pixel_count(cell, half) as f64;
@@ -196,7 +196,7 @@ impl Film {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = PixelSubset::Half(half);
         tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
-            let place = move |number| Pixels { rect, part }.position(number);
+            let place = move |number| SelectedPixels { rect, part }.position(number);
             let index = move |(x, y): (u32, u32)| ((y - tile.y) * tile.width + x - tile.x) as usize;
             (0..part.count(rect.area()) as u32).map(move |number| index(place(number)))
         })

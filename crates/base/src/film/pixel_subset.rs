@@ -5,20 +5,20 @@ use super::Rect;
 
 /// A subset of a rectangle's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pixels {
+pub struct SelectedPixels {
     /// The enclosing rectangle.
     pub rect: Rect,
     /// The selected half, or all pixels.
     pub part: PixelSubset,
 }
 
-impl From<Rect> for Pixels {
+impl From<Rect> for SelectedPixels {
     fn from(rect: Rect) -> Self {
         Self { rect, part: PixelSubset::All }
     }
 }
 
-impl Pixels {
+impl SelectedPixels {
     /// Number of selected pixels.
     pub fn count(&self) -> usize {
         self.part.count(self.rect.area())
@@ -27,7 +27,7 @@ impl Pixels {
     /// Image column and row of the selected pixel `number`.
     #[inline]
     pub fn position(&self, number: u32) -> (u32, u32) {
-        let index = self.part.index(number, self.rect);
+        let index = self.part.index_in_rect(number, self.rect);
         (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)
     }
 }
@@ -53,7 +53,7 @@ impl PixelSubset {
 
     /// Row-major index, within the rectangle, of the selected pixel `number`.
     #[inline(always)]
-    pub fn index(self, number: u32, rect: Rect) -> u32 {
+    pub fn index_in_rect(self, number: u32, rect: Rect) -> u32 {
         match self {
             Self::All => number,
             // If the area is odd, the last pixel belongs to the first half.
@@ -87,7 +87,7 @@ mod tests {
             let rect = Rect { x: 3, y: 8, width, height };
             let mut seen = vec![0; rect.area()];
             for half in 0..2 {
-                let pixels = Pixels { rect, part: PixelSubset::Half(half) };
+                let pixels = SelectedPixels { rect, part: PixelSubset::Half(half) };
                 for number in 0..pixels.count() as u32 {
                     let (x, y) = pixels.position(number);
                     let index = (y - 8) * width + x - 3;

@@ -55,7 +55,7 @@ impl BrightnessPrepass {
 
     /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film. `None` if
     /// there are no samples.
-    pub fn sample_luminance(mut samples: TileSamples) -> Option<f64> {
+    pub fn pixel_luminance(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
         let film = Film::new(1, 1, None).ok()?;
@@ -101,7 +101,7 @@ mod tests {
         let prepass = BrightnessPrepass::new(crop);
         let apart = prepass.mean_luminance(|number| {
             let (x, y) = prepass.position(number);
-            BrightnessPrepass::sample_luminance(samples(Rect { x, y, width: 1, height: 1 }))
+            BrightnessPrepass::pixel_luminance(samples(Rect { x, y, width: 1, height: 1 }))
         });
         assert_eq!(prepass.film_mean_luminance(&film), apart);
         assert!(

@@ -101,7 +101,12 @@ impl Previewer {
         let mut looked = 0;
         while looked < self.shares.len() {
             let end = (self.next + at_once).min(self.shares.len());
-            refresh(&mut self.shares[self.next..end], self.next, (film, self.quantity), axes);
+            refresh_tile_contributions(
+                &mut self.shares[self.next..end],
+                self.next,
+                (film, self.quantity),
+                axes,
+            );
             looked += end - self.next;
             self.next = if end == self.shares.len() { 0 } else { end };
             self.is_whole |= self.next == 0;
@@ -143,7 +148,7 @@ impl Previewer {
 }
 
 /// Updates the contributions of consecutive tiles, starting with tile `first`.
-fn refresh(
+fn refresh_tile_contributions(
     shares: &mut [TileContribution],
     first: usize,
     (film, quantity): (&Film, Quantity),

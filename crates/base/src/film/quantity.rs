@@ -90,7 +90,7 @@ impl Tile {
             }
         }
         let variance = if count > 1 && pixels > 0 {
-            let rate = Convergence::predicted_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
+            let rate = Convergence::predicted_next_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
             pixel_variance(sum / f64::from(pixels), count, rate)
         } else {
             0.0

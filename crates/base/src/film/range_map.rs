@@ -32,7 +32,7 @@ pub struct DataRange {
     pub least: f32,
     /// Largest value in view.
     pub greatest: f32,
-    /// Bias b of the curve between `least` and `greatest`; see [`DataRange::fraction_in_range`].
+    /// Bias b of the curve between `least` and `greatest`; see [`DataRange::position_in_range`].
     bias: f32,
 }
 
@@ -69,7 +69,7 @@ impl RangeMap {
             Self::None => numbers,
             Self::Unresolved(_) => Vec3::ZERO,
             Self::Resolved(DataKind::Distances, range) => each(&|x| range.distance_brightness(x)),
-            Self::Resolved(DataKind::Amounts, range) => each(&|x| range.fraction_in_range(x)),
+            Self::Resolved(DataKind::Amounts, range) => each(&|x| range.position_in_range(x)),
         }
     }
 }
@@ -91,7 +91,7 @@ impl DataRange {
         }
         let middle = seen.len() / 2;
         let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
-        let place = linear.fraction_in_range(median);
+        let place = linear.position_in_range(median);
         let bias = (1.0 - QUARTER) / QUARTER * place / (1.0 - place).max(f32::MIN_POSITIVE);
         Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
     }
@@ -105,7 +105,7 @@ impl DataRange {
     /// quarter of the range. Otherwise uses the curve x/(x + b(1 − x)), which maps the median to the end of
     /// the first quarter (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
     /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
-    fn fraction_in_range(&self, number: f32) -> f32 {
+    fn position_in_range(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
@@ -116,7 +116,7 @@ impl DataRange {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
         }
-        1.0 - (1.0 - DARKEST) * self.fraction_in_range(distance)
+        1.0 - (1.0 - DARKEST) * self.position_in_range(distance)
     }
 }
 

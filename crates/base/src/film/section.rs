@@ -6,7 +6,12 @@ use crate::math::Vec3;
 impl Film {
     /// Copies a rectangle of pixels without scaling. Pixels without samples show `base` (a full image of any
     /// size), or black if there is no base.
-    pub fn copy_region(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
+    pub fn cropped_image(
+        &self,
+        quantity: Quantity,
+        rect: Rect,
+        base: Option<&RadianceImage>,
+    ) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
             self.fill_from_base(base, rect, &mut image);
@@ -21,7 +26,7 @@ impl Film {
                     let at = (y - place.y) as usize * columns + (x - place.x) as usize;
                     let value = tile.value(quantity, (at, columns));
                     if let Some(value) = value {
-                        image.pixels[index_in(rect, x, y)] = value.as_vec3();
+                        image.pixels[pixel_index_in_rect(rect, x, y)] = value.as_vec3();
                     }
                 }
             }
@@ -35,13 +40,13 @@ impl Film {
             let row = at(y, self.height(), base.height) as usize * base.width as usize;
             for x in rect.x..rect.x + rect.width {
                 let pixel = base.pixels.get(row + at(x, self.width(), base.width) as usize);
-                image.pixels[index_in(rect, x, y)] = pixel.copied().unwrap_or(Vec3::ZERO);
+                image.pixels[pixel_index_in_rect(rect, x, y)] = pixel.copied().unwrap_or(Vec3::ZERO);
             }
         }
     }
 }
 
-fn index_in(rect: Rect, x: u32, y: u32) -> usize {
+fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> usize {
     (y - rect.y) as usize * rect.width as usize + (x - rect.x) as usize
 }
 
@@ -63,7 +68,7 @@ mod tests {
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };
         let rect = Rect { x: 20, y: 11, width: 60, height: 50 };
-        let section = film.copy_region(Quantity::Radiance, rect, Some(&base));
+        let section = film.cropped_image(Quantity::Radiance, rect, Some(&base));
         for (i, pixel) in (0..).zip(&section.pixels) {
             let (x, y) = (rect.x + i % rect.width, rect.y + i / rect.width);
             let below = if x < 50 { Vec3::X } else { Vec3::Y };

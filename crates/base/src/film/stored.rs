@@ -52,7 +52,7 @@ impl StoredTile {
     ///
     /// # Errors
     /// [`Malformed`] if the tiles differ in size or the block does not exist.
-    pub fn add_block(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
+    pub fn add_block_from(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
             self.tile.resize(area);
@@ -77,7 +77,7 @@ impl StoredTile {
     }
 
     /// Adds a tile's sample counts after its blocks have been added.
-    pub fn add_counts(&mut self, of: &Self) {
+    pub fn add_counts_from(&mut self, of: &Self) {
         self.tile.counts.iter_mut().zip(&of.tile.counts).for_each(|(own, other)| *own += other);
         if let (Some(own), Some(other)) = (&mut self.tile.negative, &of.tile.negative) {
             own.counts.iter_mut().zip(&other.counts).for_each(|(own, other)| *own += other);
@@ -110,11 +110,11 @@ impl Film {
             put(bytes, count as u32);
         }
         put_sums(bytes, &tile.sums, &tile.earlier);
-        put_all(bytes, tile.counts.iter().map(|count| count.to_le_bytes()));
+        append_numbers(bytes, tile.counts.iter().map(|count| count.to_le_bytes()));
         if let Some(negative) = &tile.negative {
             bytes.extend_from_slice(&negative.weight.to_bits().to_le_bytes());
             put_sums(bytes, &negative.sums, &negative.earlier);
-            put_all(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
+            append_numbers(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
         tile.steps.write_words(&mut |word| put(bytes, word));
         true
@@ -138,12 +138,12 @@ impl Film {
     }
 
     /// Samples per pixel in one half of a cell, or 0 if the half has no pixels.
-    pub fn cell_half_samples(&self, cell: usize, half: usize) -> u32 {
+    pub fn cell_half_samples_per_pixel(&self, cell: usize, half: usize) -> u32 {
         let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
         if PixelSubset::Half(half).count(rect.area()) == 0 {
             return 0;
         }
-        let index = PixelSubset::Half(half).index(0, rect);
+        let index = PixelSubset::Half(half).index_in_rect(0, rect);
         let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
         self.lock_tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
@@ -160,7 +160,7 @@ fn put(bytes: &mut Vec<u8>, word: u32) {
 
 fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
     for sums in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)) {
-        put_all(
+        append_numbers(
             bytes,
             sums.iter().map(|sum| {
                 let mut number = [0; 24];
@@ -176,7 +176,7 @@ fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
 }
 
 /// Appends numbers of `N` bytes each. Resizing once is much faster than appending them one at a time.
-fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
+fn append_numbers<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
     let start = bytes.len();
     bytes.resize(start + N * numbers.len(), 0);
     for (place, number) in bytes[start..].chunks_exact_mut(N).zip(numbers) {
@@ -219,7 +219,7 @@ impl ByteReader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{BLOCK_SIZE, NegativeLobes, Rect, SumOrder, TileSamples};
+    use crate::film::{BLOCK_SIZE, NegativeLobeSamples, Rect, SumOrder, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -238,7 +238,7 @@ mod tests {
                     }
                 }
             }
-            let negative = is_signed.then_some(NegativeLobes { weight: 0.1, is_negative });
+            let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
             let samples = range.end - range.start;
             film.add_samples(tile, &TileSamples { pixels: rect.into(), samples, radiance, negative });
         }
@@ -271,7 +271,10 @@ mod tests {
                 let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
                 second.restore_tile(tile, read).expect("the tile should fit the film");
             }
-            assert_eq!((second.cell_half_samples(0, 1), second.cell_half_samples(1, 0)), (21, 21));
+            assert_eq!(
+                (second.cell_half_samples_per_pixel(0, 1), second.cell_half_samples_per_pixel(1, 0)),
+                (21, 21)
+            );
             add(&second, 21..37, is_signed);
             assert_eq!(second.radiance().pixels, whole.radiance().pixels);
             assert_eq!(second.image_noise(), whole.image_noise());
@@ -298,13 +301,13 @@ mod tests {
                     [&outer, &inner].map(|of| StoredTile::read(&stored(of, tile), area).expect("a tile"));
                 let mut sum = StoredTile::default();
                 for (of, block) in [(&outer, 0), (&inner, 0), (&outer, 1)] {
-                    sum.add_block(of, block).expect("a block");
+                    sum.add_block_from(of, block).expect("a block");
                 }
-                [&outer, &inner].into_iter().for_each(|of| sum.add_counts(of));
+                [&outer, &inner].into_iter().for_each(|of| sum.add_counts_from(of));
                 merged.restore_tile(tile, sum).expect("a tile");
             }
             assert_eq!(merged.radiance().pixels, whole.radiance().pixels);
-            assert_eq!(merged.sample_stats(), whole.sample_stats());
+            assert_eq!(merged.sample_count_stats(), whole.sample_count_stats());
         }
     }
 

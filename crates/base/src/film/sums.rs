@@ -57,7 +57,7 @@ fn remedy(crop_helps: bool) -> &'static str {
 
 /// Range and mean of the sample counts per pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampleStats {
+pub struct SampleCountStats {
     /// Minimum over all pixels.
     pub min: u32,
     /// Mean over all pixels.
@@ -192,7 +192,7 @@ impl Tile {
                 self.steps.record((index, cell, half), self.counts[index], luminance(mean));
             }
             if blocks != SumOrder::Sequential {
-                self.close_block(index, blocks);
+                self.close_block_if_complete(index, blocks);
             }
         }
         non_finite
@@ -338,12 +338,12 @@ impl Film {
         let count = samples.samples as usize;
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = samples.pixels.position(i as u32);
-            let Some(index) = index_in(rect, x, y) else { continue };
+            let Some(index) = pixel_index_in_rect(rect, x, y) else { continue };
             let (cell, inside) = cell_at(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
-            let half =
-                index_in(inside, x, y).map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
+            let half = pixel_index_in_rect(inside, x, y)
+                .map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
             non_finite += tile.add_samples((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;
@@ -352,7 +352,7 @@ impl Film {
     }
 
     /// Minimum, mean and maximum number of samples per pixel in the crop.
-    pub fn sample_stats(&self) -> SampleStats {
+    pub fn sample_count_stats(&self) -> SampleCountStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {
             let tile = lock(tile);
@@ -365,7 +365,7 @@ impl Film {
                 total += u64::from(count);
             }
         }
-        SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
+        SampleCountStats { min, mean: total as f64 / self.crop.area() as f64, max }
     }
 
     /// Number of samples with a NaN or an infinity, which were treated as black.
@@ -388,7 +388,7 @@ fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
     tile.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
+fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
     let (x, y) = (x.checked_sub(rect.x)?, y.checked_sub(rect.y)?);
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }

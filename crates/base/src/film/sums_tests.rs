@@ -31,7 +31,7 @@ fn image_bits(image: &RadianceImage) -> Vec<[u32; 3]> {
 fn pixel_samples(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
-    index_in(rect, x, y).map_or(0, |index| film.lock_tile(tile).count(index))
+    pixel_index_in_rect(rect, x, y).map_or(0, |index| film.lock_tile(tile).count(index))
 }
 
 fn film_after_passes(passes: &[u32]) -> Film {
@@ -58,7 +58,7 @@ fn sample_grouping_does_not_change_bits() {
         let film = film_after_passes(passes);
         assert_eq!(sum_bits(&film), sum_bits(&at_once), "{passes:?}");
         assert_eq!(image_bits(&film.radiance()), image_bits(&at_once.radiance()), "{passes:?}");
-        assert_eq!(film.sample_stats(), SampleStats { min: 24, mean: 24.0, max: 24 });
+        assert_eq!(film.sample_count_stats(), SampleCountStats { min: 24, mean: 24.0, max: 24 });
     }
 }
 
@@ -115,7 +115,7 @@ fn pixel_means_and_counts_are_correct() {
     assert_eq!(image.pixels.iter().filter(|p| **p != Vec3::ZERO).count(), 2);
     assert_eq!((pixel_samples(&film, 3, 1), pixel_samples(&film, 39, 1)), (3, 1));
     assert_eq!((pixel_samples(&film, 3, 0), pixel_samples(&film, 39, 0)), (0, 0));
-    assert_eq!(film.sample_stats(), SampleStats { min: 0, mean: 4.0 / 80.0, max: 3 });
+    assert_eq!(film.sample_count_stats(), SampleCountStats { min: 0, mean: 4.0 / 80.0, max: 3 });
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn snapshots_are_consistent_during_rendering() {
                                 tile,
                                 &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
                             );
-                            assert!(film.sample_stats().max <= pass + 9);
+                            assert!(film.sample_count_stats().max <= pass + 9);
                         }
                     }
                 })
@@ -211,7 +211,7 @@ fn snapshots_are_consistent_during_rendering() {
         }
         done.store(true, Ordering::Release);
     });
-    assert_eq!(film.sample_stats(), SampleStats { min: 8, mean: 8.0, max: 8 });
+    assert_eq!(film.sample_count_stats(), SampleCountStats { min: 8, mean: 8.0, max: 8 });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::range_map::RangeMap;
-use super::{RadianceImage, Srgb8Image, Srgb16Image, curves, is_in_thread_pool, linear_to_srgb8};
+use super::{RadianceImage, Srgb8Image, Srgb16Image, curves, is_in_thread_pool, linear_to_srgb8_by_table};
 use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
@@ -93,7 +93,7 @@ impl ToneMapping {
 /// Converts an image to 8 bits per channel.
 pub fn tone_map_to_8_bits(image: &RadianceImage, tone: &ToneMapping) -> Srgb8Image {
     let pixels = match tone.transfer {
-        Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8)),
+        Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8_by_table)),
         Transfer::Identity => {
             map_pixels(image, tone, |color| color.to_array().map(|x| (x * 255.0 + 0.5) as u8))
         }
@@ -261,7 +261,7 @@ mod tests {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         let developed = pool.install(|| tone_map_to_8_bits(&image, &mapping)).pixels;
         for (pixel, &radiance) in developed.iter().zip(&image.pixels) {
-            assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8));
+            assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8_by_table));
         }
     }
 }

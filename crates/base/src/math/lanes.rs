@@ -61,7 +61,7 @@ pub trait Simd: Copy {
 
     /// Runs a kernel in a separate function shared by all callers. Use this if the call overhead is small
     /// compared with the kernel and inlined copies would bloat the binary.
-    fn call<L: SimdKernel>(self, work: L) -> L::Output;
+    fn call_out_of_line<L: SimdKernel>(self, work: L) -> L::Output;
 }
 
 /// Reduces 16 numbers by repeatedly combining the two halves, which compiles to vector instructions.
@@ -130,7 +130,7 @@ impl Simd for PortableSimd {
     }
 
     #[inline(never)]
-    fn call<L: SimdKernel>(self, work: L) -> L::Output {
+    fn call_out_of_line<L: SimdKernel>(self, work: L) -> L::Output {
         work.run(self)
     }
 }

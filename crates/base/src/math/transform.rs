@@ -53,7 +53,7 @@ impl Transform {
     }
 
     /// Transforms upper bounds on the magnitudes of a vector's components.
-    pub fn abs_bound(&self, reach: DVec3) -> DVec3 {
+    pub fn transform_abs_bound(&self, reach: DVec3) -> DVec3 {
         let DMat3 { x_axis, y_axis, z_axis } = self.linear;
         x_axis.abs() * reach.x + y_axis.abs() * reach.y + z_axis.abs() * reach.z
     }

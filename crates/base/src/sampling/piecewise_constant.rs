@@ -97,7 +97,7 @@ fn append_cumulative_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
 fn guide_table(sums: &[f32]) -> impl Iterator<Item = u32> {
     let (count, mut place) = (sums.len() - 1, 0);
     (0..count).map(move |part| {
-        place = last_interval_from(sums, place, part as f32 / count as f32);
+        place = find_interval_forward(sums, place, part as f32 / count as f32);
         place as u32
     })
 }
@@ -105,7 +105,7 @@ fn guide_table(sums: &[f32]) -> impl Iterator<Item = u32> {
 /// Finds the last interval that starts at or before `u`, searching forward from `place`. It is usually
 /// `place` or the next interval, so the first two steps avoid unpredictable branches.
 #[inline(always)]
-fn last_interval_from(sums: &[f32], mut place: usize, u: f32) -> usize {
+fn find_interval_forward(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
         let next = (place + 1).min(sums.len() - 2);
         place = if sums[next] <= u { next } else { place };
@@ -121,7 +121,7 @@ fn last_interval_from(sums: &[f32], mut place: usize, u: f32) -> usize {
 fn find_interval(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
     // Rounding may select the part after the correct part, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
-    let first = last_interval_from(sums, guide[part] as usize, u);
+    let first = find_interval_forward(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
     const LAST: f32 = 1.0_f32.next_down();
     (first, if rest < LAST { rest } else { LAST })

@@ -29,7 +29,7 @@ fn entry_names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsS
 ///
 /// # Errors
 /// Returns an error if the folder or any of its contents cannot be removed.
-pub fn remove_all(folder: &Path) -> io::Result<()> {
+pub fn remove_folder_and_contents(folder: &Path) -> io::Result<()> {
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = folder.file_name().ok_or(io::ErrorKind::InvalidInput)?;
     remove_folder(File::open(parent)?.as_fd(), name)
@@ -69,10 +69,13 @@ mod tests {
         let mut listed: Vec<_> = entry_names(&at("tree/a")).expect("listed").collect();
         listed.sort();
         assert_eq!(listed, ["2", "b", "link"]);
-        remove_all(&at("tree")).expect("removed");
+        remove_folder_and_contents(&at("tree")).expect("removed");
         assert_eq!(entry_names(folder.path()).expect("listed").collect::<Vec<_>>(), ["kept"]);
         assert!(at("kept/4").exists());
-        assert!(remove_all(&at("tree")).is_err() && remove_all(&at("kept/4")).is_err());
+        assert!(
+            remove_folder_and_contents(&at("tree")).is_err()
+                && remove_folder_and_contents(&at("kept/4")).is_err()
+        );
         assert!(entry_names(&at("none")).is_err());
     }
 }

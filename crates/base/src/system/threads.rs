@@ -46,14 +46,14 @@ pub fn core_pool() -> std::result::Result<ThreadPool, String> {
 /// # Errors
 /// Returns the system's out-of-memory error if the stacks do not fit.
 pub fn check_stack_space(threads: usize) -> Result<()> {
-    match exhausted_limit(threads) {
+    match exhausted_stack_limit(threads) {
         Some(_) => Err(Error::from_raw_os_error(nix::libc::ENOMEM)),
         None => Ok(()),
     }
 }
 
 /// Setting whose limit leaves no room for the stacks of `threads` more threads.
-fn exhausted_limit(threads: usize) -> Option<&'static str> {
+fn exhausted_stack_limit(threads: usize) -> Option<&'static str> {
     memory::exhausted_limit((threads as u64).saturating_mul(STACK_BYTES))
 }
 
@@ -62,7 +62,7 @@ fn exhausted_limit(threads: usize) -> Option<&'static str> {
 pub fn describe_start_failure(threads: usize, has_threads_option: bool, error: &impl Display) -> String {
     let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
     let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };
-    match exhausted_limit(threads) {
+    match exhausted_stack_limit(threads) {
         Some(setting) => {
             format!("out of memory: cannot start {what}; {fewer}raise the memory limit ({setting})")
         }

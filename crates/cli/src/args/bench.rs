@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::{
-    CLAMP, ProgressMode, Switch, candidates, choice_long_help, choice_parser, parse_integer_in_range,
-    parse_niceness, parse_positive_seconds, parse_thread_count, parse_u32, render_integer_parser,
-    render_number_parser,
+    CLAMP, ProgressMode, Switch, candidates, choice_long_help, choice_parser, integer_override_parser,
+    number_override_parser, parse_integer_in_range, parse_niceness, parse_positive_seconds,
+    parse_thread_count, parse_u32,
 };
 use crate::scene::description::{Accel, Integrator, ShadowMode};
 use crate::tui::ColorChoice;
@@ -46,7 +46,7 @@ pub struct BenchArgs {
     pub baseline: Option<PathBuf>,
 
     /// Sample counts per pixel to measure, such as 1,4,16
-    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = integer_override_parser("samples"), help_heading = "Measurement")]
     pub samples: Vec<u32>,
     /// Render times to measure instead, such as 0.1,0.5,2
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = parse_positive_seconds, conflicts_with = "samples", help_heading = "Measurement")]
@@ -58,10 +58,10 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_u32, default_value = "1", help_heading = "Measurement")]
     pub seed: u32,
     /// Width in pixels [default: 96 on the longer side]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("width"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("width"), help_heading = "Measurement")]
     pub width: Option<u32>,
     /// Height in pixels
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("height"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
     /// Time limit if neither --samples nor --time is used
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = parse_positive_seconds, default_value = "240", help_heading = "Measurement")]
@@ -74,7 +74,7 @@ pub struct BenchArgs {
     /// Samples per pixel of each reference
     ///
     /// By default, as many as fit in the available time, up to 100 times the largest --samples.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("samples"), help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
     /// Folder for cached references
     #[arg(long, value_name = "FOLDER", help_heading = "Measurement")]
@@ -93,7 +93,7 @@ pub struct BenchArgs {
     #[arg(long, value_delimiter = ',', value_parser = choice_parser::<ShadowMode>(), hide_possible_values = true, long_help = choice_long_help::<ShadowMode>("Shadows, in whitted"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub shadows: Vec<ShadowMode>,
     /// Limits on indirect radiance per bounce; 0 disables the limit
-    #[arg(long, value_delimiter = ',', value_parser = render_number_parser("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
+    #[arg(long, value_delimiter = ',', value_parser = number_override_parser("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
     pub clamp: Vec<f32>,
     /// Acceleration structures: bvh, bvh-high, kdtree
     #[arg(long, value_delimiter = ',', value_parser = choice_parser::<Accel>(), hide_possible_values = true, long_help = choice_long_help::<Accel>("Acceleration structures"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
@@ -103,7 +103,7 @@ pub struct BenchArgs {
     #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
     /// Maximum bounces per path
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = render_integer_parser("max_depth"), help_heading = "All images and references")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("max_depth"), help_heading = "All images and references")]
     pub max_depth: Option<u32>,
     /// Depth of field, if the camera has an aperture
     #[arg(long, value_parser = choice_parser::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "All images and references")]

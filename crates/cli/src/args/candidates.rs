@@ -9,7 +9,7 @@ use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathComplete
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names, documented_paths};
 use crate::scene::outline::{OutlineTable, outline};
-use crate::scene::{is_mesh, read_current_text};
+use crate::scene::{has_mesh_extension, read_current_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -31,7 +31,7 @@ pub(crate) fn scene_completer() -> ArgValueCompleter {
 
 /// Completes scenes and models.
 pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
-    ArgValueCompleter::new(PathCompleter::file().filter(|path| is_scene(path) || is_mesh(path)))
+    ArgValueCompleter::new(PathCompleter::file().filter(|path| is_scene(path) || has_mesh_extension(path)))
 }
 
 /// Completes glTF files.
@@ -81,7 +81,7 @@ fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     let keys = outline.iter().flat_map(of).chain(of_absent);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
         key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
-            named_values(key.kind, &outline)
+            suggest_values(key.kind, &outline)
         })
     };
     let of_type = |table: &OutlineTable| {
@@ -117,7 +117,7 @@ fn key_or_value_candidates(
 }
 
 /// Returns the named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
-fn named_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
+fn suggest_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
         ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),

@@ -63,7 +63,7 @@ fn method_change(
 ) -> Option<MethodChange> {
     let pairs = now.steps.iter().filter_map(|step| Some((matching_step(step, &then.steps)?, step)));
     let differences: Vec<(f64, f64, f64)> =
-        pairs.filter_map(|(old, new)| log_difference(old, new, quantity)).collect();
+        pairs.filter_map(|(old, new)| estimate_log_difference(old, new, quantity)).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().map(|(difference, ..)| difference).sum::<f64>() / count;
     let variances = || differences.iter().map(|(_, error, freedom)| (error * error, freedom));
@@ -98,7 +98,11 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
 
 /// Difference between two steps' mean log times or mean log errors, with its standard error and degrees of
 /// freedom. `None` if a step has fewer than two positive values.
-fn log_difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
+fn estimate_log_difference(
+    then: &StepResult,
+    now: &StepResult,
+    quantity: Quantity,
+) -> Option<(f64, f64, f64)> {
     let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {
             Quantity::Seconds => picture.seconds,

@@ -17,7 +17,7 @@ pub const MIN_SEEDS: usize = 3;
 
 /// Estimated squared bias of a method, with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Bias {
+pub struct SquaredBias {
     /// Squared bias, as a contribution to relMSE. May be negative due to noise.
     pub size: f64,
     /// Standard error of `size`.
@@ -28,7 +28,7 @@ pub struct Bias {
     pub bound: f64,
 }
 
-impl Bias {
+impl SquaredBias {
     /// Whether the bias is significant.
     pub fn is_significant(&self) -> bool {
         self.by_chance < FALSE_POSITIVE_RATE
@@ -36,18 +36,18 @@ impl Bias {
 }
 
 /// Estimates the bias from images with different seeds. `None` for fewer than [`MIN_SEEDS`].
-pub fn estimate_bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bias> {
+pub fn estimate_bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<SquaredBias> {
     if pictures.len() < MIN_SEEDS {
         return None;
     }
     let pairs = PairwiseErrorProducts::from_images(references, pictures);
-    let by_references = references.uncertainty(&mean_image(pictures));
+    let by_references = references.relmse_standard_error(&mean_image(pictures));
     let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
     let by_chance =
         if error > 0.0 { student_t_tail(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
-    Some(Bias {
+    Some(SquaredBias {
         size,
         error,
         by_chance,
@@ -144,7 +144,7 @@ mod tests {
             picture
         }
 
-        fn found(&mut self, seeds: usize, offset: f32, block: u32) -> Bias {
+        fn found(&mut self, seeds: usize, offset: f32, block: u32) -> SquaredBias {
             let names = [Path::new("r1"), Path::new("r2")];
             let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
             let references = TwoReferences::new(pair.expect("a pair"));
@@ -184,7 +184,7 @@ mod tests {
     fn standard_error_matches_repeated_trials() {
         let mut noise = Noise(11);
         for offset in [0.0, 0.04] {
-            let tries: Vec<Bias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
+            let tries: Vec<SquaredBias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
             let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
             let (_, error) = super::super::statistics::mean_and_standard_error(&sizes);
             let actual = error * (sizes.len() as f64).sqrt();

@@ -45,7 +45,7 @@ pub fn compare_brightness(
     let (of_pictures, freedom) = if are_pixels_independent {
         // Estimate the noise from all pixels, not just from a few seeds.
         (
-            mean_luminance_error(pictures) / references.mean_luminance(),
+            mean_luminance_standard_error(pictures) / references.mean_luminance(),
             seeds * pictures[0].pixels.len() as f64,
         )
     } else {
@@ -61,7 +61,7 @@ pub fn compare_brightness(
 }
 
 /// Standard error of the images' mean luminance, from the variance of each pixel.
-fn mean_luminance_error(pictures: &[RadianceImage]) -> f64 {
+fn mean_luminance_standard_error(pictures: &[RadianceImage]) -> f64 {
     let count = pictures.len() as f64;
     let weights: DVec3 = LUMINANCE_WEIGHTS.as_dvec3();
     let pixels = pictures[0].pixels.len();

@@ -66,7 +66,7 @@ fn create_folder(folder: &Path) -> Result<(), OutputError> {
 
 /// Two references and their cost.
 #[derive(Clone, Debug)]
-pub(super) struct CachedReferences {
+pub(super) struct ReferencesWithCost {
     pub(super) pair: Pair,
     pub(super) cost: ReferenceCost,
 }
@@ -91,10 +91,10 @@ struct CacheHeader {
 const KEY_BYTES: usize = 64;
 
 /// Loads the references stored under a key. `None` if the file is missing or damaged.
-pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<CachedReferences> {
+pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCost> {
     let bytes = fs::read(cache_file_path(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
-    if content_checksum(content).as_bytes() != seal {
+    if integrity_checksum(content).as_bytes() != seal {
         return None;
     }
     let end = content.iter().position(|byte| *byte == b'\n')?;
@@ -109,14 +109,18 @@ pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<CachedReferences>
     }
     let image = |pixels: &[Vec3]| RadianceImage { width, height, pixels: pixels.to_vec() };
     let pair = Pair::new([folder, folder], image(&pixels[..count]), image(&pixels[count..])).ok()?;
-    Some(CachedReferences { pair, cost })
+    Some(ReferencesWithCost { pair, cost })
 }
 
 /// Stores references under a key.
 ///
 /// # Errors
 /// The folder cannot be created or the file cannot be written.
-pub(super) fn store(folder: &Path, key: &Fingerprint, stored: &CachedReferences) -> Result<(), OutputError> {
+pub(super) fn store(
+    folder: &Path,
+    key: &Fingerprint,
+    stored: &ReferencesWithCost,
+) -> Result<(), OutputError> {
     let path = cache_file_path(folder, key);
     create_folder(folder)?;
     let (a, b) = (stored.pair.a(), stored.pair.b());
@@ -127,7 +131,7 @@ pub(super) fn store(folder: &Path, key: &Fingerprint, stored: &CachedReferences)
     for pixel in a.pixels.iter().chain(&b.pixels) {
         pixel.to_array().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
-    let seal = content_checksum(&bytes);
+    let seal = integrity_checksum(&bytes);
     bytes.extend(seal.as_bytes());
     let may_replace = |real: &Path| {
         if is_replaceable(real) { Ok(()) } else { Err(foreign_file_error(&path, "a reference")) }
@@ -138,7 +142,7 @@ pub(super) fn store(folder: &Path, key: &Fingerprint, stored: &CachedReferences)
         sweep: None,
         losses: AttributeLossPolicy::Report(&|_| ()),
     };
-    write::atomic_guarded(&path, &bytes, &guard, &CancelToken::new())
+    write::atomic_with_policy(&path, &bytes, &guard, &CancelToken::new())
 }
 
 /// Whether a file may be replaced because it is missing, empty or a (possibly damaged) cached reference.
@@ -151,7 +155,7 @@ fn is_replaceable(path: &Path) -> bool {
     is_read && (start.is_empty() || serde_json::from_slice::<CacheHeader>(line).is_ok())
 }
 
-fn content_checksum(content: &[u8]) -> String {
+fn integrity_checksum(content: &[u8]) -> String {
     FingerprintHasher::new("references").add_bytes(content).finish().to_string()
 }
 
@@ -163,11 +167,11 @@ fn cache_file_path(folder: &Path, key: &Fingerprint) -> PathBuf {
 mod tests {
     use super::*;
 
-    fn stored() -> CachedReferences {
+    fn stored() -> ReferencesWithCost {
         let image =
             |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
-        CachedReferences { pair, cost: ReferenceCost { samples: 12.5, seconds: 3.25 } }
+        ReferencesWithCost { pair, cost: ReferenceCost { samples: 12.5, seconds: 3.25 } }
     }
 
     #[test]
@@ -229,7 +233,7 @@ mod tests {
             assert!(load(folder.path(), &key).is_none(), "flipped a bit in byte {place}");
         }
         let lie = b"{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\n".to_vec();
-        fs::write(&path, [lie.clone(), content_checksum(&lie).into_bytes()].concat()).expect("written");
+        fs::write(&path, [lie.clone(), integrity_checksum(&lie).into_bytes()].concat()).expect("written");
         assert!(load(folder.path(), &key).is_none(), "fewer pixels than specified in the header");
     }
 }

@@ -105,7 +105,7 @@ impl MethodRun<'_> {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.report_image(aim, number, budget, took, &pictures);
             let RenderedImage { image, report, .. } = self.render(session, seed, aim)?;
-            let relmse = self.two.error(&image);
+            let relmse = self.two.unbiased_relmse(&image);
             are_pixels_independent &= report.photons.is_none();
             if !relmse.is_finite() {
                 let name = &self.method.name;
@@ -124,7 +124,7 @@ impl MethodRun<'_> {
         let brightness = compare_brightness(self.two, &images, are_pixels_independent);
         let step = StepResult { brightness, ..summarize_step(aim, pictures, &images, self.two) };
         let (name, seconds) = (&self.method.name, words::format_seconds(step.seconds));
-        self.run.report_done(&format!(
+        self.run.report_task_done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
             format_samples(step.samples),
             format_error(step.relmse)
@@ -155,10 +155,12 @@ impl MethodRun<'_> {
         };
         let remaining = f64::from(order.seeds - number);
         let left = each.map(|each| {
-            budget
-                .seconds_left(each * (remaining + f64::from(order.seeds) * self.later_steps_time(aim)), false)
+            budget.seconds_left(
+                each * (remaining + f64::from(order.seeds) * self.later_steps_time_ratio(aim)),
+                false,
+            )
         });
-        self.run.report_begin(&what, left);
+        self.run.report_task_begin(&what, left);
     }
 
     /// Returns the expected ratio of this step's time to the previous step's time.
@@ -172,7 +174,7 @@ impl MethodRun<'_> {
     }
 
     /// Returns the expected total time of all later steps, as a multiple of this step's time.
-    fn later_steps_time(&self, aim: StepTarget) -> f64 {
+    fn later_steps_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => 0.0,
@@ -217,7 +219,7 @@ fn summarize_step(
         seconds: median(&of(|picture| picture.seconds)),
         relmse: median(&errors),
         spread: [least, most],
-        uncertainty: images.first().map_or(0.0, |image| two.uncertainty(image)),
+        uncertainty: images.first().map_or(0.0, |image| two.relmse_standard_error(image)),
         bias: estimate_bias(two, images),
         brightness: None,
         pictures,

@@ -52,14 +52,20 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
             distinct.push(settings);
         }
     }
-    distinct.into_iter().map(|settings| name_method(settings, toggles)).collect()
+    distinct.into_iter().map(|settings| create_named_method(settings, toggles)).collect()
 }
 
 fn default_settings(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
-        method_settings(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
+        normalize_method_settings(
+            integrator,
+            photons,
+            scene.render.shadows,
+            scene.render.clamp,
+            scene.render.accel,
+        )
     };
     ways.into_iter().map(of).collect()
 }
@@ -71,7 +77,7 @@ fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSetting
             for shadows in or_scene_value(&toggles.shadows, scene.render.shadows) {
                 for clamp in or_scene_value(&toggles.clamps, scene.render.clamp) {
                     for accel in or_scene_value(&toggles.accels, scene.render.accel) {
-                        ways.push(method_settings(integrator, photons, shadows, clamp, accel));
+                        ways.push(normalize_method_settings(integrator, photons, shadows, clamp, accel));
                     }
                 }
             }
@@ -84,7 +90,7 @@ fn or_scene_value<T: Copy>(asked: &[T], own: T) -> Vec<T> {
     if asked.is_empty() { vec![own] } else { asked.to_vec() }
 }
 
-fn method_settings(
+fn normalize_method_settings(
     integrator: Integrator,
     photons: bool,
     shadows: ShadowMode,
@@ -97,7 +103,7 @@ fn method_settings(
 }
 
 /// Creates a method, named after the requested settings.
-fn name_method(settings: MethodSettings, toggles: &MethodSweep) -> Method {
+fn create_named_method(settings: MethodSettings, toggles: &MethodSweep) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {

@@ -21,7 +21,7 @@ mod statistics;
 pub mod table;
 mod time_budget;
 
-pub use bias::{Bias, MIN_SEEDS};
+pub use bias::{MIN_SEEDS, SquaredBias};
 pub use brightness::BrightnessDifference;
 pub use methods::{Method, MethodSweep, methods_to_measure};
 pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::cache::{self, CachedReferences, ReferenceCost};
+use super::cache::{self, ReferenceCost, ReferencesWithCost};
 use super::request::BenchError;
 use super::results::ReferenceResult;
 use crate::compare::{Pair, TwoReferences};
@@ -30,7 +30,7 @@ const MAX_MEASURED: f64 = 65_536.0;
 
 /// Largest sample count to measure against references with `of_references` samples. `None` means that the
 /// references are image files.
-pub(super) fn max_measured_samples(of_references: Option<f64>) -> f64 {
+pub(super) fn max_measurable_samples(of_references: Option<f64>) -> f64 {
     let most = of_references.map_or(MAX_MEASURED, |samples| samples / f64::from(REFERENCE_RATIO));
     most.clamp(MIN_MEASURED, MAX_MEASURED)
 }
@@ -75,7 +75,7 @@ pub(super) struct ReferenceFingerprints([Fingerprint; 2]);
 /// Rendered references that are not cached yet.
 pub(super) struct RenderedReferences {
     pub(super) keys: ReferenceFingerprints,
-    stored: CachedReferences,
+    stored: ReferencesWithCost,
     warnings: Vec<Diagnostic>,
 }
 
@@ -128,11 +128,11 @@ impl ReferenceRenderer<'_> {
     ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
             .filter(|stored| amount.is_met(stored.cost))?;
-        Some(scene_references(stored, true, Vec::new(), None))
+        Some(create_scene_references(stored, true, Vec::new(), None))
     }
 
     /// Renders both references. Calls `begin` before each one and passes it the number of references left.
-    pub(super) fn render_references(
+    pub(super) fn render_reference_pair(
         &self,
         session: &mut Session,
         amount: ReferenceQuality,
@@ -152,7 +152,7 @@ impl ReferenceRenderer<'_> {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);
-        Ok(RenderedReferences { keys, stored: CachedReferences { pair, cost }, warnings: first.warnings })
+        Ok(RenderedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
     }
 
     /// Stores rendered references in the cache, if it is enabled.
@@ -161,7 +161,7 @@ impl ReferenceRenderer<'_> {
         let cache_error = self
             .cache
             .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());
-        scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
+        create_scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
     fn render(
@@ -198,13 +198,13 @@ fn cache_key(
     key.finish()
 }
 
-fn scene_references(
-    stored: CachedReferences,
+fn create_scene_references(
+    stored: ReferencesWithCost,
     is_cached: bool,
     warnings: Vec<Diagnostic>,
     cache_error: Option<String>,
 ) -> SceneReferences {
-    let CachedReferences { pair, cost } = stored;
+    let ReferencesWithCost { pair, cost } = stored;
     let two = TwoReferences::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
@@ -242,9 +242,9 @@ mod tests {
 
     #[test]
     fn measured_samples_are_limited_to_1_percent() {
-        assert_eq!(max_measured_samples(Some(25_600.0)), 256.0);
-        assert_eq!(max_measured_samples(Some(400.0)), 16.0, "a slope needs at least this many samples");
-        assert_eq!(max_measured_samples(Some(1e9)), 65_536.0);
-        assert_eq!(max_measured_samples(None), 65_536.0, "unknown samples");
+        assert_eq!(max_measurable_samples(Some(25_600.0)), 256.0);
+        assert_eq!(max_measurable_samples(Some(400.0)), 16.0, "a slope needs at least this many samples");
+        assert_eq!(max_measurable_samples(Some(1e9)), 65_536.0);
+        assert_eq!(max_measurable_samples(None), 65_536.0, "unknown samples");
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bias::Bias;
+use super::bias::SquaredBias;
 use super::brightness::BrightnessDifference;
 use super::slope::{Slope, TimeToError, mean_loglog_slope, time_to_error};
 use super::statistics::mean_and_standard_error;
@@ -89,7 +89,7 @@ pub struct StepResult {
     /// Standard error that reference noise adds to each relMSE.
     pub uncertainty: f64,
     /// The estimated bias. `None` if there are too few images.
-    pub bias: Option<Bias>,
+    pub bias: Option<SquaredBias>,
     /// Difference in brightness between the images and the references. `None` if there are too few images.
     #[serde(default)]
     pub brightness: Option<BrightnessDifference>,
@@ -157,7 +157,7 @@ impl BiasVerdict {
 }
 
 /// Whether the bias decreased significantly.
-fn is_bias_decreasing(before: Bias, after: Bias) -> bool {
+fn is_bias_decreasing(before: SquaredBias, after: SquaredBias) -> bool {
     /// A bias counts as decreasing if quadrupling the samples scales it by at most this factor. The ratio is
     /// 0.4 for photon mapping and 1 for a constant bias.
     const MAX_RATIO: f64 = 0.8;
@@ -212,7 +212,7 @@ pub(super) mod tests {
             relmse,
             spread: [relmse * 0.9, relmse * 1.1],
             uncertainty: 1e-9,
-            bias: Some(Bias { size: bias, error: bias * 0.01 + 1e-9, by_chance, bound: bias + 1e-8 }),
+            bias: Some(SquaredBias { size: bias, error: bias * 0.01 + 1e-9, by_chance, bound: bias + 1e-8 }),
             brightness: Some(BrightnessDifference {
                 value: -0.01,
                 error: 0.001,

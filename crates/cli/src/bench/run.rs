@@ -7,7 +7,7 @@ use super::measure::MethodRun;
 use super::methods::methods_to_measure;
 use super::reference::{
     ReferenceFingerprints, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
-    max_measured_samples,
+    max_measurable_samples,
 };
 use super::request::{
     BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark,
@@ -41,7 +41,7 @@ pub fn run(
     let runs: Vec<SceneRun<'_>> =
         order.scenes.iter().map(|path| SceneRun { order, path, token, tell }).collect();
     let mut measure = || {
-        check_seeds(order)?;
+        check_seed_overlap(order)?;
         check_scenes(&runs)?;
         for run in &runs {
             results.scenes.push(run.measure(&mut budget, &mut results.threads)?);
@@ -91,7 +91,7 @@ pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32
 }
 
 /// Checks that the seeds of images and references do not overlap.
-fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
+fn check_seed_overlap(order: &BenchRequest) -> Result<(), BenchError> {
     /// Maximum number of steps in the default schedule.
     const MAX_STEPS: u32 = 64;
     let steps = match &order.steps {
@@ -134,7 +134,7 @@ impl SceneRun<'_> {
     /// Reads and validates the scene and its files.
     fn prepare(&self, session: &mut Session) -> Result<PreparedScene, BenchError> {
         let order = self.order;
-        self.report_begin("reading", None);
+        self.report_task_begin("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
             .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
         let given = match &order.reference {
@@ -148,7 +148,7 @@ impl SceneRun<'_> {
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
         let keys = self.reference_renderer(&common).compute_fingerprints(session)?;
-        self.check_output_targets(session)?;
+        self.check_outputs_are_not_inputs(session)?;
         Ok(PreparedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
@@ -179,7 +179,7 @@ impl SceneRun<'_> {
         drop(session);
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.report_references(&reference, (width, height));
-        let most_samples = max_measured_samples(reference.result.samples);
+        let most_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             budget.begin_method();
@@ -220,9 +220,9 @@ impl SceneRun<'_> {
         let begin = |left: usize| {
             let seconds =
                 amount.seconds.map(|seconds| budget.seconds_left(seconds * left as f64 / 2.0, true));
-            self.report_begin(&format!("reference {} of 2", 3 - left), seconds);
+            self.report_task_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
-        let made = maker.render_references(session, amount, begin)?;
+        let made = maker.render_reference_pair(session, amount, begin)?;
         if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
     }
 
@@ -232,7 +232,7 @@ impl SceneRun<'_> {
     }
 
     /// Checks that no output file is an input of the scene.
-    fn check_output_targets(&self, session: &Session) -> Result<(), BenchError> {
+    fn check_outputs_are_not_inputs(&self, session: &Session) -> Result<(), BenchError> {
         match self.order.targets.iter().find(|target| session.depends_on_file(target)) {
             Some(target) => Err(BenchError::Call(format!(
                 "cannot write {}: {} depends on it; choose another file",
@@ -248,7 +248,7 @@ impl SceneRun<'_> {
             (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
         }
         if let Some(why) = &reference.cache_error {
-            self.report_done(&format!("could not cache the references: {why}"));
+            self.report_task_done(&format!("could not cache the references: {why}"));
         }
         let result = &reference.result;
         let made = match (result.is_cached, result.seconds) {
@@ -256,13 +256,13 @@ impl SceneRun<'_> {
             (false, Some(seconds)) => format!("rendered in {}", words::format_seconds(seconds)),
             (false, None) => "from files".to_owned(),
         };
-        self.report_done(&format!(
+        self.report_task_done(&format!(
             "{width}×{height}-pixel references {made}, relMSE {:.1e} each",
             result.noise
         ));
     }
 
-    pub(super) fn report_begin(&self, what: &str, left: Option<f64>) {
+    pub(super) fn report_task_begin(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
         (self.tell)(BenchEvent::Begins { what, left });
     }
@@ -272,7 +272,7 @@ impl SceneRun<'_> {
         (self.tell)(BenchEvent::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
     }
 
-    pub(super) fn report_done(&self, what: &str) {
+    pub(super) fn report_task_done(&self, what: &str) {
         (self.tell)(BenchEvent::Done(format!("{}: {what}", self.path.display())));
     }
 }
@@ -432,9 +432,9 @@ mod tests {
     #[test]
     fn image_and_reference_seeds_never_overlap() {
         let order = |seed| BenchRequest { seed, seeds: 6, ..BenchRequest::default() };
-        assert!(check_seeds(&order(1)).is_ok());
-        assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());
-        let Err(BenchError::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else {
+        assert!(check_seed_overlap(&order(1)).is_ok());
+        assert!(check_seed_overlap(&order(u32::MAX - 6 * 64 - 2)).is_ok());
+        let Err(BenchError::Call(message)) = check_seed_overlap(&order(u32::MAX - 6 * 64)) else {
             panic!("expected an error")
         };
         assert!(message.contains("--seed"), "{message}");

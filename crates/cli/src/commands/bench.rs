@@ -40,7 +40,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority(args.nice);
     let order = bench_request(args, console)?;
     let scenes = order.scenes.len();
-    let outputs = BenchOutputs::check_args(args, &order.scenes, console)?;
+    let outputs = BenchOutputs::from_checked_args(args, &order.scenes, console)?;
     let baseline = outputs.read_baseline(console)?;
     // The first signal stops measuring. The second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());

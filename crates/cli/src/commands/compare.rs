@@ -31,7 +31,8 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
 
 /// Runs the comparison and reports errors. `Err` contains the exit code.
 fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
-    let diff = args.diff.as_deref().map(|path| ErrorImage::check(path, args, console)).transpose()?;
+    let diff =
+        args.diff.as_deref().map(|path| ErrorImage::from_checked_args(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
         errors.iter().for_each(|error| console.print_message(&format!("error: {error}")));
         Exit::WRONG
@@ -40,7 +41,7 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
     warn_about_same_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
-    let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::mean_luminance_error(path)));
+    let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::read_mean_luminance_error(path)));
     let summary = Summary::new(args, &pair, errors, bias);
     if args.json {
         print_json(&summary, console);
@@ -88,12 +89,13 @@ struct ErrorImage<'a> {
 
 impl<'a> ErrorImage<'a> {
     /// Reports errors that can be detected before the measurement.
-    fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
+    fn from_checked_args(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format =
             Format::from_path(path).map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
         check_not_input(path, path, args)
             .map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_target(path).map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
+        output::check_image_target(path)
+            .map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
     }
 
@@ -134,7 +136,7 @@ impl<'a> ErrorImage<'a> {
         let lost = RefCell::new(None);
         let losses = AttributeLossPolicy::Report(&|what| drop(lost.replace(Some(what))));
         let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        write::atomic_guarded(self.path, &bytes, &guard, &token)?;
+        write::atomic_with_policy(self.path, &bytes, &guard, &token)?;
         Ok(lost.into_inner())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::console::{Console, stdout_columns};
 use crate::exit::Exit;
-use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TypeInfo, ValueKind};
+use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableTypeInfo, ValueKind};
 use crate::scene::keys::{all_tables, documented_paths, find_table};
 use crate::scene::nearest::{nearest_name, translate_foreign_name};
 use crate::scene::sanitize::shortened;
@@ -44,7 +44,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
 const MIN_COLUMNS: usize = 16;
 
 /// Whether a table defines a type with this name.
-fn has_type(table: &TableInfo, name: &str) -> bool {
+fn defines_type(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
 
@@ -67,8 +67,8 @@ fn explain_path(path: &str) -> Option<String> {
     match parts.as_slice() {
         [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
-            None if all_tables().iter().any(|table| has_type(table, name)) => {
-                let types = all_tables().iter().filter(|table| has_type(table, name));
+            None if all_tables().iter().any(|table| defines_type(table, name)) => {
+                let types = all_tables().iter().filter(|table| defines_type(table, name));
                 let texts = types.filter_map(|table| Some(type_details(table, table.find_type(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
@@ -168,7 +168,7 @@ fn table_details(table: &'static TableInfo) -> String {
 
 fn format_type_list(table: &TableInfo) -> String {
     let default = table.types.first().map_or("", |kind| kind.name);
-    let line = |kind: &TypeInfo| {
+    let line = |kind: &TableTypeInfo| {
         format!("    type = {:<15}{}\n", format!("\"{}\"", kind.name), without_backticks(kind.doc))
     };
     let lines: String = table.types.iter().map(line).collect();
@@ -176,7 +176,7 @@ fn format_type_list(table: &TableInfo) -> String {
 }
 
 /// Describes a type, with one line for each of its keys and each common key.
-fn type_details(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
+fn type_details(table: &'static TableInfo, kind: &'static TableTypeInfo) -> String {
     let head = format!("{}, type = \"{}\"\n    {}\n\n", table.header(), kind.name, format_sentence(kind.doc));
     format!("{head}{}", format_key_list(table.keys_for_type(Some(kind))))
 }

@@ -20,7 +20,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
     // A line break in a name could end a here-document. Other control characters are unsafe on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
-    if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
+    if paths.contains(&None) || words.into_iter().any(|word| !is_printable_word(word)) {
         return console.print_error(Exit::WRONG, "names cannot contain control characters");
     }
     if !args.scene.is_file() {
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
 }
 
 /// Whether a word is safe in scripts and on terminals: it has no control characters or invisible characters.
-fn is_plain_word(word: &str) -> bool {
+fn is_printable_word(word: &str) -> bool {
     word.chars().all(is_terminal_safe)
 }
 
@@ -265,10 +265,10 @@ mod tests {
     #[test]
     fn control_characters_are_rejected() {
         for word in ["a\nb", "\0", "\u{1b}]52;c;eA==\u{7}", "\u{9b}31m", "\u{202e}gnp.exr", "a\tb", "\r"] {
-            assert!(!is_plain_word(word), "{word:?}");
+            assert!(!is_printable_word(word), "{word:?}");
         }
         for word in ["", "my scene.toml", "Würfel.exr", "$(x) `y` 'z'"] {
-            assert!(is_plain_word(word), "{word:?}");
+            assert!(is_printable_word(word), "{word:?}");
         }
     }
 

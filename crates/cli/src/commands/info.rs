@@ -15,7 +15,7 @@ use crate::scene::detect_non_scene;
 use crate::scene::sanitize::escape_invisible_chars;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
-    let info = match describe(&args.image) {
+    let info = match read_info_or_format(&args.image) {
         Ok(info) => info,
         Err(error) => return console.print_error(Exit::WRONG, &error.to_string()),
     };
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 ///
 /// # Errors
 /// Returns the same errors as [`read_info`].
-fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
+fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     read_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
         (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
@@ -47,7 +47,7 @@ fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
 /// rendered, as one JSON line or as text. Returns `None` for other files.
 pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
     let (_, problem) = detect_non_scene(path)?;
-    let info = describe(path);
+    let info = read_info_or_format(path);
     if is_json {
         let mut value = failure_to_json(&Failure::Scene(vec![*problem]));
         value["image"] = info.map_or(Value::Null, |info| as_json(path, &info));

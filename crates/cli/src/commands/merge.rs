@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use rayon::ThreadPool;
 use serde_json::json;
 
-use self::inputs::{MergeInputs, scene_paths};
+use self::inputs::{RenderInputFiles, scene_paths};
 use crate::args::{MergeArgs, ProgressMode};
 use crate::console::{Console, stdout_columns};
 use crate::control::{CancelToken, Cancelled};
@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::merge_block::TerminalBlock;
 use crate::output::part::{self, MergedParts, PartError, PartFile};
-use crate::output::write::{WritePolicy, atomic_guarded};
+use crate::output::write::{WritePolicy, atomic_with_policy};
 use crate::output::{
     self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
 };
@@ -70,8 +70,8 @@ impl MergeCommand<'_> {
     fn try_run(&self) -> Result<Exit, Exit> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
-        let inputs = MergeInputs::new(&parts, &self.args.out, self.token);
-        self.check_inputs(&inputs)?;
+        let inputs = RenderInputFiles::new(&parts, &self.args.out, self.token);
+        self.check_output_is_not_input(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.develop_settings()) else {
             return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
@@ -95,13 +95,13 @@ impl MergeCommand<'_> {
         }
         let format = Format::from_path(out)
             .map_err(|error| self.console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_target(out)
+        output::check_image_target(out)
             .map_err(|error| self.console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(format)
     }
 
     /// Checks that the output does not replace an input file of the render.
-    fn check_inputs(&self, inputs: &MergeInputs<'_>) -> Result<(), Exit> {
+    fn check_output_is_not_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
         match self.input_conflict_message(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
@@ -112,7 +112,7 @@ impl MergeCommand<'_> {
     /// Returns an error message if the file at `path` is an input file of the parts or their scene.
     fn input_conflict_message(
         &self,
-        inputs: &MergeInputs<'_>,
+        inputs: &RenderInputFiles<'_>,
         path: &Path,
     ) -> Result<Option<String>, Cancelled> {
         let why = inputs.reason_to_keep(path)?;
@@ -255,7 +255,7 @@ impl MergeCommand<'_> {
             Some(finish) => {
                 let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
-                    let image = finish.image(&merged.film);
+                    let image = finish.extract_image(&merged.film);
                     let picture = tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image));
                     images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
@@ -263,7 +263,7 @@ impl MergeCommand<'_> {
         };
         // Narrow terminals do not show an image.
         let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
-        self.console.print_trusted_text(&block.redraw(&lines, columns));
+        self.console.print_trusted_text(&block.redraw_to_string(&lines, columns));
         Ok(())
     }
 
@@ -302,10 +302,10 @@ impl MergeCommand<'_> {
         format: Format,
         mut finish: DevelopSettings,
         merged: &MergedParts,
-        (parts, inputs): (&[PartFile], &MergeInputs<'_>),
+        (parts, inputs): (&[PartFile], &RenderInputFiles<'_>),
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
-        record_scene_path(&mut finish, parts, out);
+        set_relative_scene_path(&mut finish, parts, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
@@ -322,8 +322,9 @@ impl MergeCommand<'_> {
             sweep: None,
             losses: AttributeLossPolicy::Report(&tell),
         };
-        let bytes = self.pool.install(|| finish.encode(film, (&finish.image(film), &[]), format, token));
-        let written = bytes.and_then(|bytes| atomic_guarded(out, &bytes, &guard, token));
+        let bytes =
+            self.pool.install(|| finish.encode(film, (&finish.extract_image(film), &[]), format, token));
+        let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,
             other => self.console.print_error(Exit::FAILED, &other.to_string()),
@@ -344,7 +345,7 @@ impl MergeCommand<'_> {
 }
 
 /// Records the scene's path relative to the output, as an unsharded render does.
-fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
+fn set_relative_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     if let Some(path) = scene_paths(parts, out).find(|path| path.is_file()) {
         *scene = scene_path::relative_to_image(&path, out);

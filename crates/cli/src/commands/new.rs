@@ -10,7 +10,7 @@ use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::{self, Format, OutputError, write};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{is_mesh, starter_scene};
+use crate::scene::{has_mesh_extension, starter_scene};
 
 pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let text =
@@ -57,7 +57,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         }
         Err(source) => {
             // Prefer the more specific error about the folder.
-            let of_place = output::check_path(file).err();
+            let of_place = output::check_file_target(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.print_error(Exit::FAILED, &error.to_string())
         }
@@ -88,7 +88,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
 
 /// Returns the error message for a scene file with an image or mesh extension.
 fn wrong_extension_error(file: &Path) -> Option<String> {
-    let what = if is_mesh(file) {
+    let what = if has_mesh_extension(file) {
         "a mesh"
     } else if has_image_extension(file) {
         "an image"

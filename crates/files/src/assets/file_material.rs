@@ -56,12 +56,12 @@ impl FileMaterial {
 
     /// Determines the kind of material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is an
     /// opacity texture. Materials with PBR statements are principled. Of the rest, models 3, 5 and 8 with a
-    /// specular color are coated if [`Self::is_coated`], and mirrors if not. All others are Phong materials.
+    /// specular color are coated if [`Self::has_specular_coat`], and mirrors if not. All others are Phong materials.
     pub fn kind(&self) -> FileMaterialKind<'_> {
         match (self.illumination_model, &self.physical) {
             (Some(4 | 6 | 7 | 9), _) if self.opacity_texture.is_none() => FileMaterialKind::Glass,
             (_, Some(physical)) => FileMaterialKind::Principled(physical),
-            (Some(3 | 5 | 8), None) if self.specular.max_element() > 0.0 => match self.is_coated() {
+            (Some(3 | 5 | 8), None) if self.specular.max_element() > 0.0 => match self.has_specular_coat() {
                 true => FileMaterialKind::Coated,
                 false => FileMaterialKind::Mirror,
             },
@@ -117,7 +117,7 @@ impl FileMaterial {
 
     /// Whether the specular reflection is a coat. It is one if there is a diffuse texture, or if the diffuse
     /// color is stronger than the specular color.
-    pub fn is_coated(&self) -> bool {
+    pub fn has_specular_coat(&self) -> bool {
         self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
     }
 }

@@ -127,7 +127,7 @@ pub struct DroppedFaces {
 
 /// A gKit orbiter camera, which orbits the scene's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OrbiterCamera {
+pub struct GkitOrbiterCamera {
     /// `c`: point that the camera looks at.
     pub center: [f64; 3],
     /// `p`: offset in the image plane.

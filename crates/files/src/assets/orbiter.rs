@@ -18,7 +18,7 @@
 
 use std::path::Path;
 
-use super::{AssetError, FileHash, OrbiterCamera, read};
+use super::{AssetError, FileHash, GkitOrbiterCamera, read};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
@@ -34,13 +34,13 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// # Errors
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line if a letter is unknown, the number
 /// of values is wrong, or a value is not finite or out of range.
-pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
+pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::read_text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
     Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 
-fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
+fn parse(path: &Path, text: &str) -> Result<GkitOrbiterCamera, AssetError> {
     let (mut center, mut position, mut rotation, mut size, mut field) = (None, None, None, None, None);
     for (index, line) in text.lines().enumerate() {
         let wrong = |reason: String| AssetError::malformed(path, Some(index + 1), reason);
@@ -62,7 +62,7 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
     let missing = |line| AssetError::malformed(path, None, missing_line_message(line));
     let [size, radius] = size.ok_or_else(|| missing("s size radius"))?;
     let [fov, width, height] = field.unwrap_or(DEFAULT_FIELD);
-    Ok(OrbiterCamera {
+    Ok(GkitOrbiterCamera {
         center: center.ok_or_else(|| missing("c x y z"))?,
         position: position.unwrap_or_default(),
         rotation: rotation.unwrap_or_default(),

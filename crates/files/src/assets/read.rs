@@ -71,7 +71,7 @@ const START: usize = 1 << 12;
 
 /// Reads a text file. Rejects binary files based on their first [`START`] bytes.
 pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    read_accepted(path, limit, monitor, |start| {
+    read_if_start_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         reject_if_binary(path, start.contains(&0))
     })
@@ -83,7 +83,7 @@ pub(crate) fn read_text_or_binary(
     limit: u64,
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
-    read_accepted(path, limit, monitor, |start| {
+    read_if_start_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         reject_if_binary(path, start[..start.len().min(3)].contains(&0))
     })
@@ -95,14 +95,14 @@ pub(crate) fn read_unless_all_zero(
     limit: u64,
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
-    read_accepted(path, limit, monitor, |start| {
+    read_if_start_accepted(path, limit, monitor, |start| {
         reject_if_binary(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
 /// Reads a regular file with any content.
 pub(crate) fn read_bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    read_accepted(path, limit, monitor, |_| Ok(()))
+    read_if_start_accepted(path, limit, monitor, |_| Ok(()))
 }
 
 fn reject_if_binary(path: &Path, is_binary: bool) -> Result<(), AssetError> {
@@ -130,7 +130,7 @@ fn is_utf16(start: &[u8]) -> bool {
 
 /// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, with a
 /// total of `2·length`. The second half is reserved for parsing.
-fn read_accepted(
+fn read_if_start_accepted(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,

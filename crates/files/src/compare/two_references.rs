@@ -38,7 +38,7 @@ impl TwoReferences {
 
     /// Returns an image's relMSE, without bias from the references' noise. It can be negative. The image must
     /// have the same size as the references.
-    pub fn error(&self, x: &RadianceImage) -> f64 {
+    pub fn unbiased_relmse(&self, x: &RadianceImage) -> f64 {
         self.cross_error(x, x)
     }
 
@@ -60,9 +60,9 @@ impl TwoReferences {
         sum.element_sum() / 2.0
     }
 
-    /// Standard error of [`Self::error`] due to the references' noise, assuming independent pixels and fully
+    /// Standard error of [`Self::unbiased_relmse`] due to the references' noise, assuming independent pixels and fully
     /// correlated channels.
-    pub fn uncertainty(&self, x: &RadianceImage) -> f64 {
+    pub fn relmse_standard_error(&self, x: &RadianceImage) -> f64 {
         let variances = self.weighted_pixels().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
             let channel_deviation = |channel: usize| {
@@ -138,9 +138,9 @@ mod tests {
     fn equal_references_yield_the_standard_relmse() {
         let references = references(0.0);
         assert_eq!(references.reference_noise(), 0.0);
-        let error = references.error(&test_image(3, 0.0, 0.1));
+        let error = references.unbiased_relmse(&test_image(3, 0.0, 0.1));
         assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
-        assert_eq!(references.uncertainty(&test_image(3, 0.0, 0.1)), 0.0);
+        assert_eq!(references.relmse_standard_error(&test_image(3, 0.0, 0.1)), 0.0);
     }
 
     #[test]
@@ -154,7 +154,8 @@ mod tests {
         );
         let tested = test_image(3, 0.01, 0.0);
         let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;
-        let (error, uncertainty) = (references.error(&tested), references.uncertainty(&tested));
+        let (error, uncertainty) =
+            (references.unbiased_relmse(&tested), references.relmse_standard_error(&tested));
         assert!((error - truth).abs() < 4.0 * uncertainty, "got {error} ± {uncertainty}, expected {truth}");
         assert!(uncertainty < 0.05 * noise, "{uncertainty}");
         let plain = super::super::linear::measure(
@@ -168,6 +169,10 @@ mod tests {
         let references = references(0.02);
         let cross = |offset| references.cross_error(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
-        assert!(cross(0.0).abs() < 0.04 * references.error(&test_image(5, 0.2, 0.0)), "{}", cross(0.0));
+        assert!(
+            cross(0.0).abs() < 0.04 * references.unbiased_relmse(&test_image(5, 0.2, 0.0)),
+            "{}",
+            cross(0.0)
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with_layers};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
-use crate::film::{Film, Quantity, RadianceImage, SampleStats};
+use crate::film::{Film, Quantity, RadianceImage, SampleCountStats};
 
 /// Settings for encoding a film as an image file.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,14 +22,14 @@ pub struct DevelopSettings {
 
 impl DevelopSettings {
     /// Extracts the image from a film.
-    pub fn image(&self, film: &Film) -> RadianceImage {
+    pub fn extract_image(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 
     /// Returns the metadata, with the number of samples inserted after the scene entry.
     pub fn metadata_with_samples(
         &self,
-        SampleStats { min, mean, max }: SampleStats,
+        SampleCountStats { min, mean, max }: SampleCountStats,
     ) -> Vec<(String, String)> {
         let mut metadata = self.metadata.clone();
         let samples =
@@ -51,7 +51,7 @@ impl DevelopSettings {
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.with_image_range(image);
         // Add the metadata derived from the film: the number of samples and, at the end, the range.
-        let mut metadata = self.metadata_with_samples(film.sample_stats());
+        let mut metadata = self.metadata_with_samples(film.sample_count_stats());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));

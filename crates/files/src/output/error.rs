@@ -12,13 +12,13 @@ use crate::system::describe_error;
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The path has no file name extension.
-    #[error("cannot write {}: it has no file extension; use one of {}", path.display(), Format::known_extensions())]
+    #[error("cannot write {}: it has no file extension; use one of {}", path.display(), Format::describe_extensions())]
     NoExtension {
         /// The path.
         path: PathBuf,
     },
     /// No format has this extension.
-    #[error("cannot write {}: .{extension} is not a supported format; use one of {}", path.display(), Format::known_extensions())]
+    #[error("cannot write {}: .{extension} is not a supported format; use one of {}", path.display(), Format::describe_extensions())]
     UnknownExtension {
         /// The path.
         path: PathBuf,

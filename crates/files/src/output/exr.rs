@@ -26,7 +26,7 @@ const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
 
 /// Reads the standard error of the mean luminance from an EXR file. Reads only regular files, because a pipe
 /// can be read only once.
-pub fn mean_luminance_error(path: &Path) -> Option<f64> {
+pub fn read_mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
     let meta = MetaData::read_from_buffered(BufReader::new(file), false).ok()?;

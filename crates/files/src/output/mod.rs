@@ -1,6 +1,6 @@
 //! Encodes images and writes files.
 //!
-//! [`check_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
 //! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
 //! the same file.
 
@@ -37,7 +37,7 @@ use std::path::Path;
 pub use attributes::AttributeLossPolicy;
 pub use develop::DevelopSettings;
 pub use error::OutputError;
-pub use exr::mean_luminance_error;
+pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FileFingerprint, FileIdentity, is_same_file};
 pub use origin::{
@@ -128,35 +128,35 @@ pub(crate) fn encode_with_layers(
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
 /// directory or not writable.
-pub fn check_target(path: &Path) -> Result<Format, OutputError> {
+pub fn check_image_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     resolve_path::check_writable(path)?;
     Ok(format)
 }
 
-/// Like [`check_target`], but does not create a file, so it can be called frequently.
+/// Like [`check_image_target`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_target`], but does not detect directories that reject new files despite their permissions.
-pub fn check_target_read_only(path: &Path) -> Result<Format, OutputError> {
+/// Same as [`check_image_target`], but does not detect directories that reject new files despite their permissions.
+pub fn check_image_target_read_only(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
-    check_path_read_only(path)?;
+    check_file_target_read_only(path)?;
     Ok(format)
 }
 
-/// Like [`check_target_read_only`], but for any type of file.
+/// Like [`check_image_target_read_only`], but for any type of file.
 ///
 /// # Errors
-/// Same as [`check_target_read_only`], but the extension is not checked.
-pub fn check_path_read_only(path: &Path) -> Result<(), OutputError> {
-    resolve_path::resolve(path).map(drop)
+/// Same as [`check_image_target_read_only`], but the extension is not checked.
+pub fn check_file_target_read_only(path: &Path) -> Result<(), OutputError> {
+    resolve_path::resolve_writable(path).map(drop)
 }
 
 /// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
-/// Same as [`check_target`], but the extension is not checked.
-pub fn check_path(path: &Path) -> Result<(), OutputError> {
+/// Same as [`check_image_target`], but the extension is not checked.
+pub fn check_file_target(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }
 

@@ -118,7 +118,7 @@ pub fn sign_plot(svg: &str) -> String {
 
 /// Opens the regular file that would be replaced, if it exists.
 fn open_existing(path: &Path) -> Option<io::Result<File>> {
-    match resolve_path::resolve(path) {
+    match resolve_path::resolve_writable(path) {
         Ok(WriteTarget::File(TargetFile { path, existing: Some(_) })) => Some(File::open(path)),
         // Nothing would be replaced. Errors are reported when the file is written.
         Ok(WriteTarget::File(TargetFile { existing: None, .. }) | WriteTarget::InPlace(_)) | Err(_) => None,

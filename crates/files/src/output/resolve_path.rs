@@ -41,7 +41,7 @@ impl TargetFile {
 }
 
 /// Resolves a path, and checks without writing whether it can be written.
-pub(super) fn resolve(path: &Path) -> Result<WriteTarget, OutputError> {
+pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(directory_error(path));
     }
@@ -52,9 +52,9 @@ pub(super) fn resolve(path: &Path) -> Result<WriteTarget, OutputError> {
     }
 }
 
-/// Like [`resolve`], but also checks that files can be created in the directory.
+/// Like [`resolve_writable`], but also checks that files can be created in the directory.
 pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
-    match resolve(path)? {
+    match resolve_writable(path)? {
         WriteTarget::File(target) => {
             let directory = target.directory();
             temporary::check_can_create(directory).map_err(|error| match error.kind() {

@@ -10,7 +10,7 @@ use super::move_new::rename_no_replace;
 use super::temporary::{ATTEMPTS, next_temporary_name, remove_stale_folders};
 use super::{OutputError, cancellable};
 use crate::control::CancelToken;
-use crate::system::folder::remove_all;
+use crate::system::folder::remove_folder_and_contents;
 
 /// Creates files at paths relative to a folder. Creates either all of the files or none, without overwriting
 /// anything. The files are written to a hidden folder, then the first component of each path is moved to its
@@ -42,7 +42,7 @@ pub fn create_files_atomically(
     for (name, _) in files {
         let Some(first) = name.iter().next().filter(|first| !placed.contains(first)) else { continue };
         if let Err(error) = rename_no_replace(&hidden.path.join(first), &here.join(first)) {
-            undo_moves(here, &placed, files);
+            remove_placed_files(here, &placed, files);
             return Err(at(Path::new(first))(error));
         }
         placed.push(first);
@@ -52,7 +52,7 @@ pub fn create_files_atomically(
 
 /// Removes files that were already moved. Also removes their folders, unless these contain other files.
 /// Ignores errors because the caller reports the original error.
-fn undo_moves(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
+fn remove_placed_files(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
     {
@@ -101,7 +101,7 @@ impl StagingFolder {
 impl Drop for StagingFolder {
     fn drop(&mut self) {
         // Ignore errors. The next writer tries again.
-        let _ = remove_all(&self.path);
+        let _ = remove_folder_and_contents(&self.path);
     }
 }
 

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use nix::fcntl::OFlag;
 
 use super::move_new::rename_no_replace;
-use crate::system::folder::{entry_names, remove_all};
+use crate::system::folder::{entry_names, remove_folder_and_contents};
 use crate::system::machine::ProcessIdentity;
 
 /// Maximum length of a file name on nearly all file systems.
@@ -128,7 +128,7 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
-            let _ = remove_if_stale(&path, remove_all);
+            let _ = remove_if_stale(&path, remove_folder_and_contents);
         }
     }
 }

@@ -38,7 +38,7 @@ pub const STDOUT: &str = "/dev/stdout";
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let losses = AttributeLossPolicy::Report(&|_| ());
     let guard = WritePolicy { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
-    atomic_guarded(path, bytes, &guard, &CancelToken::new())
+    atomic_with_policy(path, bytes, &guard, &CancelToken::new())
 }
 
 /// Creates a file without overwriting an existing one. Leaves no partial file on failure.
@@ -85,22 +85,27 @@ impl SweptFolders {
 ///
 /// # Errors
 /// Any error from [`atomic`] or the guard, or [`OutputError::Cancelled`].
-pub fn atomic_guarded(
+pub fn atomic_with_policy(
     path: &Path,
     bytes: &[u8],
     guard: &WritePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    atomic_with(path, &|file| cancellable::write_all(file, bytes, token), guard, (token, Durability::Power))
-        .map(drop)
+    atomic_generated(
+        path,
+        &|file| cancellable::write_all(file, bytes, token),
+        guard,
+        (token, Durability::Power),
+    )
+    .map(drop)
 }
 
-/// Like [`atomic_guarded`], but replaces the file only if it has the expected content. If the content has
+/// Like [`atomic_with_policy`], but replaces the file only if it has the expected content. If the content has
 /// changed, the file is kept and the guard determines the error.
 ///
 /// # Errors
-/// Same as [`atomic_guarded`].
-pub fn atomic_replace(
+/// Same as [`atomic_with_policy`].
+pub fn atomic_if_unchanged(
     path: &Path,
     (expected, bytes): (&[u8], &[u8]),
     guard: &WritePolicy<'_>,
@@ -108,7 +113,7 @@ pub fn atomic_replace(
 ) -> Result<(), OutputError> {
     let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
         &|file| cancellable::write_all(file, bytes, token);
-    replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
+    write_atomically_or_in_place(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
 }
 
 /// Events that a renamed file is guaranteed to survive.
@@ -120,23 +125,23 @@ pub enum Durability {
     Power,
 }
 
-/// Like [`atomic_guarded`], but for generated content. `content` must write all bytes each time it is called.
+/// Like [`atomic_with_policy`], but for generated content. `content` must write all bytes each time it is called.
 /// Returns the new file, which stays locked until it is closed. Returns `None` if the target was written in
 /// place.
 ///
 /// # Errors
-/// Any error from [`atomic_guarded`] or `content`.
-pub fn atomic_with(
+/// Any error from [`atomic_with_policy`] or `content`.
+pub fn atomic_generated(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &WritePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
-    replace(path, content, guard, (token, durability, None))
+    write_atomically_or_in_place(path, content, guard, (token, durability, None))
 }
 
-/// Like [`atomic_with`], but if `expected` is set, replaces only a file with this content.
-fn replace(
+/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content.
+fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &WritePolicy<'_>,
@@ -144,7 +149,7 @@ fn replace(
 ) -> Result<Option<File>, OutputError> {
     ignore_file_size_signal();
     let named = |error| OutputError::file(path, error);
-    match resolve_path::resolve(path)? {
+    match resolve_path::resolve_writable(path)? {
         WriteTarget::File(target) => {
             let (new, carried) = create_temporary(&target, guard).map_err(named)?;
             let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);

@@ -25,7 +25,7 @@ pub use crate::geometry::packet::{F32x16, PACKET_SIZE};
 
 /// Ends (`t_max`) of up to [`PACKET_SIZE`] rays, or −1 in lanes without a ray.
 #[inline(always)]
-pub fn packet_t_max(rays: &[crate::geometry::Ray]) -> F32x16 {
+pub fn packet_ray_ends(rays: &[crate::geometry::Ray]) -> F32x16 {
     let mut ends = [-1.0; PACKET_SIZE];
     for (end, ray) in ends.iter_mut().zip(rays) {
         *end = ray.t_max;

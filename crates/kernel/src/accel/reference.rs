@@ -157,13 +157,13 @@ impl TriangleReference {
             before = corner;
         }
         let [left, right] = self.bounds.halves(axis, at);
-        [self.intersected_with(left, &parts[0]), self.intersected_with(right, &parts[1])]
+        [self.with_intersection_bounds(left, &parts[0]), self.with_intersection_bounds(right, &parts[1])]
     }
 
     /// Replaces the reference's box with the intersection of both boxes, or with `half` if they do not
     /// overlap.
     #[inline(always)]
-    fn intersected_with(&self, half: SimdBounds, part: &SimdBounds) -> Self {
+    fn with_intersection_bounds(&self, half: SimdBounds, part: &SimdBounds) -> Self {
         let mut both =
             SimdBounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
         both = if both.extent().truncate().cmpge(Vec3::ZERO).all() { both } else { half };
@@ -200,7 +200,7 @@ impl ClippedTriangle {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
     /// Clips a triangle to a box, including its faces.
-    pub fn clipped(corners: [Vec3; 3], bounds: &Aabb) -> Self {
+    pub fn clip_to_box(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         let (mut whole, mut other) = (Self::NOTHING, Self::NOTHING);

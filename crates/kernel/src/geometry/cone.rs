@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_within_rounding_error,
-    radial_direction, ring_projected_area, sine_from_cosine,
+    self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
+    projected_area_of_normal_ring, radial_direction, sine_from_cosine, u_from_direction,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -34,7 +34,7 @@ impl SurfaceF64 for Cone {
             return self.base().closest_point_f64(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
-        self.side_point_f64(radial_direction(local.truncate()), self.side_direction(local))
+        self.side_point_f64(radial_direction(local.truncate()), self.slant_direction_and_distance(local))
     }
 }
 
@@ -118,13 +118,13 @@ impl Cone {
         }
         let local = self.frame.point_to_local(point);
         let out = radial_direction(local.truncate());
-        let (down, along) = self.side_direction(local);
+        let (down, along) = self.slant_direction_and_distance(local);
         let around = out.perp() * (-TAU * down.x * along);
         let SurfacePointF64 { point, normal, reach } = self.side_point_f64(out, (down, along));
         SurfacePoint::from_f64(
             point,
             normal,
-            Vec2::new(angle_to_u(mirror_y(out)) as f32, (1.0 - along / self.slant) as f32),
+            Vec2::new(u_from_direction(mirror_y(out)) as f32, (1.0 - along / self.slant) as f32),
             self.frame.vector_to_world(around.extend(0.0)),
             self.frame.vector_to_world((out * -self.radius).extend(-self.height)),
             reach,
@@ -132,7 +132,7 @@ impl Cone {
     }
 
     /// Computes the point on the side from a direction perpendicular to the axis and the result of
-    /// [`Cone::side_direction`].
+    /// [`Cone::slant_direction_and_distance`].
     fn side_point_f64(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
@@ -143,7 +143,7 @@ impl Cone {
 
     /// Unit vector down the side from the tip, as (outward, along the axis), and the distance of `local` from
     /// the tip along the side.
-    fn side_direction(&self, local: DVec3) -> (DVec2, f64) {
+    fn slant_direction_and_distance(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
     }
@@ -156,8 +156,8 @@ impl Cone {
         if self.capped && below.abs() < off_side.abs() {
             return self.base().uv_at(point);
         }
-        let (_, along) = self.side_direction(local);
-        DVec2::new(angle_to_u(mirror_y(radial_direction(local.truncate()))), 1.0 - along / self.slant)
+        let (_, along) = self.slant_direction_and_distance(local);
+        DVec2::new(u_from_direction(mirror_y(radial_direction(local.truncate()))), 1.0 - along / self.slant)
     }
 
     /// Mean curvature at a point on a part. The side curves only around the axis, and its curvature is
@@ -214,7 +214,8 @@ impl Cone {
         let [side, cap] = self.areas();
         // Components of the side's normals perpendicular to the axis and toward the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
-        ring_projected_area(side, cosine * sine_from_cosine(along), -sine * along) + cap * along.max(0.0)
+        projected_area_of_normal_ring(side, cosine * sine_from_cosine(along), -sine * along)
+            + cap * along.max(0.0)
     }
 
     /// The tip.

@@ -1,6 +1,6 @@
 //! Oriented boxes in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, accept};
+use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface::planar_tangents;
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -50,9 +50,9 @@ impl Cuboid {
         if !(near.0 <= far.0) {
             return None;
         }
-        [near, far]
-            .into_iter()
-            .find_map(|(t, face)| ray.accept(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 }))
+        [near, far].into_iter().find_map(|(t, face)| {
+            ray.round_if_in_range(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 })
+        })
     }
 
     /// [`Cuboid::intersect`] for a packet.
@@ -81,7 +81,7 @@ impl Cuboid {
                 far_face = if is_sooner { face + positive } else { far_face };
             }
             let is_met = !is_beside & (near <= far);
-            let (enter, leave) = (accept(near, end), accept(far, end));
+            let (enter, leave) = (round_if_in_range(near, end), round_if_in_range(far, end));
             let is_inside = enter.is_nan();
             let t = if is_inside { leave } else { enter };
             hits.t[lane] = if is_met { t } else { f32::NAN };
@@ -109,7 +109,7 @@ impl Cuboid {
     }
 
     fn face_mapping(&self, face: u32) -> FaceMapping {
-        let (u, v) = planar_tangents(face_normal(face).1);
+        let (u, v) = planar_tangents(face_axis_and_normal(face).1);
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
@@ -154,7 +154,7 @@ impl Cuboid {
 
     /// A face as a parallelogram (corner, u, v) whose front faces outward.
     pub fn face(&self, face: u32) -> (DVec3, DVec3, DVec3) {
-        let (_, normal) = face_normal(face);
+        let (_, normal) = face_axis_and_normal(face);
         let (u, v) = planar_tangents(normal);
         let corner = (normal - u - v) * self.half;
         (
@@ -184,7 +184,7 @@ impl Cuboid {
     pub fn sample(&self, face: u32, u: Vec2) -> AreaPoint {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
-        AreaPoint { point, normal: self.axes * face_normal(face).1 }
+        AreaPoint { point, normal: self.axes * face_axis_and_normal(face).1 }
     }
 
     /// Centroid.
@@ -220,7 +220,7 @@ impl FaceMapping {
 }
 
 /// Axis and outward normal of a face.
-fn face_normal(face: u32) -> (usize, DVec3) {
+fn face_axis_and_normal(face: u32) -> (usize, DVec3) {
     let axis = (face / 2) as usize;
     let mut normal = DVec3::ZERO;
     normal[axis] = if face % 2 == 1 { 1.0 } else { -1.0 };
@@ -237,7 +237,7 @@ impl SurfaceF64 for Cuboid {
     }
 }
 
-/// Branch-free [`face_normal`].
+/// Branch-free [`face_axis_and_normal`].
 #[inline(always)]
 fn branchless_face_normal(face: u32) -> DVec3 {
     let size = if face & 1 == 1 { 1.0 } else { -1.0 };

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_within_rounding_error,
-    radial_direction, ring_projected_area, sine_from_cosine,
+    self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
+    projected_area_of_normal_ring, radial_direction, sine_from_cosine, u_from_direction,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -108,7 +108,7 @@ impl Cylinder {
         SurfacePoint::from_f64(
             point,
             normal,
-            Vec2::new(angle_to_u(out) as f32, self.height_to_v(z) as f32),
+            Vec2::new(u_from_direction(out) as f32, self.height_to_v(z) as f32),
             self.frame.vector_to_world((out.perp() * (TAU * self.radius)).extend(0.0)),
             self.frame.vector_to_world(DVec3::Z * (2.0 * self.half_length)),
             reach,
@@ -142,7 +142,7 @@ impl Cylinder {
         if self.capped && below.abs() < inwards.abs() {
             return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
         }
-        DVec2::new(angle_to_u(radial_direction(local.truncate())), self.height_to_v(local.z))
+        DVec2::new(u_from_direction(radial_direction(local.truncate())), self.height_to_v(local.z))
     }
 
     /// Mean curvature of a part.
@@ -196,7 +196,7 @@ impl Cylinder {
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.areas();
-        ring_projected_area(side, sine_from_cosine(along), 0.0) + cap * along.abs()
+        projected_area_of_normal_ring(side, sine_from_cosine(along), 0.0) + cap * along.abs()
     }
 
     /// Whether the cylinder has caps.

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
-use super::packet::{F32x16, HitPacket, RayPacket, accept};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -48,7 +48,7 @@ impl Disk {
             let line = self.frame.line_to_local(&rays.ray_f64(lane));
             let along = -line.foot.z / line.direction.z;
             let across = (line.foot + line.direction * along).truncate().length();
-            let t = accept(line.start + along, end);
+            let t = round_if_in_range(line.start + along, end);
             hits.t[lane] = if across <= radius { t } else { f32::NAN };
         }
     }
@@ -58,7 +58,7 @@ impl Disk {
         let along = -line.foot.z / line.direction.z;
         let across = (line.foot + line.direction * along).truncate().length();
         let t = line.start + along;
-        (across <= self.radius * (1.0 + BORDER) && ray.accept(t).is_some()).then_some((t, 0))
+        (across <= self.radius * (1.0 + BORDER) && ray.round_if_in_range(t).is_some()).then_some((t, 0))
     }
 
     /// Surface point at a hit.
@@ -79,7 +79,7 @@ impl Disk {
     /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the magnitudes of
     /// the lengths used to compute `point`.
     pub fn closest_point_f64(&self, point: DVec3, reach: f64) -> SurfacePointF64 {
-        let (p, _) = self.nearest_in_plane(point);
+        let (p, _) = self.nearest_point_and_uv(point);
         SurfacePointF64 { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
 
@@ -88,14 +88,14 @@ impl Disk {
     }
 
     /// Plane coordinates of the nearest point on the disk, and its texture coordinates.
-    fn nearest_in_plane(&self, point: DVec3) -> (DVec2, DVec2) {
+    fn nearest_point_and_uv(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.point_to_local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
     }
 
     /// Texture coordinates of a point on the disk.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        self.nearest_in_plane(point).1
+        self.nearest_point_and_uv(point).1
     }
 
     /// Maps a point from the unit disk to this disk.
@@ -137,7 +137,7 @@ impl Disk {
     /// Local geometry of the disk near a point, for density estimation.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
-        let extent = Extent::Flat(self.radius - from.length());
+        let extent = LocalSurfaceShape::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
         LocalGeometry::Surface { distance: self.distance(point), ground: Some(ground) }
     }

@@ -138,7 +138,7 @@ impl Shape {
 
     /// Implements [`SurfacePacket::fill_uv`]. Returns whether the shape supports SIMD.
     #[inline(always)]
-    fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
+    fn try_fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
             Self::Quad(quad) => row.fill_uv_from_shape(quad, rays, hits, of),
             Self::Plane(plane) => row.fill_uv_from_shape(plane, rays, hits, of),
@@ -238,11 +238,11 @@ impl Shape {
 
     /// Whether a point is inside, or behind a plane. `None` if the shape encloses no volume.
     #[inline]
-    pub fn encloses(&self, point: DVec3) -> Option<bool> {
+    pub fn encloses_point(&self, point: DVec3) -> Option<bool> {
         self.encloses_points([point]).map(|[is_inside]| is_inside)
     }
 
-    /// [`Shape::encloses`] for several points.
+    /// [`Shape::encloses_point`] for several points.
     #[inline]
     pub fn encloses_points<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {

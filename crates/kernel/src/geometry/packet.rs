@@ -149,19 +149,19 @@ impl HitPacket {
     }
 }
 
-/// Branchless version of [`RayF64::accept`] that returns NaN for `None`.
+/// Branchless version of [`RayF64::round_if_in_range`] that returns NaN for `None`.
 #[inline(always)]
-pub(super) fn accept(t: f64, end: f32) -> f32 {
+pub(super) fn round_if_in_range(t: f64, end: f32) -> f32 {
     let single = t as f32;
     let is_on_it = (single > 0.0) & (single < f32::INFINITY) & (single <= end);
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`accept`] may accept the quotient `above / along`. If not, the division can be skipped. The
+/// Whether [`round_if_in_range`] may accept the quotient `above / along`. If not, the division can be skipped. The
 /// factor is larger than the relative error of rounding the quotient to `f32`. The added constants handle
 /// numbers that are too small for the factor.
 #[inline(always)]
-pub(super) fn may_accept(above: f64, along: f64, end: f32) -> bool {
+pub(super) fn can_quotient_be_in_range(above: f64, along: f64, end: f32) -> bool {
     let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));
     let reach = along.abs() * ((f64::from(end) + f64::from(f32::MIN_POSITIVE)) * (1.0 + 1e-6)) + 1e-290;
     // `<=` would be wrong here because an infinite end times 0 is NaN.

@@ -1,6 +1,6 @@
 //! Quads (squares and other parallelograms) in double precision.
 
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
@@ -45,7 +45,7 @@ impl Parallelogram {
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
-        let accepted = ray.accept(t)?;
+        let accepted = ray.round_if_in_range(t)?;
         let from_corner = ray.direction * t - to_corner;
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
         (is_in_unit_interval(s) && is_in_unit_interval(t)).then(|| ShapeHit::from_t(accepted))
@@ -59,7 +59,8 @@ impl Parallelogram {
             let ray = rays.ray_f64(lane);
             above[lane] = self.normal.dot(self.corner - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
-            may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
+            may_hit[lane] =
+                if can_quotient_be_in_range(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
         if simd.movemask(&may_hit) == 0 {
             return;
@@ -70,7 +71,7 @@ impl Parallelogram {
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
             let is_inside = is_in_unit_interval(s) & is_in_unit_interval(r);
-            let accepted = accept(t, ends[lane]);
+            let accepted = round_if_in_range(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
     }
@@ -83,7 +84,7 @@ impl Parallelogram {
 
     /// Coordinates of a hit along the edges, in [0, 1].
     #[inline(always)]
-    fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
+    fn hit_coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
     }
 
@@ -140,7 +141,7 @@ impl Parallelogram {
 impl SurfaceF64 for Parallelogram {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let [s, t] = self.coordinates(ray, hit);
+        let [s, t] = self.hit_coordinates(ray, hit);
         let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
         SurfacePointF64 { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
     }
@@ -149,7 +150,7 @@ impl SurfaceF64 for Parallelogram {
 impl UvMapped for Parallelogram {
     #[inline(always)]
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
-        let [s, t] = self.coordinates(ray, hit);
+        let [s, t] = self.hit_coordinates(ray, hit);
         Vec2::new(s as f32, t as f32).as_dvec2()
     }
 }

@@ -1,7 +1,7 @@
 //! Infinite planes in double precision.
 
-use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
 use super::surface::planar_tangents;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -30,7 +30,7 @@ impl Plane {
     /// Intersects the plane. `None` for rays in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
-        (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::from_t)
+        (t < f64::from(f32::MAX)).then(|| ray.round_if_in_range(t)).flatten().map(ShapeHit::from_t)
     }
 
     /// [`Plane::intersect`] for a packet.
@@ -41,14 +41,15 @@ impl Plane {
             let ray = rays.ray_f64(lane);
             above[lane] = self.normal.dot(self.point - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
-            may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
+            may_hit[lane] =
+                if can_quotient_be_in_range(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
         if simd.movemask(&may_hit) == 0 {
             return;
         }
         for lane in 0..PACKET_SIZE {
             let t = above[lane] / along[lane];
-            let accepted = accept(t, ends[lane]);
+            let accepted = round_if_in_range(t, ends[lane]);
             hits.t[lane] = if t < f64::from(f32::MAX) { accepted } else { f32::NAN };
         }
     }
@@ -62,7 +63,7 @@ impl Plane {
 
     /// Coordinates of a hit along the plane's axes.
     #[inline(always)]
-    fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
+    fn hit_coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
     }
 
@@ -105,8 +106,11 @@ impl Plane {
     /// Local geometry of the plane near a point, for density estimation.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let distance = self.distance(point);
-        let ground =
-            NearestSurface { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
+        let ground = NearestSurface {
+            normal: self.normal,
+            height: distance,
+            extent: LocalSurfaceShape::Flat(f64::INFINITY),
+        };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
@@ -129,7 +133,7 @@ impl Plane {
 impl SurfaceF64 for Plane {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let [s, t] = self.coordinates(ray, hit);
+        let [s, t] = self.hit_coordinates(ray, hit);
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
         SurfacePointF64 { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
     }
@@ -138,7 +142,7 @@ impl SurfaceF64 for Plane {
 impl UvMapped for Plane {
     #[inline(always)]
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
-        DVec2::from_array(self.coordinates(ray, hit))
+        DVec2::from_array(self.hit_coordinates(ray, hit))
     }
 }
 

@@ -45,7 +45,7 @@ impl Ray {
 
     /// Extends the segment by the error bound of its endpoint.
     #[inline(always)]
-    pub fn extended_by(self, error: Vec3) -> Self {
+    pub fn extended_by_error(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
         Self { t_max: self.t_max + relative, ..self }
     }
@@ -83,7 +83,7 @@ impl RayF64 {
     }
 
     /// `t` rounded to `f32`, or `None` if the result is not finite or is outside the ray's interval.
-    pub fn accept(&self, t: f64) -> Option<f32> {
+    pub fn round_if_in_range(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }

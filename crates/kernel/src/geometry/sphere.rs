@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
@@ -36,7 +36,7 @@ impl Sphere {
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (c / q, q / a);
         let (near, far) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
-        ray.accept(near).or_else(|| ray.accept(far)).map(ShapeHit::from_t)
+        ray.round_if_in_range(near).or_else(|| ray.round_if_in_range(far)).map(ShapeHit::from_t)
     }
 
     /// [`Sphere::intersect`] for a packet.
@@ -65,8 +65,8 @@ impl Sphere {
             let q = b + (a * discriminants[lane]).sqrt().copysign(b);
             let (t0, t1) = (c / q, q / a);
             let is_in_order = t0 < t1;
-            let near = accept(if is_in_order { t0 } else { t1 }, ends[lane]);
-            let far = accept(if is_in_order { t1 } else { t0 }, ends[lane]);
+            let near = round_if_in_range(if is_in_order { t0 } else { t1 }, ends[lane]);
+            let far = round_if_in_range(if is_in_order { t1 } else { t0 }, ends[lane]);
             let t = if near.is_nan() { far } else { near };
             hits.t[lane] = if discriminants[lane] >= 0.0 { t } else { f32::NAN };
         }
@@ -120,7 +120,8 @@ impl Sphere {
     /// Local geometry of the sphere near a point, for density estimation.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
-        let ground = NearestSurface { normal: out, height: distance, extent: Extent::Round(self.radius) };
+        let ground =
+            NearestSurface { normal: out, height: distance, extent: LocalSurfaceShape::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 

@@ -149,7 +149,7 @@ pub fn first_hit(
     };
     let accepted = |(along, part): (f64, u32)| {
         let t = line.start + along;
-        ray.accept(t).filter(|_| !is_start(along, part)).map(|_| (t, part))
+        ray.round_if_in_range(t).filter(|_| !is_start(along, part)).map(|_| (t, part))
     };
     if !closed {
         let bare = [side.enter, side.leave].into_iter().filter(|end| ends.contains_position(end.0));
@@ -181,7 +181,7 @@ pub fn sine_from_cosine(cosine: f64) -> f64 {
 /// Projected area of a surface whose normals are uniformly distributed on a ring around an axis: the integral
 /// of max(0, a·cos φ + b) over the area. Here a·cos φ + b is the cosine of the angle between the normal at
 /// azimuth φ and the direction.
-pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
+pub fn projected_area_of_normal_ring(area: f64, a: f64, b: f64) -> f64 {
     if b >= a {
         area * b
     } else if b <= -a {
@@ -231,11 +231,11 @@ pub fn radial_direction(p: DVec2) -> DVec2 {
 }
 
 /// Texture coordinate u = ½ + angle/2π of a direction in the plane, in [0, 1].
-pub fn angle_to_u(p: DVec2) -> f64 {
+pub fn u_from_direction(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
-/// Inverse of [`angle_to_u`]: the direction for a value of `u`.
+/// Inverse of [`u_from_direction`]: the direction for a value of `u`.
 pub fn direction_at_u(u: f64) -> DVec2 {
     let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
     DVec2::new(cos, sin)

@@ -83,7 +83,7 @@ impl SurfacePacket {
     /// Computes the texture coordinates of the hits selected by `of`, which must be on the same shape.
     #[inline(always)]
     pub fn fill_uv(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) {
-        if shape.fill_uvs(self, rays, hits, of) {
+        if shape.try_fill_uvs(self, rays, hits, of) {
             return;
         }
         for lane in lane_indices(of) {

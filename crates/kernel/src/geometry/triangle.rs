@@ -1,6 +1,6 @@
 //! Single triangles in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, accept};
+use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -34,7 +34,7 @@ impl Triangle {
         }
         let sum = wa + wb + wc;
         let normal = (b - a).cross(c - a);
-        let t = ray.accept(normal.dot(a) / normal.dot(d))?;
+        let t = ray.round_if_in_range(normal.dot(a) / normal.dot(d))?;
         (sum != 0.0).then(|| ShapeHit { t, primitive: 0, u: (wb / sum) as f32, v: (wc / sum) as f32 })
     }
 
@@ -50,7 +50,7 @@ impl Triangle {
             let is_right = (wa > 0.0) | (wb > 0.0) | (wc > 0.0);
             let sum = wa + wb + wc;
             let normal = (b - a).cross(c - a);
-            let t = accept(normal.dot(a) / normal.dot(d), end);
+            let t = round_if_in_range(normal.dot(a) / normal.dot(d), end);
             let is_met = !(is_left & is_right) & (sum != 0.0);
             hits.t[lane] = if is_met { t } else { f32::NAN };
             hits.u[lane] = (wb / sum) as f32;
@@ -82,19 +82,22 @@ impl Triangle {
     }
 
     /// Unnormalized normal: the cross product of the edges at the first corner.
-    fn normal(&self) -> DVec3 {
+    fn unnormalized_normal(&self) -> DVec3 {
         (self.b - self.a).cross(self.c - self.a)
     }
 
     /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
-        [0.5 * self.normal().length()]
+        [0.5 * self.unnormalized_normal().length()]
     }
 
     /// Samples a point uniformly over the area.
     pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let w = warp::triangle(u).as_dvec3();
-        AreaPoint { point: self.a * w.x + self.b * w.y + self.c * w.z, normal: self.normal().normalize() }
+        AreaPoint {
+            point: self.a * w.x + self.b * w.y + self.c * w.z,
+            normal: self.unnormalized_normal().normalize(),
+        }
     }
 
     /// Centroid.
@@ -110,7 +113,7 @@ impl Triangle {
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
-        (0.5 * self.normal().dot(direction)).max(0.0)
+        (0.5 * self.unnormalized_normal().dot(direction)).max(0.0)
     }
 }
 

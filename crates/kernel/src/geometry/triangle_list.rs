@@ -302,7 +302,7 @@ impl TriangleList {
             }
         }
         let [a, b, c] = &corners;
-        let hits = ShearedPacket::new(rays).intersect(&candidates.number, [a, b, c], ends);
+        let hits = ShearedPacket::new(rays).intersect_triangle_per_ray(&candidates.number, [a, b, c], ends);
         let (mut hit, mut undecided) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let is_any = candidates.near[i] < f32::INFINITY;
@@ -326,8 +326,11 @@ impl TriangleList {
             let (mut most, mut far, mut length) = (0.0, 0.0, 0.0);
             for axis in 0..3 {
                 let (at, low, high) = (rays.origin[axis][i], self.low[axis], self.high[axis]);
-                most = greater(most, greater(at.abs(), greater(low.abs(), high.abs())));
-                far = greater(far, greater((high - at).abs(), (at - low).abs()));
+                most = max_or_first_if_nan(
+                    most,
+                    max_or_first_if_nan(at.abs(), max_or_first_if_nan(low.abs(), high.abs())),
+                );
+                far = max_or_first_if_nan(far, max_or_first_if_nan((high - at).abs(), (at - low).abs()));
                 length += rays.direction[axis][i].abs();
             }
             // Set the bound to NaN for NaN origins. Comparisons with NaN would leave `most` unchanged.
@@ -431,6 +434,6 @@ fn slenderness([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
 
 /// The larger number, or `a` if `b` is NaN.
 #[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
+fn max_or_first_if_nan(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }
 }

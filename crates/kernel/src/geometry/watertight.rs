@@ -61,7 +61,10 @@ impl ShearedRay {
         let mut wb = ax * cy - ay * cx;
         let mut wc = bx * ay - by * ax;
         let is_outside = |[least, greatest]: [f32; 2]| least < 0.0 && greatest > 0.0;
-        let ends = [least(wa, least(wb, wc)), greatest(wa, greatest(wb, wc))];
+        let ends = [
+            min_or_second_if_nan(wa, min_or_second_if_nan(wb, wc)),
+            max_or_second_if_nan(wa, max_or_second_if_nan(wb, wc)),
+        ];
         if is_outside(ends) {
             return None;
         }
@@ -72,7 +75,10 @@ impl ShearedRay {
             wa = exact(cx, by, cy, bx);
             wb = exact(ax, cy, ay, cx);
             wc = exact(bx, ay, by, ax);
-            if is_outside([least(wa, least(wb, wc)), greatest(wa, greatest(wb, wc))]) {
+            if is_outside([
+                min_or_second_if_nan(wa, min_or_second_if_nan(wb, wc)),
+                max_or_second_if_nan(wa, max_or_second_if_nan(wb, wc)),
+            ]) {
                 return None;
             }
         }
@@ -157,12 +163,12 @@ impl ShearedRay {
 }
 
 /// The smaller number, or `b` if either is NaN, as with vector instructions.
-fn least(a: f32, b: f32) -> f32 {
+fn min_or_second_if_nan(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// The larger number, or `b` if either is NaN.
-fn greatest(a: f32, b: f32) -> f32 {
+fn max_or_second_if_nan(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 

@@ -102,7 +102,7 @@ impl<'a> ShearedPacket<'a> {
         found: &mut HitPacket,
         simd: impl Simd,
     ) {
-        let hits = self.intersect(&[number; PACKET_SIZE], *corners, ends);
+        let hits = self.intersect_triangle_per_ray(&[number; PACKET_SIZE], *corners, ends);
         let mut is_nearer = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // A hit at the end of a ray counts, unless an earlier triangle was hit at the same t.
@@ -129,7 +129,7 @@ impl<'a> ShearedPacket<'a> {
         ends: &F32x16,
         simd: impl Simd,
     ) -> u32 {
-        let hits = self.intersect(&[number; PACKET_SIZE], *corners, ends);
+        let hits = self.intersect_triangle_per_ray(&[number; PACKET_SIZE], *corners, ends);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         let hit = simd.movemask(&hits.hit) & met;
         if doubtful == 0 { hit } else { hit | self.hit_mask_scalar(doubtful, corners, ends) }
@@ -206,7 +206,7 @@ impl<'a> ShearedPacket<'a> {
     /// [`ShearedRay::intersect`] for a packet in which each ray has its own triangle. Rays that start on
     /// their triangle do not hit it.
     #[inline(always)]
-    pub(super) fn intersect(
+    pub(super) fn intersect_triangle_per_ray(
         &self,
         numbers: &[u32; PACKET_SIZE],
         corners: [impl Corner; 3],

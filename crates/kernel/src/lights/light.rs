@@ -63,7 +63,7 @@ impl Light {
 
     /// [`Light::sample`] for the points in the mask `used`, without an emission texture.
     #[inline(always)]
-    pub fn sample_packet(
+    pub fn sample_untextured_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
@@ -75,7 +75,7 @@ impl Light {
             Self::Spot(light) => light.sample_packet(points),
             Self::Directional(light) => light.sample_packet(u),
             Self::Environment(light) => light.sample_packet(normals, u),
-            Self::Area(light) => light.sample_packet(points, normals, used, u),
+            Self::Area(light) => light.sample_untextured_packet(points, normals, used, u),
         }
     }
 
@@ -165,13 +165,16 @@ impl Light {
 
     /// The light's center, and the light's own geometry. Rays toward the center must ignore this geometry.
     /// `None` for an environment.
-    pub fn center(&self) -> Option<(LightCenter, LightGeometry)> {
+    pub fn center_and_geometry(&self) -> Option<(LightCenter, LightGeometry)> {
         Some(match self.family() {
-            LightFamily::Delta(light) => {
-                (LightCenter::At(light.isotropic_equivalent().position.as_vec3()), LightGeometry::Nothing)
+            LightFamily::Delta(light) => (
+                LightCenter::At(light.isotropic_at_peak_intensity().position.as_vec3()),
+                LightGeometry::Nothing,
+            ),
+            LightFamily::Infinite(light) => {
+                (LightCenter::Towards(light.direction_to_center()?), LightGeometry::Nothing)
             }
-            LightFamily::Infinite(light) => (LightCenter::Towards(light.center()?), LightGeometry::Nothing),
-            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.geometry()),
+            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.scene_geometry()),
         })
     }
 

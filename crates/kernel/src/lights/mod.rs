@@ -45,7 +45,7 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, EmissionTexture, Emitter, LightCoverage, MeshEmitter, Side, UvMapping, UvTriangle,
+    AreaLight, EmissionTexture, Emitter, EmittingPart, MeshEmitter, Side, UvMapping, UvTriangle,
     back_area_light, front_area_light, see_through_area_light,
 };
 pub use light::{Light, LightFamily};
@@ -54,7 +54,7 @@ pub use photon_emission::{
     BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
+pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightTransportKind, Lights};
 pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
 
 #[cfg(test)]

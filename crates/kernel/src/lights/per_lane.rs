@@ -52,16 +52,16 @@ impl Lights {
             let first = left.trailing_zeros() as usize % PACKET_SIZE;
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
-                let lights = lights_of_kind((&lights, left), &mut of, Light::as_point, filler);
+                let lights = gather_lights_of_kind((&lights, left), &mut of, Light::as_point, filler);
                 packet_of!(LightGeometry::Nothing, i => {
                     let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
             } else if let Some(filler) = as_sphere_light(lights[first]) {
-                let balls = lights_of_kind((&lights, left), &mut of, as_sphere_light, filler);
+                let balls = gather_lights_of_kind((&lights, left), &mut of, as_sphere_light, filler);
                 convex_packet_of!(i => balls, points, u)
             } else if let Some(filler) = as_quad_light(lights[first]) {
-                let quads = lights_of_kind((&lights, left), &mut of, as_quad_light, filler);
+                let quads = gather_lights_of_kind((&lights, left), &mut of, as_quad_light, filler);
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
@@ -70,7 +70,7 @@ impl Lights {
                 }
                 row
             } else if let Some(filler) = as_area_sampled_light(lights[first]) {
-                let all = lights_of_kind((&lights, left), &mut of, as_area_sampled_light, filler);
+                let all = gather_lights_of_kind((&lights, left), &mut of, as_area_sampled_light, filler);
                 triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
             } else {
                 of = 1 << first;
@@ -127,7 +127,7 @@ fn as_area_sampled_light(light: &Light) -> Option<(&AreaSampledTriangles, &AreaL
 /// Returns each lane's light of one kind. Adds the lanes that have such a light to `of`. The other lanes get
 /// `filler`.
 #[inline(always)]
-fn lights_of_kind<'a, T: Copy>(
+fn gather_lights_of_kind<'a, T: Copy>(
     (lights, left): (&[&'a Light; PACKET_SIZE], u32),
     of: &mut u32,
     kind: impl Fn(&'a Light) -> Option<T>,

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, LightCoverage, MeshEmitter, Side};
+use super::area::{AreaLight, EmittingPart, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightSamplingPurpose {
+pub enum LightTransportKind {
     /// Only direct lighting. Light sampling is the only source of noise.
     Eye,
     /// Path tracing. The image also has noise from other sources.
@@ -116,7 +116,7 @@ impl Lights {
             }
         }
         let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
-            if count_lights(all.iter().filter(taken)) <= most {
+            if count_lights_merging_objects(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }
             let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
@@ -135,14 +135,14 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
-    pub fn sampler(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
+    pub fn sampler(&self, receivers: LightTransportKind) -> Option<LightSampler<'_>> {
         match receivers {
-            LightSamplingPurpose::Eye => {
+            LightTransportKind::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            LightSamplingPurpose::Paths => {
+            LightTransportKind::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -155,7 +155,7 @@ impl Lights {
     #[inline]
     pub fn expected_sample_counts(
         &self,
-        receivers: LightSamplingPurpose,
+        receivers: LightTransportKind,
         point: Vec3,
         normal: Vec3,
     ) -> ExpectedSampleCounts<'_> {
@@ -193,10 +193,10 @@ impl Lights {
             }
         };
         match light.part {
-            LightCoverage::Whole => {
+            EmittingPart::Whole => {
                 by_object.insert(light.object, ObjectLights::Whole(number));
             }
-            LightCoverage::Listed => {
+            EmittingPart::Listed => {
                 light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(index_light);
             }
         }
@@ -250,11 +250,11 @@ impl Lights {
     /// its light-sampling pdf in sr⁻¹.
     pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
-        self.radiance_from_infinity_with(sky, direction, share)
+        self.radiance_from_infinity_with_sky(sky, direction, share)
     }
 
     /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::radiance_and_pdf`].
-    pub fn radiance_from_infinity_with(
+    pub fn radiance_from_infinity_with_sky(
         &self,
         sky: Option<(Vec3, f32)>,
         direction: Vec3,
@@ -289,7 +289,7 @@ impl Lights {
 }
 
 /// Number of lights. All lights on the same object count as one.
-fn count_lights<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
+fn count_lights_merging_objects<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();
     objects.len() + lights.filter(|light| object(light).is_none()).count()

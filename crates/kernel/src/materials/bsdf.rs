@@ -37,7 +37,7 @@ impl LobeFilter {
 
 /// The lobes from which directions are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LobeSet {
+pub enum SampledLobes {
     /// All lobes, whether or not they are shown.
     All,
     /// Only the narrow lobe.
@@ -136,7 +136,7 @@ pub trait BxdfMaterial {
     type Point: BxdfParameters;
 
     /// Looks up all parameters. Parameters that do not affect the result need not be looked up.
-    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Self::Point;
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Self::Point;
 
     /// The material's main color.
     fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3;
@@ -148,7 +148,7 @@ pub trait BxdfMaterial {
 
     /// The color that can be looked up for packets and set with
     /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color). `None` if there is no such color.
-    fn packet_color(&self) -> Option<&ColorParameter> {
+    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
         None
     }
 

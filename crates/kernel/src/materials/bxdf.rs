@@ -9,7 +9,7 @@
 //! [`Bxdf::sample`] continues the path at exactly one of them. The pdfs include the directions on both
 //! sides.
 
-use super::bsdf::{BxdfParameters, LobeSet, NarrowLobe};
+use super::bsdf::{BxdfParameters, NarrowLobe, SampledLobes};
 use crate::math::Vec3;
 use crate::math::soa::Soa;
 
@@ -117,7 +117,7 @@ pub trait Bxdf: Soa + Default {
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`BxdfMaterial::packet_color`](super::bsdf::BxdfMaterial::packet_color)
+    /// Replaces the color that [`BxdfMaterial::packet_color`](super::bsdf::BxdfMaterial::packet_color_parameter)
     /// returns. Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
@@ -147,7 +147,7 @@ pub trait Bxdf: Soa + Default {
     fn pdf(
         &self,
         view: &Self::View,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         wi: Vec3,
         shape: f32,
@@ -159,7 +159,7 @@ pub trait Bxdf: Soa + Default {
     fn sample(
         &self,
         view: &Self::View,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],

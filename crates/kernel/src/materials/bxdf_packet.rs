@@ -1,6 +1,6 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
-use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, LobeSet, NarrowLobe, UvPacket};
+use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes, UvPacket};
 use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
 use super::microfacet::rotate_toward_viewer;
 use super::rough_dielectric::DielectricBxdf;
@@ -106,7 +106,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// the given coordinates replace the color. Later entries of `shown` override earlier ones. Returns a
     /// mask of surfaces that reflect nothing.
     #[inline(always)]
-    pub fn fill_lanes(
+    pub fn set_lanes_to_material(
         &mut self,
         point: &B::Point,
         color: Option<(&Texture, &UvPacket)>,
@@ -141,7 +141,12 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// in `of` or for all lanes. Replaces `normals` with the normals rotated by
     /// [`facing_normal`](super::bxdf::facing_normal).
     #[inline(always)]
-    pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
+    pub fn set_normals_and_directions(
+        &mut self,
+        of: Option<&Mask>,
+        normals: &mut Vec3x16,
+        directions: &Vec3x16,
+    ) {
         if B::TURNS_NORMALS {
             for i in 0..PACKET_SIZE {
                 let turned = rotate_toward_viewer(lane(normals, i), -lane(directions, i));
@@ -219,7 +224,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are around `normals`. `values` is
     /// the result of [`BxdfPacket::f`].
     #[inline(always)]
-    pub fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
+    pub fn pdf(&self, lobes: SampledLobes, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
         if self.has_narrow_lobes() {
             self.pdf_lanes::<true>(lobes, normals, wi, values)
         } else {
@@ -230,7 +235,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     fn pdf_lanes<const NARROW: bool>(
         &self,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normals: &Vec3x16,
         wi: &Vec3x16,
         values: &BsdfValues,
@@ -248,7 +253,13 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Samples a unit direction for each surface. Cosine lobes are around `normals`. `choices` selects the
     /// lobes, and `u` the directions within them. All random numbers are in [0, 1).
     #[inline(always)]
-    pub fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+    pub fn sample(
+        &self,
+        lobes: SampledLobes,
+        normals: &Vec3x16,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+    ) -> Vec3x16 {
         if self.has_narrow_lobes() {
             self.sample_lanes::<true>(lobes, normals, choices, u)
         } else {
@@ -259,7 +270,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     fn sample_lanes<const NARROW: bool>(
         &self,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
@@ -370,14 +381,14 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// [`BxdfPacket::f`].
     #[inline(always)]
     pub(super) fn dispatch_f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
-        if B::IS_INLINED { self.f(wi) } else { simd.call(EvaluationKernel { packet: self, wi }) }
+        if B::IS_INLINED { self.f(wi) } else { simd.call_out_of_line(EvaluationKernel { packet: self, wi }) }
     }
 
     /// [`BxdfPacket::pdf`].
     #[inline(always)]
     pub(super) fn dispatch_pdf(
         &self,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normals: &Vec3x16,
         wi: &Vec3x16,
         values: &BsdfValues,
@@ -386,7 +397,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         if B::IS_INLINED {
             self.pdf(lobes, normals, wi, values)
         } else {
-            simd.call(PdfKernel { packet: self, lobes, normals, wi, values })
+            simd.call_out_of_line(PdfKernel { packet: self, lobes, normals, wi, values })
         }
     }
 
@@ -394,7 +405,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub(super) fn dispatch_sample(
         &self,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
@@ -403,7 +414,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         if B::IS_INLINED {
             self.sample(lobes, normals, choices, u)
         } else {
-            simd.call(SamplingKernel { packet: self, lobes, normals, choices, u })
+            simd.call_out_of_line(SamplingKernel { packet: self, lobes, normals, choices, u })
         }
     }
 }
@@ -417,7 +428,7 @@ impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
         u: &[F32x16; 2],
         simd: impl Simd,
     ) -> DielectricSamplePacket {
-        simd.call(EitherSideSamplingKernel { packet: self, choices, u })
+        simd.call_out_of_line(EitherSideSamplingKernel { packet: self, choices, u })
     }
 }
 
@@ -439,7 +450,7 @@ impl<B: Bxdf> SimdKernel for EvaluationKernel<'_, B> {
 /// Kernel of [`BxdfPacket::pdf`].
 struct PdfKernel<'a, B: Bxdf> {
     packet: &'a BxdfPacket<B>,
-    lobes: LobeSet,
+    lobes: SampledLobes,
     normals: &'a Vec3x16,
     wi: &'a Vec3x16,
     values: &'a BsdfValues,
@@ -457,7 +468,7 @@ impl<B: Bxdf> SimdKernel for PdfKernel<'_, B> {
 /// Kernel of [`BxdfPacket::sample`].
 struct SamplingKernel<'a, B: Bxdf> {
     packet: &'a BxdfPacket<B>,
-    lobes: LobeSet,
+    lobes: SampledLobes,
     normals: &'a Vec3x16,
     choices: &'a F32x16,
     u: &'a [F32x16; 2],

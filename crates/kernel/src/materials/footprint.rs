@@ -87,12 +87,12 @@ impl Footprint {
 
     /// Length of the longer axis in texels. `per_unit` is the number of texels per unit of u and v.
     pub fn major_axis_texels(&self, per_unit: Vec2) -> f32 {
-        self.major_axis_length(|axis| axis * per_unit)
+        self.transformed_major_axis_length(|axis| axis * per_unit)
     }
 
     /// Length of the longer axis after applying a linear map.
     #[inline]
-    pub fn major_axis_length(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
+    pub fn transformed_major_axis_length(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
         let lengths = self.axes.map(|axis| map(axis).length());
         lengths[0].max(lengths[1])
     }

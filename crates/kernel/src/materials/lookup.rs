@@ -1,7 +1,7 @@
 //! Sources of parameter values. A material lists its parameters once, in [`BxdfMaterial::point`], for
 //! texture lookups, for renders with white textures, and for finding the textures that it uses.
 //!
-//! [`BxdfMaterial::point`]: super::bsdf::BxdfMaterial::point
+//! [`BxdfMaterial::point`]: super::bsdf::BxdfMaterial::look_up_parameters
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub trait ParameterLookup<'m> {
 
     /// The value of a number whose neutral value is 0 instead of 1.
     #[inline(always)]
-    fn signed(&mut self, number: &'m ScalarParameter) -> f32 {
+    fn number_neutral_at_zero(&mut self, number: &'m ScalarParameter) -> f32 {
         self.number(number)
     }
 
@@ -66,7 +66,7 @@ impl ParameterLookup<'_> for WhiteLookup {
     }
 
     #[inline(always)]
-    fn signed(&mut self, number: &ScalarParameter) -> f32 {
+    fn number_neutral_at_zero(&mut self, number: &ScalarParameter) -> f32 {
         number.as_constant().unwrap_or(0.0)
     }
 }
@@ -91,9 +91,9 @@ impl<'m> ParameterLookup<'m> for TextureCollector<'m> {
         WhiteLookup.number(number)
     }
 
-    fn signed(&mut self, number: &'m ScalarParameter) -> f32 {
+    fn number_neutral_at_zero(&mut self, number: &'m ScalarParameter) -> f32 {
         self.scattering.extend(number.texture());
-        WhiteLookup.signed(number)
+        WhiteLookup.number_neutral_at_zero(number)
     }
 
     fn ambient(&mut self, color: &'m ColorParameter) -> Vec3 {

@@ -94,7 +94,7 @@ impl<'a> ImageHalver<'a> {
             match to {
                 TexelData::FloatAlpha(texels) => {
                     let texel = |x: u32, y: u32| {
-                        self.of.premultiplied(y as usize * self.of.width as usize + x as usize)
+                        self.of.premultiplied_texel(y as usize * self.of.width as usize + x as usize)
                     };
                     texels.push(rows.mean(|y| columns.mean(|x| texel(x, y))));
                 }

@@ -25,7 +25,7 @@ impl Mirror {
         match self {
             Self::Constant(color) => color.evaluate(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => {
-                let fresnel = fresnel.point(&mut PointLookup { point: at, lookups });
+                let fresnel = fresnel.look_up_parameters(&mut PointLookup { point: at, lookups });
                 tint.map_or(fresnel, |tint| fresnel.tinted(tint)).reflectance(cosine)
             }
         }
@@ -35,7 +35,7 @@ impl Mirror {
     pub fn untextured_reflectance(&self, cosine: f32) -> Vec3 {
         match self {
             Self::Constant(color) => color.as_constant().unwrap_or(Vec3::ONE),
-            Self::Conductor(fresnel) => fresnel.point(&mut WhiteLookup).reflectance(cosine),
+            Self::Conductor(fresnel) => fresnel.look_up_parameters(&mut WhiteLookup).reflectance(cosine),
         }
     }
 
@@ -47,7 +47,7 @@ impl Mirror {
                 textures.color(color);
             }
             Self::Conductor(fresnel) => {
-                fresnel.point(&mut textures);
+                fresnel.look_up_parameters(&mut textures);
             }
         }
         textures.scattering.into_iter()

@@ -38,18 +38,18 @@ impl Texels {
     /// Linear value at column `x` and row `y` from the top. Both must be in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
-        self.linear_value(y as usize * self.width as usize + x as usize)
+        self.linear_color_at_index(y as usize * self.width as usize + x as usize)
     }
 
     /// Linear value at a texel index.
     #[inline]
-    pub fn linear_value(&self, place: usize) -> Vec3 {
+    pub fn linear_color_at_index(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
-            TexelData::Linear8(bytes) => linear_from_bytes(bytes[place]),
+            TexelData::Linear8(bytes) => unit_color_from_bytes(bytes[place]),
             TexelData::Float(floats) => floats[place],
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
-                self.unpremultiplied(place)
+                self.unpremultiplied_texel(place)
             }
         }
     }
@@ -65,7 +65,7 @@ impl Texels {
 
     /// Linear color at a texel index, not premultiplied by alpha.
     #[cold]
-    fn unpremultiplied(&self, place: usize) -> Vec3 {
+    fn unpremultiplied_texel(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::SrgbAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
@@ -73,15 +73,17 @@ impl Texels {
             }
             TexelData::LinearAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
-                linear_from_bytes([red, green, blue])
+                unit_color_from_bytes([red, green, blue])
             }
             TexelData::FloatAlpha(floats) => unpremultiply(floats[place]),
-            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => self.linear_value(place),
+            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => {
+                self.linear_color_at_index(place)
+            }
         }
     }
 
     /// Linear color premultiplied by alpha, and alpha, at a texel index.
-    pub fn premultiplied(&self, place: usize) -> Vec4 {
+    pub fn premultiplied_texel(&self, place: usize) -> Vec4 {
         let weight = match &self.data {
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => 1.0,
             TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
@@ -89,13 +91,14 @@ impl Texels {
             }
             TexelData::FloatAlpha(floats) => return floats[place],
         };
-        (self.linear_value(place) * weight).extend(weight)
+        (self.linear_color_at_index(place) * weight).extend(weight)
     }
 
     /// Applies a threshold to the red channel. The result is 1 where the channel is at least `least`,
     /// otherwise 0.
-    pub fn threshold(&self, least: f32) -> Self {
-        let texel = |place: usize| [if self.linear_value(place).x >= least { u8::MAX } else { 0 }; 3];
+    pub fn threshold_red_channel(&self, least: f32) -> Self {
+        let texel =
+            |place: usize| [if self.linear_color_at_index(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
         Self { data, unusable: 0, ..*self }
     }
@@ -104,7 +107,7 @@ impl Texels {
     #[inline(always)]
     pub fn gather<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
         let mut values = [Vec3::ZERO; N];
-        self.decode(places, |i, value| values[i] = value);
+        self.for_each_decoded_texel(places, |i, value| values[i] = value);
         values
     }
 
@@ -113,13 +116,13 @@ impl Texels {
     #[inline(always)]
     pub fn gather_packets(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
         for (places, values) in places.iter().zip(values) {
-            self.decode(places, |i, value| set_lane(values, i, value));
+            self.for_each_decoded_texel(places, |i, value| set_lane(values, i, value));
         }
     }
 
     /// Passes the linear value at each texel index to `put`.
     #[inline(always)]
-    fn decode<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
+    fn for_each_decoded_texel<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
                 let table = &*SRGB8_TO_LINEAR;
@@ -131,7 +134,7 @@ impl Texels {
             }
             TexelData::Linear8(bytes) => {
                 for i in 0..N {
-                    put(i, linear_from_bytes(bytes[places[i]]));
+                    put(i, unit_color_from_bytes(bytes[places[i]]));
                 }
             }
             TexelData::Float(floats) => {
@@ -141,7 +144,7 @@ impl Texels {
             }
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
                 for i in 0..N {
-                    put(i, self.unpremultiplied(places[i]));
+                    put(i, self.unpremultiplied_texel(places[i]));
                 }
             }
         }
@@ -150,11 +153,11 @@ impl Texels {
     /// Linear values of all texels.
     pub fn into_linear(self) -> Vec<Vec3> {
         if self.has_alpha() {
-            return (0..self.len()).map(|place| self.linear_value(place)).collect();
+            return (0..self.len()).map(|place| self.linear_color_at_index(place)).collect();
         }
         match self.data {
             TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),
-            TexelData::Linear8(bytes) => bytes.into_iter().map(linear_from_bytes).collect(),
+            TexelData::Linear8(bytes) => bytes.into_iter().map(unit_color_from_bytes).collect(),
             TexelData::Float(floats) => floats,
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => Vec::new(),
         }
@@ -163,7 +166,7 @@ impl Texels {
     /// Mean of all texels, weighted by alpha if there is an alpha channel.
     pub fn mean(&self) -> Vec3 {
         if self.has_alpha() {
-            let sum: DVec4 = (0..self.len()).map(|place| self.premultiplied(place).as_dvec4()).sum();
+            let sum: DVec4 = (0..self.len()).map(|place| self.premultiplied_texel(place).as_dvec4()).sum();
             return unpremultiply((sum / self.len() as f64).as_vec4());
         }
         self.mean_of(|texel| texel)
@@ -245,6 +248,6 @@ pub fn unpremultiply(weighted: Vec4) -> Vec3 {
 }
 
 #[inline(always)]
-fn linear_from_bytes(bytes: [u8; 3]) -> Vec3 {
+fn unit_color_from_bytes(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| f32::from(byte) / 255.0))
 }

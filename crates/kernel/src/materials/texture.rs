@@ -69,12 +69,12 @@ impl ScaleAndOffset {
     pub const IDENTITY: Self = Self { gain: Vec3::ONE, base: Vec3::ZERO };
 
     /// A scale without an offset. `None` if the scale is 1.
-    pub fn new(gain: Vec3) -> Option<Self> {
-        Self::with_offset(gain, Vec3::ZERO)
+    pub fn from_scale(gain: Vec3) -> Option<Self> {
+        Self::from_scale_and_offset(gain, Vec3::ZERO)
     }
 
     /// A scale and an offset. `None` for the identity.
-    pub fn with_offset(gain: Vec3, base: Vec3) -> Option<Self> {
+    pub fn from_scale_and_offset(gain: Vec3, base: Vec3) -> Option<Self> {
         (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
     }
 
@@ -239,7 +239,7 @@ impl Texture {
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
         };
         // Look up on both sides, along the axes of the image.
-        let steps = size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
+        let steps = float_size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
         let beside = |by: DVec2| self.lookup_in_tiles(tiles + by, || level).x;
         let change = |half: DVec2| beside(half) - beside(-half);
         let changes =
@@ -272,7 +272,7 @@ impl Texture {
 
     /// Number of texels per unit of u and v.
     pub fn texels_per_unit(&self) -> [f64; 2] {
-        let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
+        let (size, repeat) = (float_size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
         let Some(moved) = &self.moved else { return (size * repeat).abs().to_array() };
         let along = |axis: DVec2| (moved.transform_vector(axis * repeat) * size).length();
         [along(DVec2::X), along(DVec2::Y)]
@@ -304,9 +304,9 @@ impl Texture {
     /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
     fn lookup_repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
-        let (texels, size) = (&*self.texels, size(&self.texels));
+        let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [self.wrap.fold_packet(&uv[0], repeat.x), self.wrap.fold_packet(&uv[1], repeat.y)];
-        let extent = extent(texels);
+        let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
         let (shift, count) = match self.filter {
             TextureFilter::Nearest => (0.0, 1),
@@ -370,11 +370,11 @@ impl Texture {
     /// The mip level at which the footprint is one texel wide. It is nonnegative, and may be fractional.
     fn mip_level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
-            None => at.footprint.major_axis_texels(size(&self.texels) * self.repeat),
+            None => at.footprint.major_axis_texels(float_size(&self.texels) * self.repeat),
             Some(moved) => {
-                let size = size(&self.texels);
+                let size = float_size(&self.texels);
                 let footprint = moved.second_uv_point(at).map_or(&at.footprint, |second| &second.footprint);
-                footprint.major_axis_length(|axis| {
+                footprint.transformed_major_axis_length(|axis| {
                     moved.transform_vector((axis * self.repeat).as_dvec2()).as_vec2() * size
                 })
             }
@@ -383,10 +383,10 @@ impl Texture {
     }
 
     fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
-        let (size, extent) = (size(&self.texels), extent(&self.texels));
+        let (size, extent) = (float_size(&self.texels), integer_size(&self.texels));
         let column = self.wrap.wrap_index(floor(u * size.x), extent[0]);
         let row = self.wrap.wrap_index(floor(v * size.y), extent[1]);
-        self.texels.linear_value(texel_index(column, row, extent))
+        self.texels.linear_color_at_index(texel_index(column, row, extent))
     }
 
     /// Interpolates between the two levels around `level`.
@@ -416,7 +416,7 @@ impl Texture {
     }
 
     /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
-    /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
+    /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold_red_channel`].
     pub fn cutoff_coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tile_coordinates(at);
         let folded =
@@ -450,7 +450,7 @@ impl Texture {
     #[inline(never)]
     fn bilinear_premultiplied(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
         let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
-        let corners = places.map(|place| texels.premultiplied(place));
+        let corners = places.map(|place| texels.premultiplied_texel(place));
         corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
     }
 
@@ -467,7 +467,7 @@ impl Texture {
     /// Indices of the four nearest texels, and the interpolation weights.
     #[inline(always)]
     fn bilinear_corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
-        let (size, extent) = (size(texels), extent(texels));
+        let (size, extent) = (float_size(texels), integer_size(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let first = [floor(x), floor(y)];
         let (fx, fy) = (x - first[0] as f32, y - first[1] as f32);
@@ -508,12 +508,12 @@ fn texel_indices(
 
 /// Width and height in texels, as integers.
 #[inline(always)]
-fn extent(texels: &Texels) -> [i32; 2] {
+fn integer_size(texels: &Texels) -> [i32; 2] {
     [texels.width as i32, texels.height as i32]
 }
 
 /// Width and height in texels, as a float vector.
-fn size(texels: &Texels) -> Vec2 {
+fn float_size(texels: &Texels) -> Vec2 {
     Vec2::new(texels.width as f32, texels.height as f32)
 }
 
@@ -685,7 +685,7 @@ mod tests {
     fn factor_scales_values_and_mean_but_not_slopes() {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
-        let texture = Texture { factor: ScaleAndOffset::new(factor), ..plain.clone() };
+        let texture = Texture { factor: ScaleAndOffset::from_scale(factor), ..plain.clone() };
         let at = TexturePoint::from_uv(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
@@ -701,7 +701,7 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.texels = texels;
         for (base, gain, expected) in [(-0.5, 1.0, 0.25), (1.0, -2.0, 0.5), (-2.0, 1.0, 0.0)] {
-            texture.factor = ScaleAndOffset::with_offset(Vec3::splat(gain), Vec3::splat(base));
+            texture.factor = ScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base));
             assert_eq!(texture.mean(), Vec3::splat(expected), "{base} {gain}");
             let at = TexturePoint::from_uv(DVec2::new(0.1, 0.5));
             assert_eq!(texture.lookup(&at), Vec3::splat(f32::max(base, 0.0)), "{base} {gain}");
@@ -709,7 +709,7 @@ mod tests {
         let black = TexelData::Float(vec![Vec3::ZERO; 2]);
         texture.texels = Arc::new(Texels { width: 2, height: 1, data: black, unusable: 0 });
         for (base, is_black) in [(-0.5, true), (0.0, true), (1.0, false)] {
-            texture.factor = ScaleAndOffset::with_offset(Vec3::ONE, Vec3::splat(base));
+            texture.factor = ScaleAndOffset::from_scale_and_offset(Vec3::ONE, Vec3::splat(base));
             assert_eq!(texture.is_black(), is_black, "{base}");
         }
     }
@@ -852,7 +852,7 @@ mod tests {
         // Four of the ten texels are visible. Their alpha is just above the cutoff.
         let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
-        texture.mipmaps = levels(&texture.texels.threshold(0.5));
+        texture.mipmaps = levels(&texture.texels.threshold_red_channel(0.5));
         let at = |u: f64, width: f32| {
             let footprint = Footprint::from_ray_cone(width, Vec3::Z, Vec3::Z, [Vec3::X, Vec3::Y]);
             TexturePoint { footprint, ..TexturePoint::from_uv(DVec2::new(u, 0.5)) }

@@ -32,7 +32,7 @@ use super::memory::MemoryEstimate;
 use super::model::ModelView;
 use super::plan::{OutputNameSource, RenderPlan, resolve_plan, thread_count};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, WriteMode};
-use super::queries::{Query, QueryContext};
+use super::queries::{QueryContext, QueryOrEdit};
 use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
@@ -232,7 +232,7 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
-        let before = self.current_image_key();
+        let before = self.current_image_key_and_view();
         let outcome = self.run_stages(request, sink, context, &mut findings);
         if let Err(StopReason::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
@@ -257,19 +257,20 @@ impl Engine {
         self.end_request(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-        let unchanged = self.current_image_key() == before && settled(Stage::Render) && settled(Stage::Write);
+        let unchanged =
+            self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
         Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
     /// Returns the current image's key and view.
-    fn current_image_key(&self) -> (Option<Fingerprint>, Option<ViewMode>) {
+    fn current_image_key_and_view(&self) -> (Option<Fingerprint>, Option<ViewMode>) {
         let view = self.plan.as_ref().map(|plan| plan.settings.view);
         (self.films.current().map(|state| state.key), view)
     }
 
     /// Sends a preview of the current image in another size, outside of a request.
-    pub(super) fn show_preview_now(
+    pub(super) fn send_resized_preview(
         &mut self,
         bounds: Option<PreviewSize>,
         sink: &EventSink,
@@ -281,7 +282,7 @@ impl Engine {
     }
 
     /// Answers a query about the current image, outside of a request.
-    pub(super) fn query(&self, query: &Query, sink: &EventSink) {
+    pub(super) fn answer_query(&self, query: &QueryOrEdit, sink: &EventSink) {
         match &self.query_context {
             Some(query_context) => query_context.run(query, self.films.current(), &self.inputs, sink),
             None => query.report_failure(NO_IMAGE, sink),
@@ -395,8 +396,12 @@ impl Engine {
         let screen = PreviewTarget { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
         table.run(Stage::Photons, || trace_first_photons(asked, key, store, sending, hear, before))?;
-        let photons_key =
-            plan.settings.effective().photons.filter(|_| plan.settings.gathers_photons()).map(key);
+        let photons_key = plan
+            .settings
+            .without_ineffective_settings()
+            .photons
+            .filter(|_| plan.settings.gathers_photons())
+            .map(key);
         self.plan = Some(ready.plan.clone());
         (self.is_own, self.report) = (request.own.is_none(), None);
         self.query_context = Some(query_context);
@@ -429,7 +434,7 @@ impl Engine {
             let contents = Snapshot::new(Arc::clone(&self.contents));
             let result = read(self, &contents, findings);
             if result.is_err() && !token.is_cancelled() {
-                contents.verify(token)?;
+                contents.recheck_seen_files(token)?;
             }
             if token.is_cancelled() || contents.changed_file().is_none() {
                 return result;
@@ -483,7 +488,7 @@ impl Engine {
         let before = std::mem::replace(&mut self.inputs, ProtectedInputs::from_scene(&parsed));
         let looked = self.check_conflicts(request, &plan, findings, table.sink);
         // The current image still shows the previous scene and may still have to be written.
-        self.inputs.add(before);
+        self.inputs.merge(before);
         looked?;
         if findings.conflicts.is_empty() {
             check_targets(request.write, &plan, table.sink)?;
@@ -503,7 +508,7 @@ impl Engine {
         let (generation, textures, files) = (request.generation, Arc::new(textures), findings.files.clone());
         let good = LastValidScene { generation, parsed, meshes, bodies, textures, needed, files };
         let ready = self.build_world(request, &good, (plan, own_image_plan), table, &reading)?;
-        self.handle_scene_saves(request.saves);
+        self.allow_replacing_after_scene_save(request.saves);
         self.good = Some(good);
         Ok(ready)
     }
@@ -751,7 +756,7 @@ impl Engine {
 /// # Errors
 /// A file has changed, or the token is cancelled.
 fn verify_files_unchanged(contents: &Snapshot, token: &CancelToken) -> Result<(), StopReason> {
-    contents.verify(token)?;
+    contents.recheck_seen_files(token)?;
     let changed =
         contents.changed_file().map(|path| format!("{} changed while it was being read", path.display()));
     changed.map_or(Ok(()), |message| Err(StopReason::work_failure(message)))

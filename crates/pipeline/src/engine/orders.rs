@@ -5,7 +5,7 @@ use std::cell::Cell;
 use crate::control::CancelToken;
 use crate::inputs::ProtectedInputs;
 use crate::protocol::{Event, PreviewSize};
-use crate::queries::{Query, QueryContext};
+use crate::queries::{QueryContext, QueryOrEdit};
 use crate::render::film_state::FilmState;
 use crate::sink::EventSink;
 
@@ -29,7 +29,7 @@ pub(crate) trait PendingCommands {
     /// Takes the pending preview size change.
     fn take_preview_resize(&self) -> Option<Option<PreviewSize>>;
     /// Takes the next query about the current image.
-    fn take_query(&self) -> Option<Query>;
+    fn take_query(&self) -> Option<QueryOrEdit>;
     /// Returns the reason for interrupting the render.
     fn interruption(&self) -> Interruption;
 }

@@ -17,26 +17,26 @@ use crate::output::OutputError;
 /// Removes an existing report that does not describe the plan's image files.
 pub(super) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
-        sink.write_failed(None, format!("the report describes an earlier image: {error}"));
+        sink.send_write_failed(None, format!("the report describes an earlier image: {error}"));
     }
 }
 
 impl Engine {
     /// Whether every pixel of the current image has a sample.
-    pub(crate) fn can_write(&self) -> bool {
+    pub(crate) fn has_sample_in_every_pixel(&self) -> bool {
         self.films.current().is_some_and(FilmState::covers_all_pixels)
     }
 
     /// Writes the current image, outside of a request.
     pub(crate) fn write_now(&mut self, sink: &EventSink) {
         let (Some(state), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
-            return sink.write_failed(None, NO_IMAGE.to_owned());
+            return sink.send_write_failed(None, NO_IMAGE.to_owned());
         };
         if !state.covers_all_pixels() {
             // Earlier requests may have written images.
             let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
             let message = format!("{what}: {INCOMPLETE_IMAGE}");
-            return sink.write_failed(None, message);
+            return sink.send_write_failed(None, message);
         }
         if self.is_broken
             && let Some(path) = self.written.first_foreign_file(&plan.outputs, &self.contents)
@@ -46,7 +46,7 @@ impl Engine {
                 "no image written: {SCENE_HAS_ERRORS} and may reference {path}, which this run did not write; fix \
                  the scene first"
             );
-            return sink.write_failed(None, message);
+            return sink.send_write_failed(None, message);
         }
         let to = Destination {
             plan,
@@ -90,7 +90,7 @@ impl Engine {
             return Err(StopReason::Failed(findings.take_failure()));
         }
         if found != findings.conflicts {
-            sink.write_conflicts(found.clone());
+            sink.send_write_conflicts(found.clone());
         }
         findings.conflicts = found;
         Ok(())
@@ -115,7 +115,7 @@ impl Engine {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
             let message =
                 if is_cancelled { format!("report not written: {error}") } else { error.to_string() };
-            sink.write_failed(None, message);
+            sink.send_write_failed(None, message);
         }
     }
 

@@ -53,7 +53,7 @@ impl SavedSceneImage {
         let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
         let world = keys::world_key(surfaces, &eye.camera, &of);
         let film = keys::film_key(world, &plan.settings, plan.crop);
-        let image = image_key(film, &plan);
+        let image = written_image_key(film, &plan);
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
 
@@ -66,7 +66,7 @@ impl SavedSceneImage {
 }
 
 /// Returns the key for a finished image and its output files.
-fn image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
+fn written_image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     let mut key = FingerprintHasher::new("own image");
     key.add_fingerprint(&keys::image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
@@ -129,9 +129,9 @@ impl Engine {
 
     /// If the scene has been saved since the last request, lets its own image replace an image with keyboard
     /// changes.
-    pub(super) fn handle_scene_saves(&mut self, saves: u64) {
+    pub(super) fn allow_replacing_after_scene_save(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
-            self.written.allow_replacing_all();
+            self.written.allow_replacing_user_image();
         }
     }
 
@@ -230,7 +230,7 @@ impl Engine {
         let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
-                checkpointer.check_already_saved(state);
+                checkpointer.record_whether_already_saved(state);
                 checkpointer.finish(state, state.traced, true);
             }
         });
@@ -242,7 +242,7 @@ impl Engine {
         let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
         self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
-                checkpointer.check_already_saved(state);
+                checkpointer.record_whether_already_saved(state);
                 checkpointer.save_if_cancelled(state, state.traced, state.render_seconds);
             }
         });

@@ -42,7 +42,7 @@ impl LastValidScene {
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
         for FileRead { path, content } in &self.files {
             let is_scene_file = *path == loaded.path && !is_mesh(path);
-            if !is_scene_file && reading.contents.read(path, reading.token)? != *content {
+            if !is_scene_file && reading.contents.read_content_id(path, reading.token)? != *content {
                 return Ok(true);
             }
         }
@@ -59,12 +59,12 @@ impl Engine {
         sink: &EventSink,
         context: &RequestContext<'_>,
     ) {
-        let before = self.current_image_key();
+        let before = self.current_image_key_and_view();
         // Drop errors from this render, because the failed request has already reported its own.
         let end = match self.render_last_valid_scene(newest, sink, context) {
-            Ok(Some(is_reused)) => {
-                LastValidSceneOutcome::Finished { unchanged: is_reused && self.current_image_key() == before }
-            }
+            Ok(Some(is_reused)) => LastValidSceneOutcome::Finished {
+                unchanged: is_reused && self.current_image_key_and_view() == before,
+            },
             Ok(None) | Err(_) => LastValidSceneOutcome::Stopped,
         };
         sink.send(Event::LastGoodEnded { generation: newest.generation, end });
@@ -136,7 +136,7 @@ impl Engine {
         }
         let mut findings = Findings::default();
         let found = load_textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
-        reading.contents.verify(reading.token)?;
+        reading.contents.recheck_seen_files(reading.token)?;
         if reading.contents.changed_file().is_some() {
             return Ok(None);
         }

@@ -12,7 +12,7 @@ use super::{
     write_ground, write_lights, write_render_settings,
 };
 use crate::assets::gltf::{
-    Alpha, GltfFile, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TexturedValue,
 };
 use crate::assets::{AssetError, Companion};
@@ -75,7 +75,7 @@ pub(super) fn scene_text(
         names: HashMap::new(),
         images: BTreeSet::new(),
         image_names: scene.images.clone(),
-        companions: container.companions().to_vec(),
+        companions: container.external_buffers().to_vec(),
     };
     writer.write(&scene, bounds, show);
     let SceneWriter { toml, assets, images, companions, .. } = writer;
@@ -123,7 +123,7 @@ impl SceneWriter<'_> {
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
             true => Lighting::Default { is_polished: scene.materials.iter().any(may_cast_caustics) },
-            false => Lighting::from_file(max_irradiance(&scene.lights, bounds)),
+            false => Lighting::from_file_lights(max_irradiance(&scene.lights, bounds)),
         };
         write_render_settings(&mut self.toml, size, lighting);
         let eye = match own {
@@ -261,8 +261,8 @@ impl super::materials::SceneExport for SceneWriter<'_> {
     fn image_name(&self, image: usize) -> String {
         let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
         let of_file = || match self.container.locate_image(image) {
-            Ok(ImageBytes::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
-            Ok(ImageBytes::Inside(_)) | Err(_) => None,
+            Ok(ImageLocation::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
+            Ok(ImageLocation::Inside(_)) | Err(_) => None,
         };
         name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
     }
@@ -271,7 +271,7 @@ impl super::materials::SceneExport for SceneWriter<'_> {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {
-            (ExportStorage::Inside, Ok(ImageBytes::File(file)))
+            (ExportStorage::Inside, Ok(ImageLocation::File(file)))
                 if has_image_extension(&file) && file.is_file() =>
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
@@ -281,15 +281,15 @@ impl super::materials::SceneExport for SceneWriter<'_> {
             // A file without an image extension is read through the glTF file, so that its format is detected
             // from its content. A missing file is watched until it appears.
             (ExportStorage::Inside, bytes) => {
-                if let Ok(ImageBytes::File(file)) = bytes {
+                if let Ok(ImageLocation::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None, stamp: None });
                 }
                 TextureFile { file: file_name(self.path), image: Some(image) }
             }
             (ExportStorage::Folder(_), bytes) => {
                 let ending = match &bytes {
-                    Ok(ImageBytes::Inside(bytes)) => image_extension(bytes).to_owned(),
-                    Ok(ImageBytes::File(path)) => {
+                    Ok(ImageLocation::Inside(bytes)) => image_extension(bytes).to_owned(),
+                    Ok(ImageLocation::File(path)) => {
                         let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
                         let start = || first_bytes(path).unwrap_or_default();
                         if MAPS.contains(&own.as_str()) { own } else { image_extension(&start()).to_owned() }

@@ -60,7 +60,7 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
                     // arbitrary files as images.
                     container.check_image(image, token)?;
-                    container.image_content(image, token)?
+                    container.read_image_bytes(image, token)?
                 }
             };
             files.push((PathBuf::from(asset.name), bytes));

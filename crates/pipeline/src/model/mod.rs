@@ -153,7 +153,7 @@ enum Lighting {
 
 impl Lighting {
     /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
-    fn from_file(irradiance: f64) -> Self {
+    fn from_file_lights(irradiance: f64) -> Self {
         // At this irradiance, a white surface is as bright as under the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);

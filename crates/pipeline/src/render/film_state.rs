@@ -7,7 +7,8 @@ use std::sync::Arc;
 use super::forecast::cost::{CellCost, JobCost, PixelOverhead};
 use super::forecast::samples::ExpectedSamples;
 use crate::film::{
-    CELLS, Convergence, Film, FilmError, PixelSubset, Pixels, Previewer, RadianceImage, Rect, SumOrder,
+    CELLS, Convergence, Film, FilmError, PixelSubset, Previewer, RadianceImage, Rect, SelectedPixels,
+    SumOrder,
 };
 use crate::integrators::RayCounters;
 use crate::output::part::Dependency;
@@ -152,9 +153,9 @@ impl FilmState {
 
     /// Reads the sample counts from the film.
     pub(super) fn recount_samples(&mut self) {
-        let halves: Vec<_> = self.cell_halves().collect();
+        let halves: Vec<_> = self.assigned_cell_halves().collect();
         for (cell, half) in halves {
-            self.done[cell][half] = self.film.cell_half_samples(cell, half);
+            self.done[cell][half] = self.film.cell_half_samples_per_pixel(cell, half);
         }
     }
 
@@ -165,7 +166,7 @@ impl FilmState {
 
     /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
-        self.cell_halves()
+        self.assigned_cell_halves()
             .filter(|(cell, _)| self.is_cell_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.get(tile, half).min(samples))
     }
@@ -178,21 +179,21 @@ impl FilmState {
 
     /// Whether no pixel has more than `samples` samples.
     pub(crate) fn has_at_most_samples(&self, samples: u32) -> bool {
-        self.cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
+        self.assigned_cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
     /// Returns the lowest sample count among pixels that need more samples, limited to `most`.
-    pub(crate) fn min_samples(&self, most: u32) -> u32 {
-        self.min_samples_in(None, most)
+    pub(crate) fn min_unfinished_samples(&self, most: u32) -> u32 {
+        self.min_unfinished_samples_in(None, most)
     }
 
-    /// Like [`Self::min_samples`], but only for tiles overlapping `part`. `None` means all tiles.
-    pub(crate) fn min_samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
+    /// Like [`Self::min_unfinished_samples`], but only for tiles overlapping `part`. `None` means all tiles.
+    pub(crate) fn min_unfinished_samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
             (done < self.goals.get(tile, half).min(most)).then_some(done)
         };
-        self.cell_halves()
+        self.assigned_cell_halves()
             .filter(|(cell, _)| self.is_cell_in(part, *cell))
             .filter_map(of)
             .min()
@@ -208,15 +209,15 @@ impl FilmState {
 
     /// Whether any pixel has samples.
     pub(crate) fn has_samples(&self) -> bool {
-        self.cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
+        self.assigned_cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether every pixel has a sample. Only such an image may replace another one.
     pub(crate) fn covers_all_pixels(&self) -> bool {
-        self.cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
+        self.assigned_cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    fn cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
+    fn assigned_cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
         halves.filter(|(cell, half)| {
             self.is_tile_in_shard(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0
@@ -253,16 +254,16 @@ impl FilmState {
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
             let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
-            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common_range(&cells)) {
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(uniform_sample_range(&cells)) {
                 jobs.push(job(rect.into(), samples));
                 continue;
             }
             for (rect, halves) in cells {
                 match &halves {
                     [first, other] if first == other => jobs.push(job(rect.into(), first)),
-                    halves => jobs.extend(
-                        (0..2).map(|half| job(Pixels { rect, part: PixelSubset::Half(half) }, &halves[half])),
-                    ),
+                    halves => jobs.extend((0..2).map(|half| {
+                        job(SelectedPixels { rect, part: PixelSubset::Half(half) }, &halves[half])
+                    })),
                 }
             }
         }
@@ -351,9 +352,9 @@ impl FilmState {
 
     /// Returns two sample counts: the highest current count and the highest expected final count of any
     /// pixel. These are also the current and final numbers of photon passes.
-    pub(crate) fn photon_pass_counts(&self, most: u32) -> [u32; 2] {
+    pub(crate) fn current_and_final_photon_passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
-            self.cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
+            self.assigned_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
             most_of(&|cell, half| self.done[cell][half]),
@@ -363,7 +364,7 @@ impl FilmState {
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
-        self.cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
+        self.assigned_cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
     fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
@@ -375,12 +376,12 @@ impl FilmState {
         let units = |(cell, half): (usize, usize)| {
             self.film.half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
-        self.cell_halves().map(units).sum()
+        self.assigned_cell_halves().map(units).sum()
     }
 }
 
 /// Returns the sample range that all halves of all cells need, if it is the same for all of them.
-fn common_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+fn uniform_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }
@@ -428,7 +429,7 @@ mod tests {
 
     /// Adds samples to a tile and records how long they took.
     fn record_job(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
-        let pixels = Pixels::from(state.film.tile_rect(tile).expect("a tile"));
+        let pixels = SelectedPixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
         state.film.add_samples(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
@@ -448,8 +449,8 @@ mod tests {
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
-        assert_eq!(state.photon_pass_counts(8), [8, 8]);
-        assert_eq!(state.photon_pass_counts(16), [8, 16]);
+        assert_eq!(state.current_and_final_photon_passes(8), [8, 8]);
+        assert_eq!(state.current_and_final_photon_passes(16), [8, 16]);
     }
 
     #[test]

@@ -30,7 +30,7 @@ impl<'a> CoarseImageRenderer<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
     /// camera is being moved. Excludes sizes that would take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
-        let usual = self.default_size(shown);
+        let usual = self.reduce_size_for_large_scenes(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
         let hasty = rate.and_then(|rate| size_within_budget(usual, rate));
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
@@ -38,7 +38,7 @@ impl<'a> CoarseImageRenderer<'a> {
 
     /// Returns the preview's size, or a size with half as many pixels if the trees do not fit in the CPU
     /// caches, because tracing rays is then slow.
-    fn default_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+    fn reduce_size_for_large_scenes(&self, (width, height): (u32, u32)) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =

@@ -32,12 +32,12 @@ enum LayerSource {
 }
 
 impl OutputLayer {
-    fn source(self) -> (LayerSource, &'static [&'static str]) {
+    fn source_and_channels(self) -> (LayerSource, &'static [&'static str]) {
         match self {
             Self::Albedo => (LayerSource::View(ViewMode::Albedo), COLOR),
             Self::Normal => (LayerSource::View(ViewMode::Normal), DIRECTION),
             Self::Depth => (LayerSource::View(ViewMode::Depth), DISTANCE),
-            Self::Variance => (LayerSource::Film(variance), NUMBER),
+            Self::Variance => (LayerSource::Film(mean_luminance_variance), NUMBER),
             Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
             Self::Ambient => (LayerSource::View(ViewMode::Ambient), COLOR),
             Self::Diffuse => (LayerSource::View(ViewMode::Diffuse), COLOR),
@@ -57,7 +57,7 @@ impl OutputLayer {
 }
 
 /// Returns the squared standard error of each pixel's mean luminance.
-fn variance(state: &FilmState) -> RadianceImage {
+fn mean_luminance_variance(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
@@ -85,7 +85,7 @@ pub(crate) fn render_layers(
 ) -> Result<Vec<LayerImage>, StopReason> {
     let mut images = Vec::with_capacity(layers.len());
     for (number, layer) in layers.iter().enumerate() {
-        let (source, channels) = layer.source();
+        let (source, channels) = layer.source_and_channels();
         let image = match source {
             LayerSource::Film(image) => image(state),
             LayerSource::View(view) => {
@@ -108,7 +108,7 @@ fn render_view(
     plan.settings.view = view;
     // Use the image's sample counts, no matter what ended its render.
     plan.settings.render.error = 0.0;
-    plan.settings.render.samples = picture.film.sample_stats().max;
+    plan.settings.render.samples = picture.film.sample_count_stats().max;
     plan.time_seconds = None;
     let photons = rendering.photons.filter(|_| plan.settings.gathers_photons());
     let convergence = match photons.is_some_and(PhotonStore::emits_photons) {

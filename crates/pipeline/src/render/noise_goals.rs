@@ -7,7 +7,8 @@
 //! worst case, this is a thirtieth of the noise.
 
 use crate::film::{
-    BrightnessPrepass, CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES, samples_to_reduce_error,
+    BrightnessPrepass, CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES,
+    total_samples_to_reduce_error,
 };
 
 /// Minimum number of samples for noise estimates.
@@ -55,7 +56,7 @@ impl SampleGoals {
     }
 
     /// Whether any goal is below `samples`.
-    pub(crate) fn are_below(&self, samples: u32) -> bool {
+    pub(crate) fn is_any_below(&self, samples: u32) -> bool {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
@@ -75,10 +76,11 @@ impl SampleGoals {
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = NoiseTarget { error, brightness, convergence: film.convergence() };
-        let is_open = |tile: usize| self.judged[tile] < samples && self.is_undecided(tile, done, samples);
+        let is_open =
+            |tile: usize| self.judged[tile] < samples && self.has_undecided_half(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
-            self.decide(&noise, done, samples, &aim);
+            self.decide_from_noise(&noise, done, samples, &aim);
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
             judged.for_each(|(judged, _)| *judged = samples);
         }
@@ -92,13 +94,13 @@ impl SampleGoals {
         let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
-            let halves = || [0, 1].map(|half| film.tile_noise(tile, half)).into_iter().flatten();
+            let halves = || [0, 1].map(|half| film.tile_half_noise(tile, half)).into_iter().flatten();
             let count = halves().count() as f64;
             let all =
                 halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
             let whole = halves().next().map(|half| CellHalfNoise { variance: all.0, mean: all.1, ..half });
             let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
-            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative(&noise))
+            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative_noise(&noise))
         });
         let too_much = || noise.iter().flatten().filter(|noise| **noise > TOO_MUCH * error);
         let worst = too_much().copied().max_by(f64::total_cmp)?;
@@ -106,7 +108,7 @@ impl SampleGoals {
     }
 
     /// Whether a tile contains an undecided half with `samples` samples.
-    pub(crate) fn is_undecided(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(crate) fn has_undecided_half(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -119,7 +121,13 @@ impl SampleGoals {
         halves.any(|(goal, done)| goal > done && *done < LEAST)
     }
 
-    fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &NoiseTarget) {
+    fn decide_from_noise(
+        &mut self,
+        noise: &[Option<TileNoise>],
+        done: &[[u32; 2]],
+        samples: u32,
+        aim: &NoiseTarget,
+    ) {
         for (cell, done) in done.iter().enumerate() {
             let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             if (0..2).all(|half| was_decided[half] || done[half] != samples) {
@@ -161,7 +169,7 @@ pub(crate) struct TileNoise {
 impl TileNoise {
     fn measure(film: &Film, tile: usize) -> Self {
         let noise = |half| {
-            let noise = film.tile_noise(tile, half)?;
+            let noise = film.tile_half_noise(tile, half)?;
             // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
             // other bright samples that have not been taken yet.
             Some(CellHalfNoise {
@@ -186,7 +194,7 @@ pub(crate) struct NoiseTarget {
 impl NoiseTarget {
     /// Returns the number of samples needed for the noise to reach the target.
     fn samples_to_reach(&self, noise: &CellHalfNoise) -> u32 {
-        let relative = self.relative(noise);
+        let relative = self.relative_noise(noise);
         if !(relative > 0.0) {
             return noise.samples;
         }
@@ -195,14 +203,14 @@ impl NoiseTarget {
         // Treat samples up to the next power of two as independent. They reduce the noise faster only once
         // the power of two is reached.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
-            return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
+            return total_samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
         let power = noise.power.min(self.convergence.typical_variance_exponent());
-        samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
+        total_samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
     /// Returns the noise relative to the reference brightness.
-    pub(crate) fn relative(&self, noise: &CellHalfNoise) -> f64 {
+    pub(crate) fn relative_noise(&self, noise: &CellHalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
 }
@@ -210,7 +218,7 @@ impl NoiseTarget {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::film::{PixelSubset, Pixels, Rect, TileSamples};
+    use crate::film::{PixelSubset, Rect, SelectedPixels, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -220,7 +228,7 @@ pub(crate) mod tests {
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit_generator(3);
         for (half, (mean, spread)) in halves.into_iter().enumerate() {
-            let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
+            let pixels = SelectedPixels { rect: film.crop(), part: PixelSubset::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
             film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });
@@ -301,7 +309,7 @@ pub(crate) mod tests {
             for half in 0..2 {
                 let goal = goals.get(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);
-                let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
+                let pixels = SelectedPixels { rect: film.crop(), part: PixelSubset::Half(half) };
                 let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
                 let radiance = (0..8 * samples).map(sample).collect();
                 film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });

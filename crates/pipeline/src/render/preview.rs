@@ -79,14 +79,15 @@ impl PreviewTarget<'_> {
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
         let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
-        let image = state.film.copy_region(quantity, rect, base);
+        let image = state.film.cropped_image(quantity, rect, base);
         self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
         true
     }
 
     /// Sends a radiance image that lacks light from photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
-        self.sink.preview_without_photons(tone_map_to_8_bits(image, &self.plan.tone.with_image_range(image)));
+        self.sink
+            .send_preview_without_photons(tone_map_to_8_bits(image, &self.plan.tone.with_image_range(image)));
     }
 
     fn send(
@@ -101,7 +102,7 @@ impl PreviewTarget<'_> {
             image: keys::image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };
-        self.sink.preview(tone_map_to_8_bits(image, tone), range, section, source);
+        self.sink.send_preview(tone_map_to_8_bits(image, tone), range, section, source);
     }
 
     /// Returns the tone mapping for a preview. Because preview pixels are averages, data views use the value

@@ -12,7 +12,7 @@ use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
 use super::preview::PreviewTarget;
 use super::share::Shard;
-use super::time_budget::next_round;
+use super::time_budget::next_round_goals;
 use crate::film::{BrightnessPrepass, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::math::Vec3;
@@ -114,7 +114,7 @@ impl<'a> Scheduler<'a> {
     pub(crate) fn run(&mut self) -> Result<(), StopReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
-        let (traced, seconds) = (self.total_rays(), self.rendered_seconds());
+        let (traced, seconds) = (self.total_rays(), self.seconds_across_requests());
         if let (Some(checkpointer), Err(StopReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
             self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds);
         }
@@ -130,7 +130,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Returns the number of seconds that all requests have spent on this film.
-    fn rendered_seconds(&mut self) -> f64 {
+    fn seconds_across_requests(&mut self) -> f64 {
         self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
@@ -148,9 +148,9 @@ impl<'a> Scheduler<'a> {
             }
             let first = self.priority_rect();
             if first.is_some() {
-                self.pass(first, 1)?;
+                self.run_pass(first, 1)?;
             }
-            self.pass(None, 1)?;
+            self.run_pass(None, 1)?;
             self.is_first = false;
             self.state.base = None;
             self.show();
@@ -158,7 +158,7 @@ impl<'a> Scheduler<'a> {
         }
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
-            self.render_prepass()?;
+            self.estimate_reference_brightness()?;
         }
         if let Some(first) = self.priority_rect() {
             // Noise is relative to the brightness of the whole image, so sample the whole image first.
@@ -179,7 +179,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
-    fn render_prepass(&mut self) -> Result<(), StopReason> {
+    fn estimate_reference_brightness(&mut self) -> Result<(), StopReason> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
@@ -192,7 +192,7 @@ impl<'a> Scheduler<'a> {
         };
         let jobs: Vec<TileJob> = (0..pilot.count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
-        let keep = |_: &TileJob, samples: TileSamples| BrightnessPrepass::sample_luminance(samples);
+        let keep = |_: &TileJob, samples: TileSamples| BrightnessPrepass::pixel_luminance(samples);
         self.rendering.tracer.run(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;
@@ -207,7 +207,7 @@ impl<'a> Scheduler<'a> {
     /// Evaluates the noise of existing samples from a checkpoint or a cancelled request.
     fn decide_goals_from_existing(&mut self, part: Option<Rect>) {
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
-        let done = self.state.min_samples_in(part, samples);
+        let done = self.state.min_unfinished_samples_in(part, samples);
         // With fewer samples, no goals are decided.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
@@ -220,14 +220,15 @@ impl<'a> Scheduler<'a> {
         let RenderOptions { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.decide_goals_from_existing(part);
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
-            if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
+            if let Some(goals) = self.next_round_goals().filter(|_| part.is_none()) {
                 self.run_round(&goals)?;
                 self.measure_noise_if_due();
                 continue;
             }
             let pixels = self.state.film.crop().area();
-            let target = next_pass_samples(self.state.min_samples_in(part, samples), samples, pixels);
-            self.pass(part, target)?;
+            let target =
+                next_pass_samples(self.state.min_unfinished_samples_in(part, samples), samples, pixels);
+            self.run_pass(part, target)?;
             if target.is_power_of_two() {
                 self.measure_noise_if_due();
             }
@@ -246,12 +247,12 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders all tiles in `part` that have fewer than `target` samples.
-    fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), StopReason> {
+    fn run_pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), StopReason> {
         let Some(photons) = self.rendering.photons else {
             return self.render_jobs(part, |_, _| target, None, 0);
         };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
-            let samples = self.state.min_samples_in(part, target);
+            let samples = self.state.min_unfinished_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
             let numbers = self.state.to_global_samples(at_once);
             let end = samples + numbers.len() as u32;
@@ -288,13 +289,13 @@ impl<'a> Scheduler<'a> {
     /// Returns the next sample count for each half of each cell if there is a time limit. Adds samples where
     /// they reduce the error most. Returns `None` with photons, whose cost does not depend on the number of
     /// cells, and with a noise target, which determines the sample placement instead.
-    fn next_round(&self) -> Option<Vec<[u32; 2]>> {
+    fn next_round_goals(&self) -> Option<Vec<[u32; 2]>> {
         let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let RenderOptions { samples, error, .. } = plan.settings.render;
         if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
             return None;
         }
-        next_round(&self.state.film, &self.state.done, &self.state.rays, samples)
+        next_round_goals(&self.state.film, &self.state.done, &self.state.rays, samples)
     }
 
     /// Renders both halves of every cell in short steps until they reach their goals.
@@ -366,7 +367,7 @@ impl<'a> Scheduler<'a> {
         (self.rendering.pulse)(self.state, !self.is_first);
         let seconds = self.total_render_seconds();
         if let Some(checkpointer) = self.rendering.checkpointer {
-            let rendered = self.rendered_seconds();
+            let rendered = self.seconds_across_requests();
             checkpointer.save_if_due(self.state, self.total_rays(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
@@ -385,7 +386,7 @@ impl<'a> Scheduler<'a> {
         let RenderStageInputs { plan, photons, sink, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
         let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };
-        sink.progress(self.forecast.progress(&moment));
+        sink.send_progress(self.forecast.progress(&moment));
     }
 
     fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {

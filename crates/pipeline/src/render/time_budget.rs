@@ -25,7 +25,12 @@ const BESIDE: f64 = 1.0;
 
 /// Returns the next sample counts for both halves of each cell, based on their current samples and rays. The
 /// counts are at most `most`. Returns `None` if it is too early to decide.
-pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
+pub(crate) fn next_round_goals(
+    film: &Film,
+    done: &[[u32; 2]],
+    rays: &[u64],
+    most: u32,
+) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
@@ -111,7 +116,7 @@ fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{CELLS, PixelSubset, Pixels, TileSamples};
+    use crate::film::{CELLS, PixelSubset, SelectedPixels, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -121,7 +126,7 @@ mod tests {
     /// Adds samples to one half of a cell.
     fn add(film: &Film, (cell, half): (usize, usize), samples: u32, mut sample: impl FnMut() -> f32) {
         let rect = film.cell_rect(cell).expect("a cell");
-        let pixels = Pixels { rect, part: PixelSubset::Half(half) };
+        let pixels = SelectedPixels { rect, part: PixelSubset::Half(half) };
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
         film.add_samples(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }
@@ -147,7 +152,7 @@ mod tests {
 
     /// Returns the goals for the next round, for the film's cells from left to right.
     fn round(film: &Film, done: &[[u32; 2]], most: u32) -> Option<Vec<[u32; 2]>> {
-        let goals = next_round(film, done, &vec![0; done.len()], most)?;
+        let goals = next_round_goals(film, done, &vec![0; done.len()], most)?;
         Some(cells(film).into_iter().map(|cell| goals[cell]).collect())
     }
 
@@ -184,7 +189,7 @@ mod tests {
         let expensive = cells(&film)[0];
         let rays: Vec<u64> =
             (0..done.len()).map(|cell| if cell == expensive { 100_000 } else { 10_000 }).collect();
-        let goals = next_round(&film, &done, &rays, 1000).expect("a round");
+        let goals = next_round_goals(&film, &done, &rays, 1000).expect("a round");
         assert_eq!(cells(&film).into_iter().map(|cell| goals[cell]).collect::<Vec<_>>()[1], [32; 2]);
     }
 
@@ -223,7 +228,7 @@ mod tests {
         }
         let rays = vec![0; done.len()];
         for _ in 0..6 {
-            let goals = next_round(&film, &done, &rays, 1 << 20).expect("a round");
+            let goals = next_round_goals(&film, &done, &rays, 1 << 20).expect("a round");
             let before = done.clone();
             for &(cell, half) in &places {
                 let of = if by_own { 1 - half } else { half };

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Counters, ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report};
+use super::{ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, WorkCounters};
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::ProtectedInputs;
-use crate::integrators::{RayCounters, light_sampling_mode};
-use crate::output::write::{WritePolicy, atomic_guarded};
+use crate::integrators::{RayCounters, light_sampling_purpose};
+use crate::output::write::{WritePolicy, atomic_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
 use crate::protocol::StageReport;
@@ -63,7 +63,7 @@ pub(crate) fn write_report(
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::to_pretty_text(report).map_err(unwritable)?;
     let target = (OutputTarget::for_report(path), None);
-    write_guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
+    write_guarded(plan, inputs, target, sink, |guard| atomic_with_policy(path, text.as_bytes(), guard, token))
 }
 
 /// Removes the report for an earlier image after an unfinished image has replaced that image. Does not remove
@@ -88,7 +88,7 @@ pub(crate) fn remove_report(
 
 fn image_report(finished: &RequestResults<'_>) -> ImageReport {
     let plan = finished.plan;
-    let samples = finished.state.film.sample_stats();
+    let samples = finished.state.film.sample_count_stats();
     let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
     let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
     ImageReport {
@@ -110,7 +110,7 @@ fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler(light_sampling_mode(settings, are_gathered));
+    let selection = lights.sampler(light_sampling_purpose(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (LightSelectionMode::Picked, samples * u64::from(selection.picks.count)),
         None => (LightSelectionMode::All, 0),
@@ -133,9 +133,9 @@ fn data_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     plan.tone.with_image_range(&image).range_map.range().map(|range| range.limits())
 }
 
-fn count_work(finished: &RequestResults<'_>) -> Counters {
+fn count_work(finished: &RequestResults<'_>) -> WorkCounters {
     let (world, rays) = (finished.world, finished.rays);
-    Counters {
+    WorkCounters {
         triangles: world.triangle_count(),
         objects: world.object_count(),
         camera_rays: rays.camera_rays,

@@ -13,10 +13,12 @@ use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
-use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, separate_coincident_emitters};
+use crate::world::{
+    Geometry, MeshTree, light_lifts, mesh_files_with_emissive_override, separate_coincident_emitters,
+};
 
 /// A mesh with distinct lights, and its key.
-type DistinctMesh = (Fingerprint, Arc<LoadedMesh>);
+type SeparatedEmitterMesh = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -76,7 +78,7 @@ pub(crate) fn build_accel_structures(
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<AccelResult>, StopReason> {
-    let distinct = meshes_with_distinct_lights(scene, meshes, cache, reading.token)?;
+    let distinct = separate_mesh_emitters(scene, meshes, cache, reading.token)?;
     let (meshes, kept) = build_mesh_trees(scene, (meshes, &distinct), cache, reading)?;
     let lights_key = keys::with_origin(&keys::coplanar_lights_key(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
@@ -105,14 +107,14 @@ pub(crate) fn build_accel_structures(
 }
 
 /// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
-fn meshes_with_distinct_lights(
+fn separate_mesh_emitters(
     scene: &Scene,
     meshes: &Meshes,
     cache: &mut AccelCache,
     token: &CancelToken,
-) -> Result<Vec<Option<DistinctMesh>>, StopReason> {
+) -> Result<Vec<Option<SeparatedEmitterMesh>>, StopReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
-        let key = keys::distinct_lights_mesh_key(&mesh.key, is_emissive);
+        let key = keys::separated_emitter_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
             Some(found) => found,
             None => {
@@ -125,13 +127,13 @@ fn meshes_with_distinct_lights(
         };
         Ok((*found).clone().map(|distinct| (key, distinct)))
     };
-    meshes.iter().zip(emissive_meshes(scene)).map(distinct).collect()
+    meshes.iter().zip(mesh_files_with_emissive_override(scene)).map(distinct).collect()
 }
 
 /// Returns the trees for all meshes, and how many of them were cached.
 fn build_mesh_trees(
     scene: &Scene,
-    (meshes, distinct): (&Meshes, &[Option<DistinctMesh>]),
+    (meshes, distinct): (&Meshes, &[Option<SeparatedEmitterMesh>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), StopReason> {

@@ -5,18 +5,18 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::assets::gltf::{GltfFile, ImageBytes, is_gltf};
+use crate::assets::gltf::{GltfFile, ImageLocation, is_gltf};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
 /// Slot for a file. Its first user fills it.
-type SharedContainer = Arc<Mutex<Option<Arc<GltfFile>>>>;
+type GltfFileSlot = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
 #[derive(Debug, Default)]
 pub(crate) struct GltfContainers {
-    gltf: Mutex<HashMap<PathBuf, SharedContainer>>,
+    gltf: Mutex<HashMap<PathBuf, GltfFileSlot>>,
     /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
@@ -76,8 +76,8 @@ impl GltfContainers {
     ) -> Result<(ImageInput, FileHash), AssetError> {
         let container = self.open(path, &ignore_progress, token)?;
         let input = match container.locate_image(number as usize)? {
-            ImageBytes::Inside(bytes) => ImageInput::Bytes(bytes.into()),
-            ImageBytes::File(path) => ImageInput::File(path),
+            ImageLocation::Inside(bytes) => ImageInput::Bytes(bytes.into()),
+            ImageLocation::File(path) => ImageInput::File(path),
         };
         Ok((input, container.hash()))
     }

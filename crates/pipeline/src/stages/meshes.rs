@@ -59,10 +59,10 @@ pub(crate) fn load_meshes(
         .iter()
         .map(|file| {
             let name = mesh_name(file);
-            let content = reading.contents.read(&file.value, reading.token)?;
+            let content = reading.contents.read_content_id(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
-                companions(&last.companions, reading)?;
+                read_current_contents(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
         })
@@ -194,7 +194,7 @@ fn load_one(
     let path = &file.value;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == companions(&mesh.companions, reading)?
+        && mesh.companions == read_current_contents(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
@@ -234,7 +234,7 @@ fn has_companion_appeared(
 ) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
-        let content = reading.contents.read(&companion.path, reading.token)?;
+        let content = reading.contents.read_content_id(&companion.path, reading.token)?;
         if is_new && matches!(content, FileContentId::Hash(_)) {
             return Ok(true);
         }
@@ -243,9 +243,12 @@ fn has_companion_appeared(
 }
 
 /// Returns the files with their current contents.
-fn companions(files: &[FileRead], reading: &FileReadContext<'_>) -> Result<Vec<FileRead>, Cancelled> {
+fn read_current_contents(
+    files: &[FileRead],
+    reading: &FileReadContext<'_>,
+) -> Result<Vec<FileRead>, Cancelled> {
     let now = |file: &FileRead| {
-        let content = reading.contents.read(&file.path, reading.token)?;
+        let content = reading.contents.read_content_id(&file.path, reading.token)?;
         Ok(FileRead { path: file.path.clone(), content })
     };
     files.iter().map(now).collect()
@@ -391,7 +394,7 @@ mod tests {
 
         fn hash(&self, name: &str) -> FileContentId {
             let path = self.folder.path().join(name);
-            FileHashCache::default().read(&path, &CancelToken::new()).expect("not cancelled")
+            FileHashCache::default().read_content_id(&path, &CancelToken::new()).expect("not cancelled")
         }
 
         /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
@@ -489,7 +492,9 @@ mod tests {
         fixture.read(&fixture.snapshot());
         // Change the file after the request has hashed it.
         let snapshot = fixture.snapshot();
-        snapshot.read(&fixture.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
+        snapshot
+            .read_content_id(&fixture.folder.path().join("a.obj"), &CancelToken::new())
+            .expect("not cancelled");
         fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");

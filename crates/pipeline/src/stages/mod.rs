@@ -149,7 +149,7 @@ impl Findings {
                 continue;
             }
             let path = folder.join(text);
-            if let Ok(content) = contents.read(&path, token) {
+            if let Ok(content) = contents.read_content_id(&path, token) {
                 self.add_file(FileRead { path, content });
             }
         }

@@ -13,7 +13,7 @@ use super::{Findings, StageResult, StopReason};
 use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
-use crate::assets::{AssetError, OrbiterCamera};
+use crate::assets::{AssetError, GkitOrbiterCamera};
 use crate::control::{CancelToken, Cancelled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
@@ -27,7 +27,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 #[derive(Debug)]
 pub(crate) struct ParsedScene {
     pub(crate) loaded: Arc<scene::LoadedScene>,
-    pub(crate) orbiter: Option<OrbiterCamera>,
+    pub(crate) orbiter: Option<GkitOrbiterCamera>,
     /// Files that the scene references without the overrides, and the files that those files reference.
     pub(crate) named: Vec<PathBuf>,
     /// Files that a generated model scene depends on, except the model itself.
@@ -60,7 +60,7 @@ fn generate_model_scene(
         AssetError::OutOfMemory { .. } => StopReason::work_failure(error),
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
-            if let Ok(content) = contents.read(&path, token) {
+            if let Ok(content) = contents.read_content_id(&path, token) {
                 findings.add_file(FileRead { path: path.clone(), content });
             }
             scene_error(&path, format!("cannot read it: {reason}"))
@@ -108,7 +108,7 @@ pub(crate) fn parse(
             ..file_diagnostic(path, Severity::Warning, held::backup_warning(&held))
         });
     }
-    let content = contents.read(path, token)?;
+    let content = contents.read_content_id(path, token)?;
     let is_model = is_model(path);
     if !is_model && (show.from.is_some() || show.up.is_some()) {
         findings.add_file(FileRead { path: path.to_owned(), content });
@@ -125,8 +125,9 @@ pub(crate) fn parse(
     let key = |content| scene_key(origin, content, is_model);
     // A model's scene depends on several files. All must be unchanged.
     let is_same = |parsed: &&Arc<ParsedScene>| {
-        let now =
-            |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
+        let now = |file: &FileRead| {
+            contents.read_content_id(&file.path, token).is_ok_and(|content| content == file.content)
+        };
         parsed.companions.iter().all(now)
     };
     let known = memo.get(key(content)).filter(is_same).cloned();
@@ -246,7 +247,7 @@ pub fn companion_files<'a>(
     Ok(companions)
 }
 
-type OrbiterReadResult = (Option<OrbiterCamera>, Option<FileContentId>);
+type OrbiterReadResult = (Option<GkitOrbiterCamera>, Option<FileContentId>);
 
 /// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
 fn read_orbiter(
@@ -257,7 +258,7 @@ fn read_orbiter(
     token: &CancelToken,
 ) -> Result<OrbiterReadResult, StopReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
-    let content = contents.read(&file.value, token)?;
+    let content = contents.read_content_id(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
         findings.add_file(FileRead { path: file.value.clone(), content });
         return Ok((parsed.orbiter, Some(content)));

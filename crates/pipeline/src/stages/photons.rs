@@ -120,7 +120,7 @@ impl PhotonStore {
         let PhotonContext { world, plan, pool, token, .. } = sending;
         let watch = Stopwatch::start(token);
         let photons = &self.photons;
-        let settings = plan.settings.effective();
+        let settings = plan.settings.without_ineffective_settings();
         let pass = run_with_ticks(pool, tick, || photons.trace_pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
@@ -197,7 +197,7 @@ pub(crate) fn trace_first_photons(
     mut tick: impl FnMut(),
     before: impl FnOnce() -> Result<(), StopReason>,
 ) -> Result<StageResult<()>, StopReason> {
-    let settings = sending.plan.settings.effective();
+    let settings = sending.plan.settings.without_ineffective_settings();
     let skipped = |why: &str| Ok(StageResult::skipped((), why));
     let Some(of_photons) = settings.photons else {
         return match wanted.unwrap_or(enabled) {

@@ -49,7 +49,7 @@ pub(crate) fn render(
     let budget = rendering.plan.time_seconds;
     let is_part = state.is_finished_part;
     let finished = state.is_finished(rendering.plan);
-    let had = state.min_samples(wanted);
+    let had = state.min_unfinished_samples(wanted);
     let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
@@ -72,7 +72,7 @@ pub(crate) fn render(
             state.ended_by = budget;
             StageResult::done(rays, reasons::TIME_LIMIT_REACHED)
         }
-        (false, _) if state.goals.are_below(wanted) => {
+        (false, _) if state.goals.is_any_below(wanted) => {
             let missed = state.tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
                 format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
             });

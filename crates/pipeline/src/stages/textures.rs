@@ -377,7 +377,7 @@ fn environment_span(scene: &Scene) -> Option<Range<usize>> {
 
 impl TextureRequest<'_> {
     /// Whether any use needs mipmaps.
-    fn has_mipmaps(&self) -> bool {
+    fn needs_mipmaps(&self) -> bool {
         self.asked_by.iter().any(|one| one.has_mipmaps)
     }
 
@@ -415,9 +415,9 @@ fn group_by_image<'a>(
             image.asked_by.push(one);
             continue;
         }
-        let content = reading.contents.read(&one.source.path, reading.token)?;
+        let content = reading.contents.read_content_id(&one.source.path, reading.token)?;
         let linked = cache.linked.get(&name).map(|path| {
-            let content = reading.contents.read(path, reading.token)?;
+            let content = reading.contents.read_content_id(path, reading.token)?;
             Ok(FileRead { path: path.clone(), content })
         });
         let (linked, kept) = (linked.transpose()?, CachedTexture::default());
@@ -426,7 +426,7 @@ fn group_by_image<'a>(
     for image in &mut images {
         let key = image.key();
         image.kept.texels = cache.texels.get(&image.name, key);
-        if image.has_mipmaps() {
+        if image.needs_mipmaps() {
             image.kept.mipmaps = cache.mipmaps.get(&image.name, key);
         }
     }
@@ -438,7 +438,7 @@ fn load_all(
     images: &[TextureRequest<'_>],
     most_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureContents, Result<LoadedTexture, AssetError>)> {
+) -> Vec<(TextureContentIds, Result<LoadedTexture, AssetError>)> {
     let size = |image: &TextureRequest<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
@@ -449,7 +449,11 @@ fn load_all(
         };
         let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
         bytes
-            + if image.has_mipmaps() { Mipmaps::estimate_memory_bytes(width, height, is_weighted) } else { 0 }
+            + if image.needs_mipmaps() {
+                Mipmaps::estimate_memory_bytes(width, height, is_weighted)
+            } else {
+                0
+            }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = memory_limit_errors(&sizes, most_bytes);
@@ -485,7 +489,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if this is a glTF file, of the image file that it references.
-type TextureContents = (FileContentId, Option<FileRead>);
+type TextureContentIds = (FileContentId, Option<FileRead>);
 
 /// An image and its mipmaps, and whether both came from the cache.
 type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -493,7 +497,7 @@ type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
     image: &TextureRequest<'_>,
-    contents: &mut TextureContents,
+    contents: &mut TextureContentIds,
     reading: &FileReadContext<'_>,
 ) -> Result<LoadedTexture, AssetError> {
     let mut was_kept = true;
@@ -506,7 +510,7 @@ fn load_one(
         }
     };
     let mipmaps = match &image.kept.mipmaps {
-        None if image.has_mipmaps() => {
+        None if image.needs_mipmaps() => {
             was_kept = false;
             let made = match image.asked_by[0].source.coverage {
                 None => mipmaps(&decoded.texels, reading.token)?,
@@ -522,7 +526,7 @@ fn load_one(
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
     image: &TextureRequest<'_>,
-    contents: &mut TextureContents,
+    contents: &mut TextureContentIds,
     reading: &FileReadContext<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
@@ -541,7 +545,7 @@ fn decode(
                     return reading.sink.load_with_progress(&one.name, load);
                 }
                 ImageInput::File(path) => {
-                    let content = reading.contents.read(&path, token)?;
+                    let content = reading.contents.read_content_id(&path, token)?;
                     contents.1 = Some(FileRead { path: path.clone(), content });
                     path
                 }

@@ -18,7 +18,7 @@ use super::{StageResult, StopReason};
 use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::tone_map_to_8_bits;
-use crate::film::{RadianceImage, Rect, SampleStats, Srgb8Image};
+use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, PartHeader, PartKind};
 use crate::output::write::{Durability, SweptFolders, WritePolicy};
@@ -69,12 +69,12 @@ impl WrittenImages {
     }
 
     /// Allows the scene's own image to replace any other.
-    pub(crate) fn allow_replacing_all(&mut self) {
+    pub(crate) fn allow_replacing_user_image(&mut self) {
         self.is_by_hand = false;
     }
 
     /// Forgets which images the files contain, so that the next write stage writes them again.
-    fn forget(&mut self) {
+    fn mark_all_outdated(&mut self) {
         self.files.values_mut().for_each(|(key, _)| *key = None);
         self.own = None;
     }
@@ -83,7 +83,7 @@ impl WrittenImages {
 /// Whether a file has the given content.
 fn has_content(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
     // Use a token that is never cancelled.
-    contents.read(path, &CancelToken::new()).is_ok_and(|content| content == known)
+    contents.read_content_id(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
 
 /// An image's output files, and files that must not be overwritten.
@@ -111,13 +111,15 @@ pub(crate) fn check_targets(
 ) -> Result<(), StopReason> {
     match writing {
         WriteMode::No => Ok(()),
-        WriteMode::Must => check_each_target(plan, output::check_target, output::check_path)
+        WriteMode::Must => check_each_target(plan, output::check_image_target, output::check_file_target)
             .map_err(StopReason::work_failure),
         WriteMode::Try => {
-            if let Err(error) =
-                check_each_target(plan, output::check_target_read_only, output::check_path_read_only)
-            {
-                sink.write_failed(None, error.to_string());
+            if let Err(error) = check_each_target(
+                plan,
+                output::check_image_target_read_only,
+                output::check_file_target_read_only,
+            ) {
+                sink.send_write_failed(None, error.to_string());
             }
             Ok(())
         }
@@ -160,7 +162,9 @@ pub(crate) fn write_if_wanted(
 ) -> Result<StageResult<bool>, StopReason> {
     match writing {
         WriteMode::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
-        WriteMode::Try | WriteMode::Must => write(state, to, written, token, writing == WriteMode::Must),
+        WriteMode::Try | WriteMode::Must => {
+            write_outdated_outputs(state, to, written, token, writing == WriteMode::Must)
+        }
     }
 }
 
@@ -169,7 +173,7 @@ pub(crate) fn write_if_wanted(
 ///
 /// # Errors
 /// Returns [`StopReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
-fn write(
+fn write_outdated_outputs(
     state: &FilmState,
     to: Destination<'_>,
     written: &mut WrittenImages,
@@ -180,14 +184,14 @@ fn write(
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = SweptFolders::default();
     }
-    let unfinished = (!state.is_finished(plan)).then(|| state.film.sample_stats().into());
+    let unfinished = (!state.is_finished(plan)).then(|| state.film.sample_count_stats().into());
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
         let key = image_file_key(state, plan, path);
         if let Some((known, content)) = written.files.get(path)
             && *known == Some(key)
-            && contents.read(path, token)? == *content
+            && contents.read_content_id(path, token)? == *content
         {
             continue;
         }
@@ -207,11 +211,11 @@ fn write(
                 count += 1;
                 // The image is on disk, so ignore cancellation. Record the content before notifying other
                 // programs, which may change the file.
-                let content = contents.read(path, &CancelToken::new())?;
+                let content = contents.read_content_id(path, &CancelToken::new())?;
                 contents.outputs.end_write(path, Some(content));
                 written.files.insert(path.clone(), (Some(key), content));
                 written.is_by_hand = !is_own;
-                sink.image_written(path, bytes, is_own, unfinished);
+                sink.send_image_written(path, bytes, is_own, unfinished);
             }
             Err(error) => {
                 contents.outputs.end_write(path, None);
@@ -230,7 +234,7 @@ fn write(
             // Report each failure separately, except for the last one if it will be returned.
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
-            errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
+            errors.into_iter().for_each(|(path, message)| sink.send_write_failed(Some(path), message));
             if is_must { Err(StopReason::work_failure(last)) } else { Ok(StageResult::skipped(false, last)) }
         }
         (true, 0) => Ok(StageResult::reused(true, reasons::ALREADY_WRITTEN)),
@@ -244,22 +248,22 @@ fn write(
 pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenImages) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
-        to.sink.write_conflicts(conflicts);
+        to.sink.send_write_conflicts(conflicts);
         return false;
     }
-    written.forget();
+    written.mark_all_outdated();
     // Use a token that is never cancelled, because the user requested the image.
-    let outcome = write(state, to, written, &CancelToken::new(), false);
+    let outcome = write_outdated_outputs(state, to, written, &CancelToken::new(), false);
     let is_written = outcome.is_ok_and(|stage| stage.value);
     if is_written {
-        to.sink.write_done(to.plan.outputs.clone());
+        to.sink.send_write_done(to.plan.outputs.clone());
     }
     is_written
 }
 
 /// Finished turntable frames, with their sample counts.
 #[derive(Debug, Default)]
-pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleStats)>);
+pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
 /// have been written.
@@ -274,16 +278,17 @@ pub(crate) fn write_animation(
 ) -> Result<StageResult<bool>, StopReason> {
     let Destination { plan, inputs, sink, .. } = to;
     let finish = develop_settings(plan);
-    let image = finish.image(&state.film);
+    let image = finish.extract_image(&state.film);
     frames.0.truncate(turn.number as usize);
-    frames
-        .0
-        .push((tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)), state.film.sample_stats()));
+    frames.0.push((
+        tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)),
+        state.film.sample_count_stats(),
+    ));
     if !turn.is_last() {
         return Ok(StageResult::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
     }
     let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
-    let samples = SampleStats {
+    let samples = SampleCountStats {
         min: samples.iter().map(|one| one.min).min().unwrap_or(0),
         mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,
         max: samples.iter().map(|one| one.max).max().unwrap_or(0),
@@ -293,12 +298,13 @@ pub(crate) fn write_animation(
         let write = || {
             let metadata = develop_settings_for(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
-            let write = |guard: &WritePolicy<'_>| output::write::atomic_guarded(path, &bytes, guard, token);
+            let write =
+                |guard: &WritePolicy<'_>| output::write::atomic_with_policy(path, &bytes, guard, token);
             write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
-            Ok(bytes) => sink.image_written(path, bytes, true, None),
+            Ok(bytes) => sink.send_image_written(path, bytes, true, None),
             Err(OutputError::Cancelled(_)) => return Err(StopReason::Cancelled),
             Err(error) => return Err(StopReason::work_failure(error)),
         }
@@ -321,7 +327,7 @@ fn write_one(
     let bytes = finish.encode(&state.film, (image, layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::for_image(plan, path), Some(sweep));
     write_guarded(plan, inputs, target, sink, |guard| {
-        output::write::atomic_guarded(path, &bytes, guard, token)
+        output::write::atomic_with_policy(path, &bytes, guard, token)
     })?;
     Ok(bytes.len() as u64)
 }
@@ -407,7 +413,7 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
 }
 
 fn image_file_key(state: &FilmState, plan: &RenderPlan, path: &Path) -> Fingerprint {
-    let SampleStats { min, mean, max } = state.film.sample_stats();
+    let SampleCountStats { min, mean, max } = state.film.sample_count_stats();
     let mut key = FingerprintHasher::new("write");
     key.add_fingerprint(&state.key).add_u64(min.into()).add_f64(mean).add_u64(max.into());
     key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_index(plan.tone.curve as usize);

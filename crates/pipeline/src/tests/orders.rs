@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::engine::EngineConfig;
-use crate::film::{Pixels, Rect, TileSamples};
+use crate::film::{Rect, SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
 use crate::protocol::LastValidSceneOutcome;
@@ -20,7 +20,7 @@ fn endless(
     _: Option<&PhotonMaps>,
     _: &World,
     _: &RenderSettings,
-    _: Pixels,
+    _: SelectedPixels,
     _: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -81,7 +81,7 @@ fn breaks_once(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -103,7 +103,7 @@ fn breaks_first(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -135,7 +135,7 @@ pub(super) fn slow(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -425,7 +425,7 @@ fn held_between_passes(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -574,7 +574,7 @@ fn leisurely(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {

@@ -283,7 +283,7 @@ fn slow(
     photons: Option<&crate::integrators::PhotonMaps>,
     world: &crate::world::World,
     settings: &crate::integrators::RenderSettings,
-    pixels: crate::film::Pixels,
+    pixels: crate::film::SelectedPixels,
     samples: std::ops::Range<u32>,
     token: &crate::control::CancelToken,
 ) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Cancelled> {

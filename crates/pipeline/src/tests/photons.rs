@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Pixels, TileSamples};
+use crate::film::{SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
 
@@ -78,7 +78,7 @@ fn without(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -152,7 +152,7 @@ fn black(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {

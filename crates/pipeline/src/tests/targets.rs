@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{Pixels, TileSamples};
+use crate::film::{SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::protocol::CheckpointUpdate;
@@ -123,7 +123,7 @@ fn relinks(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: Pixels,
+    pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -218,7 +218,7 @@ fn unused(
     _: Option<&PhotonMaps>,
     _: &World,
     _: &RenderSettings,
-    _: Pixels,
+    _: SelectedPixels,
     _: Range<u32>,
     _: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {

@@ -71,7 +71,7 @@ impl ChangeTracker {
     }
 
     /// Returns the time of the next check. `None` if no hint requires one.
-    pub(super) fn due(&self) -> Option<Instant> {
+    pub(super) fn next_check_time(&self) -> Option<Instant> {
         let look = self.pending.map(|pending| pending.due);
         [look, self.unsettled.map(|unsettled| self.settled_at(unsettled))].into_iter().flatten().min()
     }
@@ -114,7 +114,7 @@ impl ChangeTracker {
     }
 
     /// Whether the reported change has settled. Returns true only once per change.
-    pub(super) fn take_settled(&mut self, now: Instant) -> bool {
+    pub(super) fn settle_if_due(&mut self, now: Instant) -> bool {
         let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
         self.unsettled = self.unsettled.filter(|_| !settles);
         settles

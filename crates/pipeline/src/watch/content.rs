@@ -107,12 +107,16 @@ impl Snapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn read(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    pub(crate) fn read_content_id(
+        &self,
+        path: &Path,
+        token: &CancelToken,
+    ) -> Result<FileContentId, Cancelled> {
         if let Some(content) = self.known(path) {
             return Ok(content);
         }
         let stamp = FileStamp::from_path(path);
-        let content = self.contents.read(path, token)?;
+        let content = self.contents.read_content_id(path, token)?;
         Ok(self.lock_seen_files().entry(path.to_owned()).or_insert(SeenFile { content, stamp }).content)
     }
 
@@ -149,7 +153,7 @@ impl Snapshot {
     ) -> Result<FileRead, Cancelled> {
         let content = match hash {
             Some(hash) => self.record_decoded_with_stamp(path, *hash, *stamp),
-            None => self.read(path, token)?,
+            None => self.read_content_id(path, token)?,
         };
         Ok(FileRead { path: path.clone(), content })
     }
@@ -160,14 +164,14 @@ impl Snapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn verify(&self, token: &CancelToken) -> Result<(), Cancelled> {
+    pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Cancelled> {
         let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, SeenFile { content, stamp }) in seen {
             let Some(now) = FileStamp::from_path(&path) else { continue };
             if Some(now) == stamp && is_stamp_reliable(&now, self.begun) {
                 continue;
             }
-            let now = self.contents.read(&path, token)?;
+            let now = self.contents.read_content_id(&path, token)?;
             if now != FileContentId::Missing && now != content {
                 self.record_change(&path);
             }
@@ -195,7 +199,7 @@ impl Snapshot {
 }
 
 /// Content to use for a file that is too long to hash.
-fn content_of_stamp(stamp: &FileStamp) -> FileContentId {
+fn content_id_from_stamp(stamp: &FileStamp) -> FileContentId {
     FileContentId::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
 }
 
@@ -211,7 +215,7 @@ impl FileHashCache {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled. The token is checked once per mebibyte.
-    pub fn read(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         token.check()?;
         let now = SystemTime::now();
         let metadata = match file::file_kind(path) {
@@ -228,7 +232,8 @@ impl FileHashCache {
         if let Some(content) = known {
             return Ok(content);
         }
-        let content = if stamp.len > MAX_HASHED { content_of_stamp(&stamp) } else { self.hash(path, token)? };
+        let content =
+            if stamp.len > MAX_HASHED { content_id_from_stamp(&stamp) } else { self.hash(path, token)? };
         if is_stamp_reliable(&stamp, now) {
             self.lock_entries().insert(path.to_owned(), (stamp, content));
         } else {
@@ -299,21 +304,21 @@ mod tests {
         let path = folder.path().join("file");
         let token = CancelToken::new();
         let contents = FileHashCache::default();
-        assert_eq!(contents.read(&path, &token), Ok(FileContentId::Missing));
+        assert_eq!(contents.read_content_id(&path, &token), Ok(FileContentId::Missing));
         fs::write(&path, "a").expect("written");
-        let first = contents.read(&path, &token).expect("not cancelled");
+        let first = contents.read_content_id(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
-        let second = contents.read(&path, &token).expect("not cancelled");
+        let second = contents.read_content_id(&path, &token).expect("not cancelled");
         assert_ne!(first, second, "a change should be detected at equal length and timestamp");
         fs::write(&path, "a").expect("written");
-        assert_eq!(contents.read(&path, &token), Ok(first));
+        assert_eq!(contents.read_content_id(&path, &token), Ok(first));
         assert_eq!(
-            contents.read(folder.path(), &token),
+            contents.read_content_id(folder.path(), &token),
             Ok(FileContentId::Unusable(UnreadableReason::Folder))
         );
         #[cfg(target_os = "linux")]
         assert_eq!(
-            contents.read(Path::new("/proc/kmsg"), &token),
+            contents.read_content_id(Path::new("/proc/kmsg"), &token),
             Ok(FileContentId::Unusable(UnreadableReason::Kernel))
         );
     }
@@ -327,7 +332,7 @@ mod tests {
         let contents = FileHashCache::default();
         let read = |len| {
             file.set_len(len).expect("a sparse file");
-            contents.read(&path, &token).expect("not cancelled")
+            contents.read_content_id(&path, &token).expect("not cancelled")
         };
         let first = read(3 << 40);
         assert!(matches!(first, FileContentId::Hash(_)));
@@ -342,11 +347,11 @@ mod tests {
         let contents = Arc::new(FileHashCache::default());
         let snapshot = Snapshot::new(contents.clone());
         fs::write(&path, "a").expect("written");
-        let first = snapshot.read(&path, &token).expect("not cancelled");
+        let first = snapshot.read_content_id(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
-        assert_eq!(snapshot.read(&path, &token), Ok(first));
+        assert_eq!(snapshot.read_content_id(&path, &token), Ok(first));
         assert_ne!(
-            Snapshot::new(contents).read(&path, &token),
+            Snapshot::new(contents).read_content_id(&path, &token),
             Ok(first),
             "the next request should see the change"
         );
@@ -373,30 +378,30 @@ mod tests {
             ["mesh", "texture", "library", "same"].map(|name| current.join(name));
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
         let verified = |snapshot: &Snapshot| {
-            snapshot.verify(&token).expect("not cancelled");
+            snapshot.recheck_seen_files(&token).expect("not cancelled");
             snapshot.changed_file()
         };
         for is_decoded in [false, true] {
             show("old");
             let snapshot = Snapshot::new(Arc::default());
-            snapshot.read(&same, &token).expect("not cancelled");
+            snapshot.read_content_id(&same, &token).expect("not cancelled");
             if is_decoded {
                 let (hash, stamp) = (Some(hash_of(&library)), FileStamp::from_path(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
                 snapshot.read_companion(&companion, &token).expect("not cancelled");
             } else {
-                snapshot.read(&mesh, &token).expect("not cancelled");
+                snapshot.read_content_id(&mesh, &token).expect("not cancelled");
                 assert_eq!(verified(&snapshot), None);
                 show("new");
             }
-            snapshot.read(&texture, &token).expect("not cancelled");
+            snapshot.read_content_id(&texture, &token).expect("not cancelled");
             assert_eq!(verified(&snapshot), Some(if is_decoded { library.clone() } else { mesh.clone() }));
         }
         // Neither replacement with the same content nor removal is a change.
         show("old");
         let snapshot = Snapshot::new(Arc::default());
-        snapshot.read(&same, &token).expect("not cancelled");
+        snapshot.read_content_id(&same, &token).expect("not cancelled");
         show("new");
         assert_eq!(verified(&snapshot), None);
         fs::remove_file(&current).expect("removed");
@@ -416,7 +421,7 @@ mod tests {
                 snapshot.begun += Duration::from_secs(4);
             }
             snapshot.record_decoded_with_stamp(&path, old, stamp);
-            snapshot.verify(&token).expect("not cancelled");
+            snapshot.recheck_seen_files(&token).expect("not cancelled");
             // A file with a settled stamp is not read again.
             assert_eq!(snapshot.changed_file(), (!is_settled).then(|| path.clone()));
         }
@@ -434,7 +439,7 @@ mod tests {
         contents
             .lock_entries()
             .insert(path.clone(), (stamp, FileContentId::Unusable(UnreadableReason::Special)));
-        let read = contents.read(&path, &CancelToken::new());
+        let read = contents.read_content_id(&path, &CancelToken::new());
         assert_eq!(
             read,
             Ok(FileContentId::Unusable(UnreadableReason::Special)),

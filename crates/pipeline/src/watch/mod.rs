@@ -7,7 +7,7 @@
 //! Timestamps are also checked every two seconds, or several times per second if there are no notifications
 //! (network file systems, no watches left) or a folder or the working directory is missing.
 //!
-//! A program may write a file in several steps. [`WatchUpdate::Settled`] follows a change when no further changes
+//! A program may write a file in several steps. [`WatchEvent::Settled`] follows a change when no further changes
 //! are expected. Errors in a file are not reported earlier.
 
 mod change_tracker;
@@ -73,7 +73,7 @@ impl Default for WatchDelays {
 
 /// An update from a watcher.
 #[derive(Clone, Debug)]
-pub enum WatchUpdate {
+pub enum WatchEvent {
     /// A file's content changed, and the save appears complete.
     Changed(ContentChange),
     /// The changed files appear to be complete.
@@ -114,7 +114,7 @@ impl Watcher {
     pub fn start(
         poll: bool,
         contents: Arc<FileHashCache>,
-        say: impl FnMut(WatchUpdate) + Send + 'static,
+        say: impl FnMut(WatchEvent) + Send + 'static,
     ) -> std::io::Result<Self> {
         Self::start_with(poll, contents, WatchDelays::default(), say)
     }
@@ -123,7 +123,7 @@ impl Watcher {
         poll: bool,
         contents: Arc<FileHashCache>,
         delays: WatchDelays,
-        say: impl FnMut(WatchUpdate) + Send + 'static,
+        say: impl FnMut(WatchEvent) + Send + 'static,
     ) -> std::io::Result<Self> {
         working_folder::remember_working_folder();
         let (orders, received) = mpsc::channel();
@@ -187,14 +187,14 @@ struct WatchThread<F> {
     say: F,
 }
 
-impl<F: FnMut(WatchUpdate)> WatchThread<F> {
+impl<F: FnMut(WatchEvent)> WatchThread<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
             let pause = self.next_check().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
                 Ok(Message::Hint(hint)) => self.change_tracker.hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set_files(read, before, since),
-                Ok(Message::Outputs) => self.set_folders(),
+                Ok(Message::Outputs) => self.update_watched_folders(),
                 Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -205,7 +205,10 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         let pause =
             if self.has_working_folder && self.folders.covers_all_folders() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
-        let due = [self.change_tracker.due(), self.suspects.due(self.quiet)].into_iter().flatten().min();
+        let due = [self.change_tracker.next_check_time(), self.suspects.next_check_time(self.quiet)]
+            .into_iter()
+            .flatten()
+            .min();
         due.map_or(unhinted, |due| due.min(unhinted))
     }
 
@@ -221,7 +224,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }
-        self.set_folders();
+        self.update_watched_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
             self.change_tracker.hint(ChangeHint::Touched, Instant::now());
@@ -229,7 +232,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
     }
 
     /// Watches the folders of all files and outputs.
-    fn set_folders(&mut self) {
+    fn update_watched_folders(&mut self) {
         let outputs = self.contents.outputs.paths();
         let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
         self.contents.retain(is_watched);
@@ -238,10 +241,10 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
 
     /// Checks all files and reports changes.
     fn check(&mut self, now: Instant) {
-        self.has_working_folder = working_folder::ensure_working_folder();
+        self.has_working_folder = working_folder::reenter_working_folder_if_removed();
         self.folders.renew_lost();
         for change in self.suspects.take_confirmed(&self.contents, self.quiet, now) {
-            (self.say)(WatchUpdate::Output(change));
+            (self.say)(WatchEvent::Output(change));
         }
         let found = self.differences();
         let is_said = !self.should_delay_report(&found, now);
@@ -250,10 +253,10 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
                 self.files.insert(path, (content, now));
             }
             let noticed = self.change_tracker.mark_reported(now);
-            (self.say)(WatchUpdate::Changed(ContentChange { noticed }));
+            (self.say)(WatchEvent::Changed(ContentChange { noticed }));
         }
-        if self.change_tracker.take_settled(now) {
-            (self.say)(WatchUpdate::Settled);
+        if self.change_tracker.settle_if_due(now) {
+            (self.say)(WatchEvent::Settled);
         }
     }
 
@@ -266,7 +269,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
         }
         let is_early = if self.change_tracker.has_hints() {
             let moves = !before.is_empty() && before != found;
-            self.change_tracker.should_delay_report(is_missing(found), moves, now)
+            self.change_tracker.should_delay_report(has_missing_or_empty_file(found), moves, now)
         } else {
             // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
             // check.
@@ -284,7 +287,8 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
     fn differences(&self) -> Vec<FileRead> {
         let token = CancelToken::new();
         // Use a token that is never cancelled.
-        let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(FileContentId::Missing);
+        let now =
+            |path: &PathBuf| self.contents.read_content_id(path, &token).unwrap_or(FileContentId::Missing);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
             .map(|(path, (content, _))| (path, *content, now(path)))
@@ -297,7 +301,7 @@ impl<F: FnMut(WatchUpdate)> WatchThread<F> {
 }
 
 /// Whether a file is missing or empty, in which case it is probably being replaced.
-fn is_missing(files: &[FileRead]) -> bool {
+fn has_missing_or_empty_file(files: &[FileRead]) -> bool {
     let empty = FileContentId::Hash(*blake3::hash(b"").as_bytes());
     files.iter().any(|file| file.content == FileContentId::Missing || file.content == empty)
 }

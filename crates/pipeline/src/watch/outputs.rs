@@ -107,18 +107,21 @@ impl WrittenOutputs {
 
     /// Returns the files that no longer have the content written by glimt.
     pub fn changed_externally(&self, contents: &FileHashCache) -> Vec<(PathBuf, ExternalChange)> {
-        let found = self.states(contents).into_iter();
+        let found = self.reported_and_current_changes(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
 
     /// Returns the files whose state differs from the last report.
     fn unreported_changes(&self, contents: &FileHashCache) -> Vec<OutputChange> {
-        let found = self.states(contents).into_iter().filter(|(_, reported, lost)| reported != lost);
+        let found = self
+            .reported_and_current_changes(contents)
+            .into_iter()
+            .filter(|(_, reported, lost)| reported != lost);
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
 
     /// Returns each file's last reported state and current state, except for files that are being written.
-    fn states(
+    fn reported_and_current_changes(
         &self,
         contents: &FileHashCache,
     ) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
@@ -129,7 +132,7 @@ impl WrittenOutputs {
         };
         let state = |(path, output): (PathBuf, WrittenOutput)| {
             // Use a token that is never cancelled.
-            let now = contents.read(&path, &CancelToken::new()).unwrap_or(FileContentId::Missing);
+            let now = contents.read_content_id(&path, &CancelToken::new()).unwrap_or(FileContentId::Missing);
             let lost = match now {
                 now if now == output.content => None,
                 FileContentId::Missing => Some(ExternalChange::Removed),
@@ -189,7 +192,7 @@ impl UnconfirmedChanges {
     }
 
     /// Returns the time of the next check. `None` if there are no unconfirmed changes.
-    pub(super) fn due(&self, quiet: Duration) -> Option<Instant> {
+    pub(super) fn next_check_time(&self, quiet: Duration) -> Option<Instant> {
         self.0.iter().map(|(_, since)| *since + quiet).min()
     }
 }
@@ -205,7 +208,7 @@ mod tests {
     fn write(contents: &FileHashCache, path: &Path, text: &str) {
         contents.outputs.begin_write(path, OverwriteProtection::Parts);
         fs::write(path, text).expect("written");
-        let content = contents.read(path, &CancelToken::new()).expect("not cancelled");
+        let content = contents.read_content_id(path, &CancelToken::new()).expect("not cancelled");
         contents.outputs.end_write(path, Some(content));
     }
 

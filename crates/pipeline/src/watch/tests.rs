@@ -13,7 +13,7 @@ const NEVER: Duration = Duration::from_secs(3600);
 
 struct Scratch {
     folder: tempfile::TempDir,
-    news: Receiver<WatchUpdate>,
+    news: Receiver<WatchEvent>,
     watcher: Watcher,
 }
 
@@ -44,7 +44,7 @@ impl Scratch {
         let contents = FileHashCache::default();
         let read = |path: &&Path| FileRead {
             path: path.to_path_buf(),
-            content: contents.read(path, &CancelToken::new()).expect("not cancelled"),
+            content: contents.read_content_id(path, &CancelToken::new()).expect("not cancelled"),
         };
         let since = Instant::now();
         self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);
@@ -53,15 +53,15 @@ impl Scratch {
     }
 
     #[track_caller]
-    fn next(&self) -> WatchUpdate {
+    fn next(&self) -> WatchEvent {
         self.news.recv_timeout(Duration::from_secs(60)).expect("news within a minute")
     }
 
     /// Expects exactly one change, after which the files settle.
     #[track_caller]
     fn expect_one(&self) {
-        assert!(matches!(self.next(), WatchUpdate::Changed(_)), "expected a change first");
-        assert!(matches!(self.next(), WatchUpdate::Settled), "expected only one change");
+        assert!(matches!(self.next(), WatchEvent::Changed(_)), "expected a change first");
+        assert!(matches!(self.next(), WatchEvent::Settled), "expected only one change");
         self.expect_none();
     }
 
@@ -305,7 +305,7 @@ fn continuous_saves_are_rate_limited() {
         std::thread::sleep(Duration::from_millis(10));
     }
     let most = begin.elapsed().div_duration_f64(BETWEEN_CHANGES) as usize + 1;
-    let during = scratch.news.try_iter().filter(|news| matches!(news, WatchUpdate::Changed(_))).count();
+    let during = scratch.news.try_iter().filter(|news| matches!(news, WatchEvent::Changed(_))).count();
     assert!((1..=most).contains(&during), "{during} changes were reported, but at most {most} are allowed");
     let last = fs::read(scratch.path("a.toml")).expect("read");
     std::thread::sleep(SETTLE);
@@ -364,13 +364,13 @@ fn open_file_settles_only_when_closed() {
     let scratch = Scratch::with(false, WatchDelays { settle_open: NEVER, ..WatchDelays::default() });
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
-    assert!(matches!(scratch.next(), WatchUpdate::Changed(_)));
+    assert!(matches!(scratch.next(), WatchEvent::Changed(_)));
     scratch.expect_none();
     file.write_all(b" and half").expect("written");
-    assert!(matches!(scratch.next(), WatchUpdate::Changed(_)));
+    assert!(matches!(scratch.next(), WatchEvent::Changed(_)));
     scratch.expect_none();
     drop(file);
-    assert!(matches!(scratch.next(), WatchUpdate::Settled));
+    assert!(matches!(scratch.next(), WatchEvent::Settled));
 }
 
 fn two_part_write_settles_after_second_part() {
@@ -379,7 +379,7 @@ fn two_part_write_settles_after_second_part() {
         WatchDelays { settle: 5 * WatchDelays::default().settle, ..WatchDelays::default() },
     );
     fs::write(scratch.path("a.toml"), "half").expect("written");
-    assert!(matches!(scratch.next(), WatchUpdate::Changed(_)));
+    assert!(matches!(scratch.next(), WatchEvent::Changed(_)));
     std::thread::sleep(Duration::from_millis(200));
     fs::write(scratch.path("a.toml"), "half and half").expect("written");
     scratch.expect_one();
@@ -394,6 +394,6 @@ fn endless_write_settles_eventually() {
     let scratch = Scratch::with(false, delays);
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
-    assert!(matches!(scratch.next(), WatchUpdate::Changed(_)));
-    assert!(matches!(scratch.next(), WatchUpdate::Settled));
+    assert!(matches!(scratch.next(), WatchEvent::Changed(_)));
+    assert!(matches!(scratch.next(), WatchEvent::Settled));
 }

@@ -19,7 +19,7 @@ pub(super) fn remember_working_folder() {
 
 /// Whether the working directory exists. If it was removed, tries to change to a new directory of the same
 /// name.
-pub(super) fn ensure_working_folder() -> bool {
+pub(super) fn reenter_working_folder_if_removed() -> bool {
     !is_working_folder_removed() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
 }
 

@@ -148,10 +148,10 @@ pub struct EmissionSource {
 
 impl EmissionSource {
     /// No emission.
-    pub const NONE: Self = Self::constant(Vec3::ZERO);
+    pub const NONE: Self = Self::from_constant(Vec3::ZERO);
 
     /// Creates a source that emits constant radiance from the front.
-    pub const fn constant(radiance: Vec3) -> Self {
+    pub const fn from_constant(radiance: Vec3) -> Self {
         Self { scale: radiance, texture: None, sides: EmissionSides::Front }
     }
 }
@@ -239,12 +239,12 @@ impl MaterialKind {
 
     /// Whether the material is solid glass.
     pub fn is_glass(&self) -> bool {
-        self.glass_medium_key().is_some()
+        self.glass_medium_identity().is_some()
     }
 
     /// Returns a key for the interior of solid glass: the bits of its index of refraction and transmittance,
     /// but not its roughness. `None` for other materials.
-    pub fn glass_medium_key(&self) -> Option<[u64; 4]> {
+    pub fn glass_medium_identity(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
                 Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
@@ -281,7 +281,7 @@ pub struct Bump {
 
 impl Bump {
     /// Returns how to compute the height from a pixel.
-    pub fn pixel_value(&self) -> ChannelSelector {
+    pub fn height_channel(&self) -> ChannelSelector {
         self.channel.map_or(ChannelSelector::Luminance, ChannelSelector::Channel)
     }
 }
@@ -486,7 +486,7 @@ impl Material {
 
     /// Returns the weight and roughness of an emitter's clear coat. `None` if there is no emission or no
     /// clear coat.
-    pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
+    pub fn emitter_coat_parameters(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
             MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
                 let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
@@ -514,9 +514,9 @@ impl Material {
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
-        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.pixel_value())));
+        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.height_channel())));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        let coat = self.emission_coat().into_iter().flatten();
+        let coat = self.emitter_coat_parameters().into_iter().flatten();
         let coat = coat.filter_map(|number| number.texture(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
         colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()

@@ -57,7 +57,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
 
     let (position_key, look_at_key) = (position, look_at);
     let (position, look_at) = (eye?, target?);
-    if !position_key.check_distance(position, &look_at_key, look_at) {
+    if !position_key.check_points_far_apart(position, &look_at_key, look_at) {
         return None;
     }
     let view = look_at - position;

@@ -172,7 +172,7 @@ impl<'a> TableKey<'a> {
 
     /// Checks that the points at the keys `self` and `other` are far enough apart to compute with, and
     /// reports an error if not. For equal points, the caller reports a more specific error.
-    pub(super) fn check_distance(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
+    pub(super) fn check_points_far_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = robust_length(to - from);
         let span = other.span().or(self.span());
         let Some(span) = span.filter(|_| is_too_short(distance)) else { return true };
@@ -221,7 +221,7 @@ impl<'a> TableKey<'a> {
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
             let issue = Issue::error(self.span()?, message).mark_missing_value();
-            self.context.report(names.suggest_names(self.context, issue, text));
+            self.context.report(names.add_name_suggestions(self.context, issue, text));
         }
         index
     }

@@ -145,7 +145,7 @@ fn read_plastic(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKin
 }
 
 fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    common::warn_if_ineffective(table, "clearcoat_roughness", "clearcoat");
+    common::warn_if_ineffective_without(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
         |path, default| read_color(table, textures, path, default),
         |path, default| read_number(table, textures, path, default),

@@ -136,7 +136,7 @@ pub(super) fn referenced_files(text: &str, path: &Path) -> Vec<PathBuf> {
 
 /// Reads the whole scene. Textures and materials are read before the tables that refer to them by name.
 fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
-    let (render, output) = render::read(root);
+    let (render, output) = render::read_render_table(root);
     let camera = camera::read_camera(root);
     let photons = photons::read_photons(root);
     let textures = textures::read_textures(root);

@@ -44,7 +44,7 @@ impl DefinedNames {
     }
 
     /// Adds the known names and the most similar name to an issue about an unknown name.
-    pub(super) fn suggest_names(&self, context: &FileContext<'_>, issue: Issue, name: &str) -> Issue {
+    pub(super) fn add_name_suggestions(&self, context: &FileContext<'_>, issue: Issue, name: &str) -> Issue {
         const MAX_LISTED: usize = 12;
         let kind = self.kind;
         let known = || self.entries.iter().map(|entry| entry.name.as_str());
@@ -85,7 +85,7 @@ mod tests {
         let context = FileContext::new(SceneText::from_file_text("".into()), Path::new("scene.toml"));
         let names = DefinedNames::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
         for number in 0..count {
-            names.suggest_names(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
+            names.add_name_suggestions(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
         }
         context.comparisons()
     }

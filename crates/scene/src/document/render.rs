@@ -45,7 +45,7 @@ macro_rules! reader {
 render_keys!(reader);
 
 /// Reads the settings and the optional output path.
-pub(super) fn read(root: &TableReader<'_>) -> (Option<RenderOptions>, Option<PathBuf>) {
+pub(super) fn read_render_table(root: &TableReader<'_>) -> (Option<RenderOptions>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(RenderOptions::DEFAULT), None) };
     let render = read_settings(&table);
     let output = read_output_path(&table);

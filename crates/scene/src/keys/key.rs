@@ -15,7 +15,7 @@ pub struct TableInfo {
     /// The keys that all types have in common.
     pub keys: &'static [KeyInfo],
     /// The values of the key `type`, starting with the default. Empty if the table has no key `type`.
-    pub types: &'static [TypeInfo],
+    pub types: &'static [TableTypeInfo],
 }
 
 /// Syntax of a table.
@@ -31,7 +31,7 @@ pub enum TableSyntax {
 
 /// Definition of a material or light type.
 #[derive(Clone, Debug)]
-pub struct TypeInfo {
+pub struct TableTypeInfo {
     /// The value of `type`.
     pub name: &'static str,
     /// Description: one sentence without a final period.
@@ -159,7 +159,7 @@ pub(super) const fn define_key(
 impl TableInfo {
     /// Returns the type called `name`, or the default type if `name` is `None`. `None` if the type is
     /// unknown.
-    pub fn find_type(&self, name: Option<&str>) -> Option<&'static TypeInfo> {
+    pub fn find_type(&self, name: Option<&str>) -> Option<&'static TableTypeInfo> {
         match name {
             Some(name) => self.types.iter().find(|one| one.name == name),
             None => self.types.first(),
@@ -167,7 +167,10 @@ impl TableInfo {
     }
 
     /// Returns all keys of a table with this type, except `type`. The type-specific keys come first.
-    pub fn keys_for_type(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
+    pub fn keys_for_type(
+        &self,
+        kind: Option<&'static TableTypeInfo>,
+    ) -> impl Iterator<Item = &'static KeyInfo> {
         kind.map_or(&[] as &[KeyInfo], |kind| kind.keys).iter().chain(self.keys)
     }
 

@@ -2,7 +2,7 @@
 
 use super::key::DefaultValue::Is;
 use super::key::ValueKind::{Color, Number, Numbers, Words};
-use super::key::{TableInfo, TableSyntax, TypeInfo, choice_values, define_key};
+use super::key::{TableInfo, TableSyntax, TableTypeInfo, choice_values, define_key};
 use super::limits::Limits::{Any, AtLeast, Between, Inside};
 use crate::description::light::Falloff;
 
@@ -12,7 +12,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
     doc: "A light without a shape",
     keys: &[],
     types: &[
-        TypeInfo {
+        TableTypeInfo {
             name: "point",
             doc: "A point light",
             keys: &[
@@ -33,7 +33,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                 ),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "spot",
             doc: "A point light that shines into a cone",
             keys: &[
@@ -75,7 +75,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                 ),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "directional",
             doc: "Light from a distant source, such as the sun",
             keys: &[

@@ -4,7 +4,7 @@ use super::key::DefaultValue::{Absent, By, Is};
 use super::key::ValueKind::{
     ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
 };
-use super::key::{TableInfo, TableSyntax, TypeInfo, choice_values, define_key};
+use super::key::{TableInfo, TableSyntax, TableTypeInfo, choice_values, define_key};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::description::EmissionSides;
 use crate::materials::conductor::elements::MetalElement;
@@ -54,7 +54,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
         ),
     ],
     types: &[
-        TypeInfo {
+        TableTypeInfo {
             name: "phong",
             doc: "A diffuse surface with a glossy highlight",
             keys: &[
@@ -88,7 +88,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 ),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "mirror",
             doc: "A perfect mirror",
             keys: &[define_key(
@@ -99,7 +99,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 "Reflectance at every angle",
             )],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "glass",
             doc: "A smooth or rough dielectric, or a thin pane",
             keys: &[
@@ -127,7 +127,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 define_key("thin", Flag, "", Is("false"), "Whether the glass is an infinitely thin pane"),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "metal",
             doc: "A rough or smooth conductor, defined by exactly one of `color`, `eta` with `k`, and `element`",
             keys: &[
@@ -175,7 +175,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 ),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "plastic",
             doc: "A diffuse base under a rough or smooth coat",
             keys: &[
@@ -209,7 +209,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 ),
             ],
         },
-        TypeInfo {
+        TableTypeInfo {
             name: "principled",
             doc: "The glTF material model",
             keys: &[

@@ -19,7 +19,7 @@ use std::sync::LazyLock;
 pub(super) use colors::hex_digits;
 pub use colors::{color_names, parse_color_bytes};
 pub use key::{
-    ChoiceValue, ChoiceValuesFn, DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind,
+    ChoiceValue, ChoiceValuesFn, DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind,
     choice_values,
 };
 
@@ -91,7 +91,7 @@ mod tests {
     }
 
     /// Returns a scene in which a key is set to its example value.
-    fn with_example(info: &TableInfo, kind: Option<&TypeInfo>, key: &KeyInfo) -> String {
+    fn with_example(info: &TableInfo, kind: Option<&TableTypeInfo>, key: &KeyInfo) -> String {
         let mut text = String::new();
         for (table, body) in [
             ("camera", "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n"),

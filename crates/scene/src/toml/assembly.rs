@@ -56,7 +56,7 @@ impl<'s> DocumentBuilder<'s> {
     }
 
     /// Adds a new, detached table to a document.
-    pub(super) fn with_detached_table(mut document: Document<'s>) -> (Self, TableId) {
+    pub(super) fn from_document_with_new_table(mut document: Document<'s>) -> (Self, TableId) {
         let table = document.add_table(TableOrigin::default());
         (Self { table, ..Self::from_document(document) }, table)
     }

@@ -170,7 +170,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
             ScalarKind::Boolean(value) => NodeKind::Boolean(value),
             ScalarKind::DateTime => NodeKind::Datetime,
             ScalarKind::Float => NodeKind::Float(text()),
-            ScalarKind::Integer(radix) => NodeKind::Integer(text(), to_radix(radix)),
+            ScalarKind::Integer(radix) => NodeKind::Integer(text(), convert_radix(radix)),
         };
         ValueNode { span, kind }
     }
@@ -247,7 +247,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
     }
 }
 
-fn to_radix(radix: IntegerRadix) -> Radix {
+fn convert_radix(radix: IntegerRadix) -> Radix {
     match radix {
         IntegerRadix::Dec => Radix::Decimal,
         IntegerRadix::Hex => Radix::Hexadecimal,

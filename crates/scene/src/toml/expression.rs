@@ -42,7 +42,7 @@ impl ExpressionParser {
             }
         }
         let mut sink = ErrorCollector { errors: &mut assembly.syntax, base };
-        parse(&self.tokens, part, &mut self.events, &mut sink);
+        parse_into_events(&self.tokens, part, &mut self.events, &mut sink);
         let next = self.tokens.last().map_or(source.len(), |token| base + token.span().end());
         if !assembly.is_lost {
             ExpressionEventReader { events: &self.events, source: part, base, assembly }.read_all();
@@ -51,7 +51,12 @@ impl ExpressionParser {
     }
 }
 
-fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: &mut dyn ErrorSink) {
+fn parse_into_events(
+    tokens: &[Token],
+    source: Source<'_>,
+    events: &mut Vec<Event>,
+    errors: &mut dyn ErrorSink,
+) {
     let mut receiver = ValidateWhitespace::new(events, source);
     let mut receiver = RecursionGuard::new(&mut receiver, MAX_DEPTH);
     parse_document(tokens, &mut receiver, errors);

@@ -47,7 +47,8 @@ const MARK: &str = "\u{feff}";
 /// Whether a text consists of exactly one dotted key and its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
-    errors.is_empty() && document.single_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
+    errors.is_empty()
+        && document.sole_assignment(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
 /// Applies a `KEY = VALUE` assignment to the document. The assignment is at byte `at` of `source`, and
@@ -61,10 +62,11 @@ pub(super) fn apply_assignment<'s>(
     at: usize,
     layout: TopLevelLayout,
 ) -> (Document<'s>, Result<(), KeyError>) {
-    let (mut assembly, detached) = DocumentBuilder::with_detached_table(document.with_source(source));
+    let (mut assembly, detached) =
+        DocumentBuilder::from_document_with_new_table(document.with_source(source));
     ExpressionParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
-    let placed = match document.single_value(detached) {
+    let placed = match document.sole_assignment(detached) {
         Some((keys, value)) => document.set_at_path(&keys, value, layout),
         None => Ok(()),
     };

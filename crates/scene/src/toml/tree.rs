@@ -285,7 +285,7 @@ impl<'s> Document<'s> {
 
     /// Returns the only value in a table and its dotted key. `None` if there are several values or if the
     /// value has a header.
-    pub(super) fn single_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
+    pub(super) fn sole_assignment(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
         let mut value = None;

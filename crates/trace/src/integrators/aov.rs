@@ -3,7 +3,7 @@
 use super::photons::{GatherPoint, PhotonMaps};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
-use super::transport::vertex::Vertex;
+use super::transport::vertex::SurfaceVertex;
 use super::{FirstHitQuantity, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
@@ -29,10 +29,10 @@ pub fn shade_aov(
         };
         let Some((path, hit)) = passed.unwrap_or(Some((*path, *hit))) else { continue };
         let (path, hit) = (&path, &hit);
-        let vertex = Vertex::new(tile, path, hit);
+        let vertex = SurfaceVertex::new(tile, path, hit);
         let surface = &vertex.surface;
         let value = match quantity {
-            FirstHitQuantity::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
+            FirstHitQuantity::Normal => (vertex.perturbed_front_normal(counters) + Vec3::ONE) * 0.5,
             FirstHitQuantity::Depth => Vec3::splat(view_depth(tile, surface)),
             FirstHitQuantity::Barycentric => surface.barycentric,
             FirstHitQuantity::Photons => {
@@ -51,7 +51,12 @@ pub fn shade_aov(
 }
 
 /// Counts the photons within the kernels around a vertex, using the sample's photon pass.
-fn count_nearby_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
+fn count_nearby_photons(
+    maps: &PhotonMaps,
+    tile: &TileContext<'_>,
+    slot: u32,
+    vertex: &SurfaceVertex<'_>,
+) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);
     let pass = maps.pass_for_sample(sample);

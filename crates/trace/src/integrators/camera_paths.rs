@@ -17,14 +17,16 @@ use super::transport::accumulator::{Accumulator, NonReflectedTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
-use super::transport::interface::{FresnelSplit, fresnel_split, reflected_path, sheet_transmission};
+use super::transport::interface::{
+    FresnelSplit, diffusing_sheet_transmission, fresnel_split, reflected_path,
+};
 use super::transport::interiors::InteriorList;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
 use super::transport::scatter::Continuation;
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
-use super::transport::vertex::{ShadingVertex, Vertex};
+use super::transport::vertex::{ShadingVertex, SurfaceVertex};
 use super::transport::walk::{
     Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk_to_interaction,
 };
@@ -33,7 +35,7 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, lane_indices};
 use crate::geometry::surface_packet::SurfacePacket;
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::SampledLobes;
 use crate::materials::{Bsdf, BxdfPoint, Coated, Mirror, NonSpecular, RoughDielectricPoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
@@ -77,7 +79,7 @@ pub fn trace_camera_paths(
     wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-        tile.camera_packets(start..slots.end, camera);
+        tile.generate_camera_packets(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
@@ -191,7 +193,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     fn handle_pane(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'a>,
+        vertex: &SurfaceVertex<'a>,
         hit: OpaqueHit,
         pane: &ThinDielectric,
     ) -> NullInteraction {
@@ -235,7 +237,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn begin_bounce(&mut self) {
-        let continuation = || Continuation::new(self.tile, self.depth, LobeSet::All);
+        let continuation = || Continuation::new(self.tile, self.depth, SampledLobes::All);
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
 
@@ -354,7 +356,8 @@ impl CameraWavefront<'_, '_> {
         let lights = &tile.world.lights;
         for lane in lane_indices(beyond) {
             let sky = lights.environment().map(|_| packet.sky(lane));
-            let beyond = lights.radiance_from_infinity_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+            let beyond =
+                lights.radiance_from_infinity_with_sky(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
             self.accumulator.add_non_reflected(
                 first + lane as u32,
                 NonReflectedTerm::Emitted,
@@ -428,7 +431,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    fn add_emission(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
+    fn add_emission(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, hit: OpaqueHit) -> bool {
         if vertex.emits() {
             let weight = match hit {
                 OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
@@ -441,7 +444,13 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Shades a non-specular surface. `far` is the medium behind the surface.
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &NonSpecular, far: &InteriorList) {
+    fn shade_rough(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        rough: &NonSpecular,
+        far: &InteriorList,
+    ) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let accepts_ambient = ambient != Vec3::ZERO && self.accumulator.accepts_ambient(path);
@@ -457,7 +466,7 @@ impl CameraWavefront<'_, '_> {
         let mut bsdf =
             if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
-            vertex.tint(&mut bsdf);
+            vertex.tint_by_vertex_color(&mut bsdf);
         }
         if accepts_ambient {
             self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient_reflectance());
@@ -471,17 +480,23 @@ impl CameraWavefront<'_, '_> {
     /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
-    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &BxdfPoint, far: &InteriorList) {
+    fn queue_rough(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        bsdf: &BxdfPoint,
+        far: &InteriorList,
+    ) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading_normals(self.counters);
-        let behind = bsdf.transmission().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
         let aov = self.light_aov_at(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
         // viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
-            let throughput = path.throughput * sheet_transmission(tile.world, &path.interiors, far);
+            let throughput = path.throughput * diffusing_sheet_transmission(tile.world, &path.interiors, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.far_side());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
@@ -493,7 +508,7 @@ impl CameraWavefront<'_, '_> {
     fn shade_rough_glass(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         rough: RoughDielectricPoint,
         far: &InteriorList,
     ) {
@@ -521,7 +536,7 @@ impl CameraWavefront<'_, '_> {
         // Photons are stored on both sides, so each side needs a vertex.
         let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.far_origin().is_some();
         let is_behind = is_one && dark == [true, false];
-        let sides = |vertex: &Vertex<'_>, is_dark: bool, interiors| match vertex.far_origin() {
+        let sides = |vertex: &SurfaceVertex<'_>, is_dark: bool, interiors| match vertex.far_origin() {
             Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, interiors },
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };
@@ -544,7 +559,7 @@ impl CameraWavefront<'_, '_> {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 
-    fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
+    fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading_normals(self.counters);
         let is_colored = self.accumulator.aov.is_colored();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
@@ -553,7 +568,13 @@ impl CameraWavefront<'_, '_> {
 
     /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
     /// the coat is its Fresnel reflectance.
-    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &InteriorList) {
+    fn shade_coated(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        coated: &Coated,
+        far: &InteriorList,
+    ) {
         let shading = vertex.shading_normals(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
@@ -578,7 +599,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &InteriorList) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
         let shading = vertex.shading_normals(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);

@@ -32,11 +32,11 @@ mod view;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{NegativeLobes, Pixels, TileSamples};
+use crate::film::{NegativeLobeSamples, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_mode;
+pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
 use memory::ThreadMemory;
 pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
@@ -56,7 +56,7 @@ const BATCH_SIZE: usize = 1024;
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
-    pixels: impl Into<Pixels>,
+    pixels: impl Into<SelectedPixels>,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -71,7 +71,7 @@ pub fn render_tile_with_photons(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
-    pixels: impl Into<Pixels>,
+    pixels: impl Into<SelectedPixels>,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
@@ -82,7 +82,7 @@ pub fn render_tile_with_photons(
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
     // Prepare the context shared by all rays.
-    let settings = &settings.effective();
+    let settings = &settings.without_ineffective_settings();
     let photons = photons.filter(|_| settings.gathers_photons());
     let behavior = PathBehavior::from_settings(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
@@ -99,7 +99,7 @@ pub fn render_tile_with_photons(
         let negative = |first: u32, bits: u32| write_mask_bits(&mut is_negative, first, bits);
         match settings.view.aov_source() {
             AovSource::FirstHit(number) => {
-                tile.camera_rays(slots, &mut memory.scratch.rays, negative);
+                tile.generate_camera_rays(slots, &mut memory.scratch.rays, negative);
                 aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
@@ -113,7 +113,7 @@ pub fn render_tile_with_photons(
                     negative,
                 )?;
                 if shown == AovSource::Bounds {
-                    tile.camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
+                    tile.generate_camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
                     bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;
                 }
             }
@@ -121,7 +121,7 @@ pub fn render_tile_with_photons(
     }
     // Return the samples.
     memory.return_to_thread();
-    let negative = weight.map(|weight| NegativeLobes { weight, is_negative });
+    let negative = weight.map(|weight| NegativeLobeSamples { weight, is_negative });
     let samples = block.samples.len() as u32;
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }

@@ -32,7 +32,7 @@ pub struct PhotonSettings {
 
 impl RenderSettings {
     /// Returns the effective settings. Settings that have no effect are reset to their defaults.
-    pub fn effective(&self) -> Self {
+    pub fn without_ineffective_settings(&self) -> Self {
         let mut render = self.render.reset_ignored();
         let photons = self.photons.filter(|_| render.integrator.properties().gathers);
         if photons.is_some() {
@@ -53,7 +53,7 @@ impl RenderSettings {
                 self.render.max_depth > 1
             }
         };
-        shows && self.effective().photons.is_some()
+        shows && self.without_ineffective_settings().photons.is_some()
     }
 
     /// Textures needed for images with these settings.
@@ -79,7 +79,8 @@ impl RenderSettings {
             }
             AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
-                let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
+                let ambient =
+                    parts.ambient && self.without_ineffective_settings().render.ambient != Vec3::ZERO;
                 TextureNeeds { ambient, lights: parts.emitted, by_delta: true, ..TextureNeeds::NONE }
             }
             // Boxes are drawn over the beauty image.
@@ -101,7 +102,7 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { render, dof, view, photons } = self.effective();
+        let Self { render, dof, view, photons } = self.without_ineffective_settings();
         key.add(&render, of).add_bool(dof).add_choice(view.sampled_view());
         // All acceleration structures return the same hits, but these two views show the structures
         // themselves.

@@ -48,7 +48,7 @@ impl World {
         Self {
             unlit_glass: world.find_unlit_glass(),
             lens_glass: world.find_lens_glass(),
-            enclosing_glass: world.find_enclosing_glass(),
+            enclosing_glass: world.find_glass_of_subtrees(),
             camera_solids: world.find_solids_around_camera(),
             see_through: SeeThroughObjects::from_world(&world).map(Box::new),
             ..world

@@ -1,6 +1,6 @@
 //! Pinhole and thin-lens camera.
 
-use crate::assets::OrbiterCamera;
+use crate::assets::GkitOrbiterCamera;
 use crate::geometry::Ray;
 use crate::math::decimal::{decimal_step, round_to_step};
 use crate::math::transform::rotation_xyz;
@@ -26,7 +26,7 @@ pub struct Camera {
 
 impl Camera {
     /// Creates the camera described by the scene, using the contents of the orbiter file if there is one.
-    pub fn new(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Self {
+    pub fn new(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Self {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
                 let forward = (*look_at - *position).normalize();
@@ -43,7 +43,7 @@ impl Camera {
             }
             description::Camera::Orbiter { fov, aperture, focus, .. } => {
                 let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
-                let orbiter = OrbiterCamera { fov: fov.unwrap_or(file.fov), ..file };
+                let orbiter = GkitOrbiterCamera { fov: fov.unwrap_or(file.fov), ..file };
                 Self {
                     aperture: *aperture,
                     focus: focus.unwrap_or(orbiter.size),
@@ -56,7 +56,7 @@ impl Camera {
     /// Returns the point that the camera orbits, and the distance to it.
     pub fn target_and_distance(
         camera: &description::Camera,
-        orbiter: Option<&OrbiterCamera>,
+        orbiter: Option<&GkitOrbiterCamera>,
     ) -> (DVec3, f64) {
         match camera {
             description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
@@ -70,7 +70,7 @@ impl Camera {
     /// Returns the camera as position, target and up vector. An orbiter camera is rounded to short decimals,
     /// precise enough to render the same view. Its target is the point on the view axis at the distance of
     /// the orbiter's center.
-    pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
+    pub fn viewpoint(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Viewpoint {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {
                 pose: Pose { position: *position, look_at: *look_at, up: *up },
@@ -101,7 +101,7 @@ impl Camera {
     }
 
     /// Camera of a gKit orbiter. The world-to-camera transform is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
-    fn from_orbiter(orbiter: &OrbiterCamera) -> Self {
+    fn from_orbiter(orbiter: &GkitOrbiterCamera) -> Self {
         let [x, y] = orbiter.rotation;
         // `rotation_xyz` rotates about x first, but the orbiter rotates about y first.
         let view: DMat3 = rotation_xyz(DVec3::new(x, 0.0, 0.0)) * rotation_xyz(DVec3::new(0.0, y, 0.0));
@@ -160,7 +160,7 @@ impl Camera {
 const UPRIGHT: f64 = 1e-3;
 
 /// Orbiter used if the orbiter file is missing. The pipeline reports the missing file as an error first.
-const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
+const DEFAULT_ORBITER: GkitOrbiterCamera = GkitOrbiterCamera {
     center: [0.0; 3],
     position: [0.0; 2],
     rotation: [0.0; 2],
@@ -212,8 +212,12 @@ mod tests {
 
     #[test]
     fn orbiter_looks_at_its_center() {
-        let orbiter =
-            OrbiterCamera { center: [1.0, 2.0, 3.0], rotation: [30.0, 90.0], size: 5.0, ..DEFAULT_ORBITER };
+        let orbiter = GkitOrbiterCamera {
+            center: [1.0, 2.0, 3.0],
+            rotation: [30.0, 90.0],
+            size: 5.0,
+            ..DEFAULT_ORBITER
+        };
         let camera = Camera::from_orbiter(&orbiter);
         let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
         assert!((to_center - camera.forward * 5.0).length() < 1e-12);
@@ -227,7 +231,7 @@ mod tests {
     fn orbiter_viewpoint_matches_the_camera() {
         let file = description::Spanned { value: "camera.txt".into(), span: 0..0 };
         for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
-            let orbiter = OrbiterCamera {
+            let orbiter = GkitOrbiterCamera {
                 center: [1.0, 2.0, 3.0],
                 position: [0.5, -0.25],
                 rotation,

@@ -37,7 +37,7 @@ impl World {
     /// solids that contain the camera.
     pub fn glass_around_lens_point(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         };
         self.lens_glass.iter().copied().filter(is_inside).chain(self.camera_solids.iter().copied())
@@ -105,7 +105,8 @@ impl World {
     pub fn material_around(&self, body: &CompoundSolid, point: Vec3, of: Option<u32>) -> Option<u32> {
         let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..MIN_RAYS.max(objects.len()) {
-            let target = self.geometry.objects()[objects[ray % objects.len()] as usize].sample_surface(ray);
+            let target =
+                self.geometry.objects()[objects[ray % objects.len()] as usize].surface_point_by_number(ray);
             let Some((is_back, seen)) = target.and_then(|target| self.hit_side(body, (point, of), target))
             else {
                 continue;
@@ -149,7 +150,7 @@ impl World {
 
 impl Object {
     /// Returns a point on the surface, selected by `number`. `None` if the object has no area.
-    fn sample_surface(&self, number: usize) -> Option<DVec3> {
+    fn surface_point_by_number(&self, number: usize) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
                 let areas = shape.areas();

@@ -19,7 +19,7 @@ pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
 /// the same point have no effect there.
-pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
+pub(super) type SubtreeGlassList = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on each side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,12 +82,12 @@ pub struct CoincidenceQuery<'a> {
 
 /// The offset points, and the near point without the added `lead` distance.
 #[derive(Clone, Copy)]
-struct CoincidenceProbe {
+struct CoincidenceSegment {
     sides: OffsetPoints,
     close: Vec3,
 }
 
-impl CoincidenceProbe {
+impl CoincidenceSegment {
     /// Value of t at `close` along the segment.
     fn close_point_t(&self) -> f32 {
         let way = self.sides.ray().direction;
@@ -107,7 +107,7 @@ impl World {
     ) -> OffsetPoints {
         let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
-            if self.is_far_side_away(at, margin) {
+            if self.is_hit_on_thick_glass(at, margin) {
                 return self.classify_isolated_hit(at, visit);
             }
             self.geometry.set_hit_as_candidate(at, memory)
@@ -118,7 +118,7 @@ impl World {
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
-    fn is_far_side_away(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
+    fn is_hit_on_thick_glass(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
             Object::Shape(shape) => shape.is_thicker_than(at.surface.point.as_dvec3(), far),
@@ -127,7 +127,7 @@ impl World {
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path for [`World::classify_candidates`] if [`World::is_far_side_away`] is true and nothing else
+    /// Fast path for [`World::classify_candidates`] if [`World::is_hit_on_thick_glass`] is true and nothing else
     /// is nearby. In this case, only the incoming ray's side matters.
     fn classify_isolated_hit(
         &self,
@@ -159,7 +159,7 @@ impl World {
             before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
             beyond: offset_origin(point, error, normal, -normal),
         };
-        let probe = CoincidenceProbe { sides, close: offset_origin(point, error, normal, normal) };
+        let probe = CoincidenceSegment { sides, close: offset_origin(point, error, normal, normal) };
         let lead_end = probe.close_point_t();
         let mut is_led = false;
         let mut found = |near: CoincidentSurface| {
@@ -184,7 +184,7 @@ impl World {
             let mesh = geometry.objects()[object as usize].mesh();
             if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.intersect_segment(triangle, ends)) {
                 let hit = Hit { shape, object };
-                found(self.coincident_surface(hit, self.material_index(&hit) as u32, is_front));
+                found(self.oriented_coincident_surface(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -207,10 +207,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.coincident_surface(Hit { shape: own, object }, material, is_front))
+        Some(self.oriented_coincident_surface(Hit { shape: own, object }, material, is_front))
     }
 
-    fn coincident_surface(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
+    fn oriented_coincident_surface(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
         let is_inside_out = self.is_glass_material(material) && self.glass_solids.is_inside_out(hit.object);
         CoincidentSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }
@@ -252,19 +252,19 @@ impl World {
         })
     }
 
-    /// The [`EnclosingGlass`] of each subtree. Empty if few objects are nested.
-    pub(super) fn find_enclosing_glass(&self) -> Box<[EnclosingGlass]> {
+    /// The [`SubtreeGlassList`] of each subtree. Empty if few objects are nested.
+    pub(super) fn find_glass_of_subtrees(&self) -> Box<[SubtreeGlassList]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
         };
-        self.geometry.tree().last_primitives_of_subtrees(is_glass).into()
+        self.geometry.tree().highest_ids_by_subtree(is_glass).into()
     }
 
     /// Whether an object is a closed shape that contains a point.
     pub fn encloses(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         }
     }
@@ -307,7 +307,7 @@ impl Geometry {
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
-        enclosing: &[EnclosingGlass],
+        enclosing: &[SubtreeGlassList],
     ) -> Vec3 {
         let CoincidenceScratch { objects, triangles } = memory;
         objects.clear();
@@ -327,7 +327,7 @@ impl Geometry {
         let mut error = at.surface.error;
         for &id in &*objects {
             let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };
-            mesh.tree.triangles().visit_triangles_in_box(&mesh.local_box(&near), |triangle| {
+            mesh.tree.triangle_tree().visit_triangles_in_box(&mesh.local_box(&near), |triangle| {
                 if triangle_meets_box(mesh.world_corners(triangle), &near) {
                     triangles.push((id, triangle));
                     error = error.max(mesh.triangle_position_error(triangle, point));
@@ -357,8 +357,8 @@ impl MeshInstance {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
-        let of_tests = self.with_placement(&self.transform).point_error_bound(point, local, corners);
-        of_tests + self.transform.abs_bound(reach).as_vec3() * f32::EPSILON
+        let of_tests = self.to_placed_mesh(&self.transform).point_error_bound(point, local, corners);
+        of_tests + self.transform.transform_abs_bound(reach).as_vec3() * f32::EPSILON
     }
 
     /// Upper bound on the error of any triangle in the mesh.
@@ -367,7 +367,7 @@ impl MeshInstance {
         if local.is_empty() {
             return 0.0;
         }
-        let reach = self.transform.abs_bound(local.min.abs().max(local.max.abs()).as_dvec3());
+        let reach = self.transform.transform_abs_bound(local.min.abs().max(local.max.abs()).as_dvec3());
         (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
     }
 

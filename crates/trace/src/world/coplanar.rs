@@ -341,7 +341,7 @@ fn visit_flat_faces(
             for triangle in 0..loaded.mesh.triangles.len() {
                 let corners = loaded.mesh.corners(triangle as u32);
                 let local = corners.iter().fold(Vec3::ZERO, |most, at| most.max(at.abs()));
-                let local = transform.abs_bound(local.as_dvec3()).max_element();
+                let local = transform.transform_abs_bound(local.as_dvec3()).max_element();
                 let [a, b, c] = corners.map(|at| transform.point(at.as_dvec3() + loaded.mesh.origin));
                 let [least, greatest] = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
                 let rounding = ROUNDING * local.max(least.abs().max(greatest.abs()).max_element());

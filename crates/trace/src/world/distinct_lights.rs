@@ -17,7 +17,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
 
 /// Whether an object gives an emissive material to each mesh file.
-pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
+pub fn mesh_files_with_emissive_override(scene: &Scene) -> Vec<bool> {
     let mut emissive = vec![false; scene.mesh_files.len()];
     for object in &scene.objects {
         if let (Some(mesh), Some(own)) = (object.shape.mesh(), object.material) {

@@ -16,7 +16,7 @@ use crate::lights::{
     AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvMapping,
     UvTriangle, back_area_light, front_area_light, see_through_area_light,
 };
-use crate::lights::{Emitter, LightCoverage};
+use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
@@ -237,7 +237,7 @@ fn mesh_lights(
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
             let texture = if emissive.is_textured() { emissive.texture(patches()).map(Box::new) } else { None };
-            let (shape, part) = (Emitter::Mesh(emitter), LightCoverage::Listed);
+            let (shape, part) = (Emitter::Mesh(emitter), EmittingPart::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
     let of_sides = all

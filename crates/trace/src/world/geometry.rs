@@ -101,8 +101,9 @@ impl Geometry {
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
-        let shell = |id: u32| object_shell(&objects[id as usize], &boxes[id as usize]);
-        let (tree, instructions) = (Bvh::build(&boxes, token)?.with_shells(shell), InstructionSet::best());
+        let shell = |id: u32| bounding_spherical_shell(&objects[id as usize], &boxes[id as usize]);
+        let (tree, instructions) =
+            (Bvh::build(&boxes, token)?.with_shells_if_nested(shell), InstructionSet::best());
         let merged = merged.map(|meshes| -> Result<_, Cancelled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
@@ -110,7 +111,7 @@ impl Geometry {
             let shell = |id: u32| {
                 objects.get(id as usize).map_or(SphericalShell::from_bounds(&of_merged), |_| shell(id))
             };
-            Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells(shell), meshes })
+            Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells_if_nested(shell), meshes })
         });
         let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::max_rounding_error);
@@ -297,7 +298,7 @@ impl Geometry {
 
     /// Scene-wide number of the hit triangle, for [`Ray::start`]. [`Ray::NO_TRIANGLE`] for other shapes.
     #[inline(always)]
-    pub fn triangle_number(&self, hit: &Hit) -> u32 {
+    pub fn scene_triangle_number(&self, hit: &Hit) -> u32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(_) => Ray::NO_TRIANGLE,
             Object::Mesh(mesh) => mesh.scene_triangle_number(hit.shape.primitive),
@@ -366,7 +367,7 @@ impl Geometry {
 }
 
 /// Shell around an object with this bounding box.
-fn object_shell(object: &Object, bounds: &Aabb) -> SphericalShell {
+fn bounding_spherical_shell(object: &Object, bounds: &Aabb) -> SphericalShell {
     match object {
         Object::Shape(Shape::Sphere(sphere)) => SphericalShell::from_sphere(sphere.center, sphere.radius),
         Object::Shape(_) | Object::Mesh(_) => SphericalShell::from_bounds(bounds),
@@ -435,7 +436,7 @@ mod tests {
         for (object, own) in (0..).zip(geometry.objects()) {
             for primitive in 0..own.triangle_count() as u32 {
                 let hit = Hit { shape: ShapeHit { primitive, ..ShapeHit::from_t(1.0) }, object };
-                assert!(seen.insert(geometry.triangle_number(&hit)), "{object} {primitive}");
+                assert!(seen.insert(geometry.scene_triangle_number(&hit)), "{object} {primitive}");
             }
         }
         assert!(!seen.contains(&Ray::NO_TRIANGLE));
@@ -454,7 +455,8 @@ mod tests {
             let surface = geometry.surface(&ray, &hit);
             let direction = vector(1.0).normalize();
             let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
-            let leaving = Ray::new(origin, direction).with_start_triangle(geometry.triangle_number(&hit));
+            let leaving =
+                Ray::new(origin, direction).with_start_triangle(geometry.scene_triangle_number(&hit));
             let found = geometry.closest_hit(&leaving);
             assert_eq!(found, geometry.closest_hit(&Ray::new(origin, direction)), "{hit:?} {leaving:?}");
             started += 1;

@@ -201,7 +201,7 @@ impl Geometry {
             Object::Shape(shape) => shape_is_near(shape, around, region),
             Object::Mesh(mesh) => {
                 let is_far = |other: u32| !region.is_near(mesh.world_corners(other), around);
-                !mesh.tree.triangles().visit_triangles_in_box_while(&mesh.local_box(around), is_far)
+                !mesh.tree.triangle_tree().visit_triangles_in_box_while(&mesh.local_box(around), is_far)
             }
         };
         let is_near = |id: u32| id != own && is_near(id);
@@ -224,7 +224,7 @@ impl Geometry {
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
 fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
-    mesh.tree.triangles().visit_triangles_in_box_while(&around, |other| {
+    mesh.tree.triangle_tree().visit_triangles_in_box_while(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
     })
 }

@@ -76,7 +76,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         strength: map.strength,
     });
     let bump = material.bump.map(|bump| Bump {
-        texture: of.texture(bump.texture, TextureRole::Bump(bump.pixel_value())),
+        texture: of.texture(bump.texture, TextureRole::Bump(bump.height_channel())),
         scale: bump.scale,
     });
     let normal_perturbation = NormalPerturbation::new(normal_map, bump);
@@ -135,7 +135,7 @@ fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorPa
 /// Emission of a material from the scene file.
 pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
     let (emission, of) = (&material.emission, SceneTextureLookup { scene, images, material });
-    let coat = material.emission_coat().and_then(|numbers| {
+    let coat = material.emitter_coat_parameters().and_then(|numbers| {
         let [weight, roughness] = numbers.map(|number| of.number(&number, TextureRole::EmissionCoat));
         EmissionCoat::new(weight, roughness).map(Arc::new)
     });
@@ -322,7 +322,7 @@ impl SceneTextureLookup<'_> {
         let declared = &scene.textures[index];
         let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
         let Image { texels, mipmaps } =
-            loaded_image(images, &material_texture_source(scene, material, (index, role)));
+            loaded_image_or_placeholder(images, &material_texture_source(scene, material, (index, role)));
         let mipmaps = match filter {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
             TextureFilter::Mipmap => mipmaps,
@@ -330,7 +330,7 @@ impl SceneTextureLookup<'_> {
         let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
         let factor = match role.pixel_interpretation() {
             PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-                ScaleAndOffset::new(factor)
+                ScaleAndOffset::from_scale(factor)
             }
             PixelInterpretation::Normal => None,
         };
@@ -345,7 +345,7 @@ fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretatio
     let (base, gain) = texture.range;
     let factor = match used {
         PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-            ScaleAndOffset::with_offset(Vec3::splat(gain), Vec3::splat(base))
+            ScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base))
         }
         PixelInterpretation::Normal => None,
     };
@@ -362,7 +362,7 @@ fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretatio
 
 /// Returns a loaded image, or a placeholder if the image was not loaded. Such images are used only by
 /// materials without objects, which are never looked up.
-fn loaded_image(images: &Images, source: &TextureSource) -> Image {
+fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
         Image { texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }), mipmaps: None }

@@ -463,7 +463,8 @@ pub(super) mod tests {
             assert_eq!(found, expected, "{ray:?}");
             // Ignoring the hit triangle results in a hit on another triangle.
             if let Some(hit) = found {
-                let next = geometry.closest_hit(&ray.with_start_triangle(geometry.triangle_number(&hit)));
+                let next =
+                    geometry.closest_hit(&ray.with_start_triangle(geometry.scene_triangle_number(&hit)));
                 let is_own =
                     |next: Hit| (next.object, next.shape.primitive) == (hit.object, hit.shape.primitive);
                 assert!(!next.is_some_and(is_own), "{ray:?}");

@@ -60,7 +60,7 @@ impl MeshInstance {
         }
     }
 
-    /// Scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::triangle_number).
+    /// Scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::scene_triangle_number).
     #[inline(always)]
     pub(super) fn scene_triangle_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
@@ -126,7 +126,7 @@ impl MeshInstance {
 
     /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
-    pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
+    pub(super) fn vertex_uvs(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
         match set {
             UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
@@ -136,7 +136,7 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.values_in_corner_order(triangle, self.uvs(UvSet::First)).unwrap_or([
+        self.values_in_corner_order(triangle, self.vertex_uvs(UvSet::First)).unwrap_or([
             Vec2::ZERO,
             Vec2::X,
             Vec2::Y,
@@ -192,7 +192,7 @@ impl MeshInstance {
 
     /// Combines this mesh with `placement`, which must represent the mesh's transform.
     #[inline(always)]
-    pub(super) fn with_placement<P>(&self, placement: P) -> PlacedMesh<P> {
+    pub(super) fn to_placed_mesh<P>(&self, placement: P) -> PlacedMesh<P> {
         PlacedMesh {
             placement,
             edge_margin: self.edge_margin,
@@ -203,8 +203,8 @@ impl MeshInstance {
     /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => self.surface_with_placement(self.with_placement(&self.transform), ray, hit, asked),
-            false => self.surface_with_placement(self.with_placement(IdentityPlacement), ray, hit, asked),
+            true => self.surface_with_placement(self.to_placed_mesh(&self.transform), ray, hit, asked),
+            false => self.surface_with_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, asked),
         }
     }
 
@@ -284,7 +284,7 @@ impl MeshInstance {
         found: &mut HitPacket,
     ) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.triangles().closest_hit_packet(&self.local_rays(rows, met), ends, &mut hits);
+        self.tree.triangle_tree().closest_hit_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -304,11 +304,11 @@ impl MeshInstance {
     ) -> u32 {
         let local = self.local_rays(rows, met);
         let Some((own, numbers)) = except else {
-            return self.tree.triangles().any_hit_packet(&local, ends, &[]);
+            return self.tree.triangle_tree().any_hit_packet(&local, ends, &[]);
         };
         let mut parts = [None; PACKET_SIZE];
         lane_indices(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
-        self.tree.triangles().any_hit_packet(&local, ends, &parts)
+        self.tree.triangle_tree().any_hit_packet(&local, ends, &parts)
     }
 
     /// Transforms the rays in `met` to mesh coordinates. Other lanes contain a copy of the first ray in

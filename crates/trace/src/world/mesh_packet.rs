@@ -23,7 +23,7 @@ impl MeshInstance {
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
     ) {
-        simd.call(FillSurfaces { mesh: self, surface, rays, hits, of, asked_uvs });
+        simd.call_out_of_line(FillSurfaces { mesh: self, surface, rays, hits, of, asked_uvs });
     }
 
     #[inline(always)]
@@ -80,7 +80,7 @@ impl MeshInstance {
             surface.copy_shading_normals(of, &found);
         }
         if let Some(set) = asked_uvs {
-            let all = self.uvs(set);
+            let all = self.vertex_uvs(set);
             for i in 0..PACKET_SIZE {
                 let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
@@ -113,7 +113,7 @@ impl SimdKernel for FillSurfaces<'_> {
         let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
         if mesh.is_transformed {
             mesh.fill_placed_surfaces(
-                mesh.with_placement(&mesh.transform),
+                mesh.to_placed_mesh(&mesh.transform),
                 surface,
                 (rays, hits),
                 of,
@@ -122,7 +122,7 @@ impl SimdKernel for FillSurfaces<'_> {
             );
         } else {
             mesh.fill_placed_surfaces(
-                mesh.with_placement(IdentityPlacement),
+                mesh.to_placed_mesh(IdentityPlacement),
                 surface,
                 (rays, hits),
                 of,
@@ -281,7 +281,8 @@ mod tests {
                 let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();
                 let mut hits = HitPacket::without_hits();
                 for (i, ray) in rays.iter().enumerate() {
-                    let hit = mesh.tree.triangles().closest_hit(&mesh.local_ray(ray)).expect("the ground");
+                    let hit =
+                        mesh.tree.triangle_tree().closest_hit(&mesh.local_ray(ray)).expect("the ground");
                     hits.set(i, &hit);
                 }
                 let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);

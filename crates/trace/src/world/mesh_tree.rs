@@ -35,7 +35,7 @@ impl MeshTree {
     }
 
     /// The tree over the triangles, in mesh coordinates.
-    pub fn triangles(&self) -> &TriangleTree {
+    pub fn triangle_tree(&self) -> &TriangleTree {
         &self.tree
     }
 

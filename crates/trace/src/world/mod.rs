@@ -37,14 +37,14 @@ pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, MAX_INTERIORS, OffsetPoints};
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
-pub use distinct_lights::{emissive_meshes, separate_coincident_emitters};
+pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
 pub use emitters::{build_lights, photon_source, sky_map};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
-pub use null_interaction::{MAX_NULL_INTERACTIONS, Transmittance};
+pub use null_interaction::{MAX_NULL_INTERACTIONS, TransmittancePacket};
 pub use object::Object;
 pub use origin::choose_scene_origin;
 pub use packet_material::PacketMaterial;
@@ -54,7 +54,7 @@ pub use textures::{
 };
 pub use unlit_glass::LightBoundingBoxes;
 
-use crate::assets::OrbiterCamera;
+use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
 use crate::geometry::packet::lane_indices;
 use crate::lights::Lights;
@@ -83,7 +83,7 @@ pub struct WorldInputs {
     /// The images listed by [`textures_needed`].
     pub images: Images,
     /// Contents of the orbiter file. `None` if the scene file defines the camera itself.
-    pub orbiter: Option<OrbiterCamera>,
+    pub orbiter: Option<GkitOrbiterCamera>,
     /// Camera that overrides the scene's camera. `None` to use the scene's camera.
     pub camera: Option<description::Camera>,
     /// Glass solids, if they have already been found.
@@ -122,7 +122,7 @@ pub struct World {
     /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
-    enclosing_glass: Box<[contact::EnclosingGlass]>,
+    enclosing_glass: Box<[contact::SubtreeGlassList]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
@@ -183,7 +183,7 @@ impl World {
     /// Material indices for the lanes in `of`, which all hit `object`. Other lanes contain arbitrary valid
     /// indices.
     #[inline(always)]
-    pub fn packet_materials(
+    pub fn packet_material_indices(
         &self,
         object: u32,
         of: u32,
@@ -253,7 +253,7 @@ impl World {
     /// Whether an object's texture axes are well defined or irrelevant: the object has UVs, or no lobes
     /// depend on the axes.
     #[inline]
-    pub fn has_texture_axes(&self, object: u32) -> bool {
+    pub fn has_usable_texture_axes(&self, object: u32) -> bool {
         if !self.has_directions {
             return true;
         }

@@ -54,7 +54,7 @@ impl SeeThroughObjects {
 
 /// Transmittance along the shadow rays in a packet.
 #[repr(align(64))]
-pub struct Transmittance {
+pub struct TransmittancePacket {
     /// Mask of rays with zero transmittance.
     pub occluded: u32,
     /// Transmittance of each ray.
@@ -63,7 +63,7 @@ pub struct Transmittance {
     pub lookups: u64,
 }
 
-impl Transmittance {
+impl TransmittancePacket {
     /// Sets the transmittance along a lane's ray.
     fn set(&mut self, lane: usize, left: Vec3) {
         set_lane(&mut self.left, lane, left);
@@ -88,7 +88,7 @@ impl World {
         ends: &F32x16,
         traced: u32,
         sources: &LightGeometryPacket,
-    ) -> Transmittance {
+    ) -> TransmittancePacket {
         self.geometry.instruction_set().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
     }
 
@@ -121,7 +121,7 @@ impl World {
         let at = self.texture_point(hit, &surface, |_| Footprint::POINT);
         let left = material.null_transmittance(&at, color, cosine, lookups);
         let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
-        let start = self.geometry.triangle_number(hit);
+        let start = self.geometry.scene_triangle_number(hit);
         let beyond = Ray::new(origin, ray.direction).with_start_triangle(start);
         (left, Ray { t_max: ray.t_max - hit.shape.t, ..beyond })
     }
@@ -172,12 +172,13 @@ struct TransmittanceKernel<'a> {
 }
 
 impl SimdKernel for TransmittanceKernel<'_> {
-    type Output = Transmittance;
+    type Output = TransmittancePacket;
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> Transmittance {
+    fn run(self, simd: impl Simd) -> TransmittancePacket {
         let Self { world, rows, ends, traced, sources } = self;
-        let mut transmittance = Transmittance { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
+        let mut transmittance =
+            TransmittancePacket { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
         let Some(see_through) = &world.see_through else { return transmittance };
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;

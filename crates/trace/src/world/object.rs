@@ -22,7 +22,7 @@ impl Object {
     pub fn closest_hit(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64),
-            Self::Mesh(mesh) => mesh.tree.triangles().closest_hit(&mesh.local_ray(ray)),
+            Self::Mesh(mesh) => mesh.tree.triangle_tree().closest_hit(&mesh.local_ray(ray)),
         }
     }
 
@@ -30,7 +30,7 @@ impl Object {
     pub fn any_hit(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
-            Self::Mesh(mesh) => mesh.tree.triangles().any_hit(&mesh.local_ray(ray), except),
+            Self::Mesh(mesh) => mesh.tree.triangle_tree().any_hit(&mesh.local_ray(ray), except),
         }
     }
 

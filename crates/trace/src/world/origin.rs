@@ -1,7 +1,7 @@
 //! The origin of the coordinate system in which a scene is traced.
 
 use super::Camera;
-use crate::assets::OrbiterCamera;
+use crate::assets::GkitOrbiterCamera;
 use crate::math::DVec3;
 use crate::math::origin::origin_near;
 use crate::scene::description;
@@ -10,7 +10,7 @@ use crate::scene::description;
 /// origin is 0 if the target is within about 20 camera distances of 0. It depends only on the point that the
 /// camera orbits and the distance to this point, and changes in discrete steps. Orbiting does not change the
 /// origin. Trees are rebuilt only when the origin changes.
-pub fn choose_scene_origin(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> DVec3 {
+pub fn choose_scene_origin(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> DVec3 {
     let (aim, distance) = Camera::target_and_distance(camera, orbiter);
     origin_near(aim, distance)
 }

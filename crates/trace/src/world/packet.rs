@@ -51,7 +51,7 @@ impl Geometry {
         sources: &LightGeometryPacket,
         simd: impl Simd,
     ) -> u32 {
-        simd.call(OcclusionKernel { geometry: self, rows, ends, traced, sources })
+        simd.call_out_of_line(OcclusionKernel { geometry: self, rows, ends, traced, sources })
     }
 }
 
@@ -404,7 +404,7 @@ pub(super) mod tests {
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
             // Let some rays ignore the triangle they would hit.
             for ray in rays.iter_mut().step_by(4) {
-                let start = geometry.closest_hit(ray).map_or(7, |hit| geometry.triangle_number(&hit));
+                let start = geometry.closest_hit(ray).map_or(7, |hit| geometry.scene_triangle_number(&hit));
                 *ray = ray.with_start_triangle(start);
             }
             let mut found = vec![None; rays.len()];

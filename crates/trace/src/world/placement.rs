@@ -28,7 +28,7 @@ impl MeshPlacement for &Transform {
 
     #[inline(always)]
     fn abs_bound_to_world(self, local: DVec3) -> DVec3 {
-        Transform::abs_bound(self, local)
+        Transform::transform_abs_bound(self, local)
     }
 
     #[inline(always)]

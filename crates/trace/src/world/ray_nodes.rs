@@ -14,7 +14,7 @@ impl Geometry {
         mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool,
     ) {
         let mut below = Vec::new();
-        self.traced_tree().visit_along_ray(
+        self.traced_tree().visit_nodes_along_ray(
             ray,
             |cell, stretch| visit(ray, cell, stretch),
             |id, depth| below.push((id, depth)),
@@ -23,7 +23,7 @@ impl Geometry {
             let (local, tree) =
                 match (self.merged_meshes(id), self.objects().get(id as usize).and_then(Object::mesh)) {
                     (Some(merged), _) => (*ray, merged.tree()),
-                    (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangles()),
+                    (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangle_tree()),
                     (None, None) => continue,
                 };
             tree.visit_nodes_along_ray(&local, |cell, stretch| {

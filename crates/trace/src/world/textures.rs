@@ -70,7 +70,7 @@ impl NeededTexture {
     /// The image used as the environment map.
     pub fn for_environment(file: &Path) -> Self {
         Self {
-            source: environment_texture_source(file),
+            source: environment_source_from_file(file),
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
@@ -214,7 +214,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
 
 /// The environment map's file. `None` if there is no map or if the map's color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
-    environment_file(scene).map(environment_texture_source)
+    environment_file(scene).map(environment_source_from_file)
 }
 
 fn environment_file(scene: &Scene) -> Option<&Path> {
@@ -222,7 +222,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_texture_source(file: &Path) -> TextureSource {
+fn environment_source_from_file(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
@@ -285,7 +285,8 @@ pub fn texture_use(
                 }
             };
             let opacity = material.opacity.texture().filter(|(_, number)| is_alpha(*number));
-            let is_cut_out = opacity.is_some_and(|(opacity, _)| is_same_image(scene, opacity, texture));
+            let is_cut_out =
+                opacity.is_some_and(|(opacity, _)| have_same_image_and_mapping(scene, opacity, texture));
             if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
         }
         PixelInterpretation::Number(ChannelSelector::Opacity)
@@ -306,7 +307,7 @@ fn is_used_as_color(scene: &Scene, material: &Material, texture: usize) -> bool 
 }
 
 /// Whether two textures use the same image with the same texture coordinates.
-fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
+fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
     let [a, b] = [a, b].map(|texture| &scene.textures[texture]);
     let at = |texture: &crate::scene::description::Texture| {
         (texture.image, texture.wrap, texture.repeat, texture.rotate, texture.offset, texture.uv)

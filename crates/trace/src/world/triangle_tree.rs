@@ -66,8 +66,8 @@ impl TriangleTree {
     /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
     pub fn visit_nodes_along_ray(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
-            Self::Boxes(tree) => tree.visit_along_ray(ray, visit),
-            Self::Planes(tree) => tree.visit_along_ray(ray, visit),
+            Self::Boxes(tree) => tree.visit_nodes_along_ray(ray, visit),
+            Self::Planes(tree) => tree.visit_nodes_along_ray(ray, visit),
         }
     }
 

@@ -6,7 +6,7 @@ const SIDE: usize = 8;
 /// Dither threshold in (0, 1) for a pixel, taken from Bayer's matrix ("An optimum method for two-level
 /// rendition of continuous-tone pictures", 1973). It depends only on the position, so static content does not
 /// flicker.
-pub(super) fn threshold(x: usize, y: usize) -> f32 {
+pub(super) fn bayer_threshold(x: usize, y: usize) -> f32 {
     let (x, y) = (x % SIDE, y % SIDE);
     let mixed = x ^ y;
     let rank = (0..3).fold(0, |rank, bit| {
@@ -19,7 +19,7 @@ pub(super) fn threshold(x: usize, y: usize) -> f32 {
 /// Dithers a color to six bits per channel.
 pub(crate) fn dithered_to_6_bits(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
     const LEVELS: u16 = 63;
-    let more = (threshold(x, y) * 255.0) as u16;
+    let more = (bayer_threshold(x, y) * 255.0) as u16;
     rgb.map(|channel| {
         let level = (u16::from(channel) * LEVELS + more) / 255;
         ((level * 255 + LEVELS / 2) / LEVELS) as u8
@@ -32,14 +32,15 @@ mod tests {
 
     #[test]
     fn bayer_ranks_are_a_permutation() {
-        let mut ranks: Vec<u32> = (0..64).map(|i| (threshold(i % 8, i / 8) * 64.0) as u32).collect();
+        let mut ranks: Vec<u32> = (0..64).map(|i| (bayer_threshold(i % 8, i / 8) * 64.0) as u32).collect();
         for corner in [(0, 0), (4, 0), (0, 4), (4, 4)] {
-            let below = (0..16).filter(|i| threshold(corner.0 + i % 4, corner.1 + i / 4) < 0.25).count();
+            let below =
+                (0..16).filter(|i| bayer_threshold(corner.0 + i % 4, corner.1 + i / 4) < 0.25).count();
             assert_eq!(below, 4);
         }
         ranks.sort_unstable();
         assert!(ranks.into_iter().eq(0..64));
-        assert_eq!(threshold(3, 5), threshold(11, 21));
+        assert_eq!(bayer_threshold(3, 5), bayer_threshold(11, 21));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 
-use super::bayer::threshold;
-use super::oklab::oklab;
+use super::bayer::bayer_threshold;
+use super::oklab::linear_to_oklab;
 use super::palette::{self, AnsiColors};
 use super::recipes::{DitherColor, PatternDither};
 use super::{ColorDepth, NAMES};
@@ -55,8 +55,9 @@ impl ColorMapper {
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
             ColorDepth::Indexed256 => {
-                let inks =
-                    (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(DitherColor::solid);
+                let inks = (palette::FIRST_FIXED..=u8::MAX)
+                    .filter_map(palette::fixed_palette_color)
+                    .map(DitherColor::solid);
                 shades.plain = RefCell::new(PatternDither::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
@@ -75,7 +76,7 @@ impl ColorMapper {
 
     /// Returns the terminal color to draw for an sRGB color at this pixel position.
     pub(crate) fn map_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
-        let index = || self.plain.borrow_mut().select_color_index(rgb, threshold(x, y));
+        let index = || self.plain.borrow_mut().select_color_index(rgb, bayer_threshold(x, y));
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
             ColorDepth::Indexed256 => Color::Indexed(palette::FIRST_FIXED.saturating_add(index() as u8)),
@@ -88,7 +89,7 @@ impl ColorMapper {
     pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> MappedCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
-            let labs = fitted.pair.map(|rgb| oklab(srgb8_to_linear(rgb)));
+            let labs = fitted.pair.map(|rgb| linear_to_oklab(srgb8_to_linear(rgb)));
             if labs[0].distance_squared(labs[1]) < EDGE {
                 return self.dithered_cell(mean_cell_color(first, second, fitted.tile), x, y);
             }
@@ -98,7 +99,7 @@ impl ColorMapper {
     }
 
     fn dithered_cell(&self, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
-        let index = self.mixed.borrow_mut().select_color_index(rgb, threshold(x, y));
+        let index = self.mixed.borrow_mut().select_color_index(rgb, bayer_threshold(x, y));
         let AnsiColorMix { level, colors } =
             self.pairs.get(index).copied().unwrap_or(AnsiColorMix { level: None, colors: [0; 2] });
         let [front, back] = colors.map(|color| NAMES[color]);

@@ -11,9 +11,9 @@ use ratatui::style::Color;
 
 pub(super) use self::bayer::dithered_to_6_bits;
 pub(super) use self::color_mapper::ColorMapper;
-pub(super) use self::oklab::oklab;
+pub(super) use self::oklab::linear_to_oklab;
 pub use self::palette::xterm_rgb;
-pub(super) use self::palette::{AnsiColors, XTERM, assumed_ansi_colors, fixed_color, nearest_256};
+pub(super) use self::palette::{AnsiColors, XTERM, assumed_ansi_colors, fixed_palette_color, nearest_256};
 pub(super) use self::palette_dither::PaletteDither;
 use super::terminals::TerminalBrand;
 use crate::choice;

@@ -22,7 +22,7 @@ fn multiply_matrix(rows: [Vec3; 3], v: Vec3) -> Vec3 {
 }
 
 /// Converts a linear color to Oklab.
-pub(crate) fn oklab(linear: Vec3) -> Vec3 {
+pub(crate) fn linear_to_oklab(linear: Vec3) -> Vec3 {
     let cones = multiply_matrix(CONES, linear.max(Vec3::ZERO));
     multiply_matrix(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
@@ -54,16 +54,16 @@ mod tests {
 
     #[test]
     fn white_has_lightness_one_and_no_hue() {
-        assert!(oklab(Vec3::ONE).distance(Vec3::new(1.0, 0.0, 0.0)) < 1e-3);
+        assert!(linear_to_oklab(Vec3::ONE).distance(Vec3::new(1.0, 0.0, 0.0)) < 1e-3);
         // Lightness of red, from Ottosson's article.
-        assert!((oklab(Vec3::X).x - 0.628).abs() < 1e-3);
+        assert!((linear_to_oklab(Vec3::X).x - 0.628).abs() < 1e-3);
     }
 
     #[test]
     fn derivative_matches_finite_differences() {
         let color = Vec3::new(0.4, 0.2, 0.6);
         let step = Vec3::new(1e-3, -2e-3, 1e-3);
-        let change = oklab(color + step) - oklab(color);
+        let change = linear_to_oklab(color + step) - linear_to_oklab(color);
         assert!(OklabDerivative::at(color).apply(step).distance(change) < 0.1 * change.length());
     }
 }

@@ -59,7 +59,7 @@ pub(crate) fn assumed_ansi_colors(term: &str) -> &'static AnsiColors {
 }
 
 /// The sRGB value of a palette color. `None` for the first 16, which the user can change.
-pub(crate) fn fixed_color(index: u8) -> Option<[u8; 3]> {
+pub(crate) fn fixed_palette_color(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
         FIRST_FIXED..FIRST_GRAY => {
@@ -77,7 +77,7 @@ pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
         Color::Reset => return None,
         Color::Rgb(r, g, b) => return Some([r, g, b]),
         Color::Indexed(index) => {
-            return fixed_color(index).or_else(|| XTERM.get(usize::from(index)).copied());
+            return fixed_palette_color(index).or_else(|| XTERM.get(usize::from(index)).copied());
         }
         Color::Black => 0,
         Color::Red => 1,
@@ -149,23 +149,24 @@ mod tests {
         ] {
             assert_eq!(nearest_256(rgb), index, "{rgb:?}");
             assert!(
-                fixed_color(index)
+                fixed_palette_color(index)
                     .is_some_and(|fixed_color| redmean_distance_squared(fixed_color, rgb) <= 36),
                 "{rgb:?}"
             );
         }
-        assert_eq!(fixed_color(15), None);
+        assert_eq!(fixed_palette_color(15), None);
         let shown = [Color::Indexed(9), Color::LightRed, Color::Indexed(67), Color::Reset].map(xterm_rgb);
         assert_eq!(shown, [Some([255, 0, 0]), Some([255, 0, 0]), Some([95, 135, 175]), None]);
     }
 
     #[test]
     fn nearest_palette_color_is_close_to_optimal() {
-        let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed_color).collect();
+        let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed_palette_color).collect();
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {
             let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
-            let got = redmean_distance_squared(rgb, fixed_color(nearest_256(rgb)).expect("a fixed color"));
+            let got =
+                redmean_distance_squared(rgb, fixed_palette_color(nearest_256(rgb)).expect("a fixed color"));
             let best =
                 palette.iter().map(|&other| redmean_distance_squared(rgb, other)).min().expect("240 colors");
             assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");

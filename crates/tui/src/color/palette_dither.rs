@@ -1,6 +1,6 @@
 //! Dithering with an arbitrary palette.
 
-use super::bayer::threshold;
+use super::bayer::bayer_threshold;
 use super::recipes::{DitherColor, PatternDither};
 
 /// How strongly dithering favors palette colors close to the target color. Applies to palettes computed from
@@ -19,6 +19,6 @@ impl PaletteDither {
 
     /// Returns the index of the palette color to use for `rgb` at this pixel.
     pub(crate) fn index_at(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
-        self.0.select_color_index(rgb, threshold(x, y))
+        self.0.select_color_index(rgb, bayer_threshold(x, y))
     }
 }

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use super::oklab::{OklabDerivative, oklab};
+use super::oklab::{OklabDerivative, linear_to_oklab};
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
@@ -31,7 +31,7 @@ impl DitherColor {
     /// Creates an ink with a solid color.
     pub(super) fn solid(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
-        Self { linear, lab: oklab(linear), texture: 0.0 }
+        Self { linear, lab: linear_to_oklab(linear), texture: 0.0 }
     }
 
     /// Creates an ink from a fine pattern of `front` over `back`. `share` is the fraction of the area covered
@@ -41,7 +41,7 @@ impl DitherColor {
         /// cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
-        let lab = oklab(linear);
+        let lab = linear_to_oklab(linear);
         let texture =
             share * front.lab.distance_squared(lab) + (1.0 - share) * back.lab.distance_squared(lab);
         Self { linear, lab, texture: texture * FINENESS }
@@ -85,7 +85,7 @@ impl PatternDither {
 
     fn compute_pattern(&self, rgb: [u8; 3]) -> [u16; PARTS] {
         let linear = srgb8_to_linear(rgb);
-        let lab = oklab(linear);
+        let lab = linear_to_oklab(linear);
         let slope = OklabDerivative::at(linear);
         let mut near: Vec<(f32, usize)> = self
             .inks
@@ -122,17 +122,20 @@ mod tests {
     use crate::color::palette;
 
     fn cube() -> PatternDither {
-        PatternDither::new((16..=255).filter_map(palette::fixed_color).map(DitherColor::solid).collect(), 0.1)
+        PatternDither::new(
+            (16..=255).filter_map(palette::fixed_palette_color).map(DitherColor::solid).collect(),
+            0.1,
+        )
     }
 
     #[test]
     fn ink_colors_are_not_dithered() {
         let mut mixer = cube();
         for index in [0, 5, 100, 215, 230] {
-            let rgb = palette::fixed_color(16 + index).expect("a fixed color");
+            let rgb = palette::fixed_palette_color(16 + index).expect("a fixed color");
             for part in 0..PARTS {
                 let ink = mixer.select_color_index(rgb, (part as f32 + 0.5) / PARTS as f32);
-                assert_eq!(palette::fixed_color(16 + ink as u8), Some(rgb));
+                assert_eq!(palette::fixed_palette_color(16 + ink as u8), Some(rgb));
             }
         }
     }
@@ -145,7 +148,7 @@ mod tests {
                 .map(|part| mixer.select_color_index(rgb, (part as f32 + 0.5) / PARTS as f32))
                 .collect();
             let mean = parts.iter().map(|ink| mixer.inks[*ink].linear).sum::<Vec3>() / PARTS as f32;
-            let off = oklab(mean).distance(oklab(srgb8_to_linear(rgb)));
+            let off = linear_to_oklab(mean).distance(linear_to_oklab(srgb8_to_linear(rgb)));
             assert!(off < 0.02, "{rgb:?}: {off}");
         }
     }
@@ -153,7 +156,7 @@ mod tests {
     #[test]
     fn recipe_inks_are_similar() {
         let mut mixer = cube();
-        let lab = oklab(srgb8_to_linear([150, 75, 50]));
+        let lab = linear_to_oklab(srgb8_to_linear([150, 75, 50]));
         for part in 0..PARTS {
             let ink = mixer.select_color_index([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
             assert!(mixer.inks[ink].lab.distance(lab) < 0.15);

@@ -67,7 +67,7 @@ struct SentSlice {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ReplyState {
+enum ReplySupport {
     /// It is not yet known whether the terminal replies.
     Asked {
         until: Instant,
@@ -79,7 +79,7 @@ enum ReplyState {
 /// The connection to the terminal.
 #[derive(Debug)]
 pub(super) struct TerminalConnection {
-    replies: ReplyState,
+    replies: ReplySupport,
     is_multiplexed: bool,
     flight: VecDeque<SentSlice>,
     in_flight: usize,
@@ -103,7 +103,7 @@ impl TerminalConnection {
     /// of the terminal.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
         Self {
-            replies: ReplyState::Asked { until: now + REPLY_TIMEOUT },
+            replies: ReplySupport::Asked { until: now + REPLY_TIMEOUT },
             is_multiplexed,
             flight: VecDeque::new(),
             in_flight: 0,
@@ -123,11 +123,11 @@ impl TerminalConnection {
         let window = self.window_bytes().saturating_sub(self.in_flight);
         let tokens = self.bucket.tokens(now);
         let room = match self.replies {
-            ReplyState::Answering if !self.is_multiplexed => window,
-            ReplyState::Answering => window.min(tokens),
-            ReplyState::Asked { .. } => (MAX_WINDOW - self.in_flight.min(MAX_WINDOW)).min(tokens),
-            ReplyState::Silent if self.unwritten > 0 => 0,
-            ReplyState::Silent => tokens,
+            ReplySupport::Answering if !self.is_multiplexed => window,
+            ReplySupport::Answering => window.min(tokens),
+            ReplySupport::Asked { .. } => (MAX_WINDOW - self.in_flight.min(MAX_WINDOW)).min(tokens),
+            ReplySupport::Silent if self.unwritten > 0 => 0,
+            ReplySupport::Silent => tokens,
         };
         // Split the window into several slices so that the connection stays busy while replies are in flight.
         let slice = (self.window_bytes() / 3).clamp(MIN_SLICE, MAX_SLICE);
@@ -137,7 +137,7 @@ impl TerminalConnection {
 
     /// The query to append to the next slice.
     pub(super) fn next_query(&self) -> Option<QueryKind> {
-        (self.replies != ReplyState::Silent).then_some(QueryKind::Status)
+        (self.replies != ReplySupport::Silent).then_some(QueryKind::Status)
     }
 
     /// Records a sent slice. `bytes` includes its query.
@@ -161,7 +161,7 @@ impl TerminalConnection {
 
     /// Records a reply from the terminal.
     pub(super) fn handle_reply(&mut self, question: QueryKind, now: Instant) {
-        self.replies = ReplyState::Answering;
+        self.replies = ReplySupport::Answering;
         self.heard = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
         // Replies arrive in order, so replies to earlier slices have been lost.
@@ -183,14 +183,14 @@ impl TerminalConnection {
     pub(super) fn next_send_time(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
-            ReplyState::Answering => {
+            ReplySupport::Answering => {
                 let lost = (!self.flight.is_empty()).then_some(self.heard + self.lost_reply_timeout());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
-            ReplyState::Asked { until } if filled <= now => Some(until),
-            ReplyState::Asked { until } => Some(filled.min(until)),
-            ReplyState::Silent => (self.unwritten == 0).then_some(filled),
+            ReplySupport::Asked { until } if filled <= now => Some(until),
+            ReplySupport::Asked { until } => Some(filled.min(until)),
+            ReplySupport::Silent => (self.unwritten == 0).then_some(filled),
         }
     }
 
@@ -201,7 +201,7 @@ impl TerminalConnection {
 
     /// Round-trip time excluding queueing. `None` if the terminal does not reply.
     pub(super) fn round_trip(&self) -> Option<Duration> {
-        self.round_trips.minimum().filter(|_| self.replies == ReplyState::Answering)
+        self.round_trips.minimum().filter(|_| self.replies == ReplySupport::Answering)
     }
 
     /// Estimated bandwidth in bytes per second. `None` if unknown or too high to matter.
@@ -213,9 +213,9 @@ impl TerminalConnection {
             Some(self.window / round_trip.max(1e-6))
         };
         let rate = match self.replies {
-            ReplyState::Answering if !self.is_multiplexed => window_rate(),
-            ReplyState::Answering | ReplyState::Silent => Some(bucket::RATE),
-            ReplyState::Asked { .. } => None,
+            ReplySupport::Answering if !self.is_multiplexed => window_rate(),
+            ReplySupport::Answering | ReplySupport::Silent => Some(bucket::RATE),
+            ReplySupport::Asked { .. } => None,
         };
         rate.filter(|rate| *rate < FAST)
     }
@@ -224,7 +224,7 @@ impl TerminalConnection {
     /// the last slices within [`FAST_REPLY`].
     pub(super) fn is_fast(&self) -> bool {
         let quick = self.recent.iter().filter(|round_trip| **round_trip <= FAST_REPLY).count();
-        self.replies == ReplyState::Answering && !self.is_multiplexed && 2 * quick > self.recent.len()
+        self.replies == ReplySupport::Answering && !self.is_multiplexed && 2 * quick > self.recent.len()
     }
 
     fn record_round_trip(&mut self, round_trip: Duration) {
@@ -240,16 +240,18 @@ impl TerminalConnection {
 
     fn check_timeouts(&mut self, now: Instant) {
         match self.replies {
-            ReplyState::Asked { until } if now >= until => {
-                self.replies = ReplyState::Silent;
+            ReplySupport::Asked { until } if now >= until => {
+                self.replies = ReplySupport::Silent;
                 self.clear_in_flight();
             }
-            ReplyState::Answering if self.awaits_reply() && now >= self.heard + self.lost_reply_timeout() => {
+            ReplySupport::Answering
+                if self.awaits_reply() && now >= self.heard + self.lost_reply_timeout() =>
+            {
                 // The connection is stalled or a reply was lost. Send little until the next reply.
                 self.clear_in_flight();
                 self.window = MIN_WINDOW;
             }
-            ReplyState::Asked { .. } | ReplyState::Answering | ReplyState::Silent => {}
+            ReplySupport::Asked { .. } | ReplySupport::Answering | ReplySupport::Silent => {}
         }
     }
 

@@ -126,9 +126,9 @@ fn output_is_paced_by_time_without_replies() {
 fn late_replies_are_accepted() {
     let mut terminal = SimulatedTerminal::new(125e3, 1500, true, false);
     terminal.run(1200);
-    assert_eq!(terminal.connection.replies, ReplyState::Silent);
+    assert_eq!(terminal.connection.replies, ReplySupport::Silent);
     terminal.run(2000);
-    assert_eq!(terminal.connection.replies, ReplyState::Answering);
+    assert_eq!(terminal.connection.replies, ReplySupport::Answering);
 }
 
 #[test]

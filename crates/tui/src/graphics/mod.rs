@@ -35,14 +35,14 @@ pub(super) enum ImageProtocol {
 
 /// An image and the cells it covers.
 #[derive(Clone, Debug)]
-pub(super) struct ImagePlacement {
+pub(super) struct TerminalImage {
     pub(super) picture: Arc<Srgb8Image>,
     pub(super) cells: Rect,
     /// Width and height of a cell in pixels.
     pub(super) cell: (u16, u16),
 }
 
-impl PartialEq for ImagePlacement {
+impl PartialEq for TerminalImage {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.picture, &other.picture) && (self.cells, self.cell) == (other.cells, other.cell)
     }
@@ -62,9 +62,9 @@ pub(super) struct TerminalImages {
     protocol: ImageProtocol,
     /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
-    wanted: Option<ImagePlacement>,
+    wanted: Option<TerminalImage>,
     /// The image that is shown once all pieces have arrived.
-    shown: Option<ImagePlacement>,
+    shown: Option<TerminalImage>,
     is_still: bool,
     /// Whether the displayed image was downscaled to save bytes.
     is_coarse: bool,
@@ -96,7 +96,7 @@ impl TerminalImages {
 
     /// Sets the image to show. `is_still` marks a final image. Returns cells that no image covers any more,
     /// which must be redrawn.
-    pub(super) fn set_target(&mut self, wanted: Option<ImagePlacement>, is_still: bool) -> Option<Rect> {
+    pub(super) fn set_target(&mut self, wanted: Option<TerminalImage>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
         if self.wanted.as_ref().is_some_and(|wanted| wanted.cells == shown) {
@@ -125,7 +125,7 @@ impl TerminalImages {
     /// everything has been sent. `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
-            self.encode(rate);
+            self.queue_encoded_image(rate);
         }
         let mut slice = self.pieces.pop_front()?;
         while let Some(piece) = self.pieces.pop_front_if(|piece| slice.len() + piece.len() <= most) {
@@ -134,7 +134,7 @@ impl TerminalImages {
         Some(slice)
     }
 
-    fn encode(&mut self, rate: Option<f64>) {
+    fn queue_encoded_image(&mut self, rate: Option<f64>) {
         let Some(wanted) = self.wanted.clone() else { return };
         let seconds = if self.is_still { STILL_SECONDS } else { MOVING_SECONDS };
         let most = rate.map_or(MAX_BYTES, |rate| (rate * seconds).min(MAX_BYTES));

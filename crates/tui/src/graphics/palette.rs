@@ -30,7 +30,7 @@ impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
     pub(super) fn for_picture(picture: &Srgb8Image, before: Option<Self>) -> Self {
         let mut bins = histogram(picture);
-        let colors = split_into_boxes(&mut bins);
+        let colors = choose_palette_colors(&mut bins);
         let fits = |palette: &Self| {
             palette_error(&bins, &palette.colors) <= WORSE * palette_error(&bins, &colors) + ALLOWED
         };
@@ -108,7 +108,7 @@ impl ColorBox {
 
 /// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
 /// mean color of each box.
-fn split_into_boxes(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
+fn choose_palette_colors(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
     while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));

@@ -40,7 +40,7 @@ impl TestImageTerminal {
     }
 
     /// Number of images shown so far.
-    pub fn displayed_image_count(&self) -> usize {
+    pub fn total_displayed_images(&self) -> usize {
         self.count
     }
 

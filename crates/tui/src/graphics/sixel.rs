@@ -46,7 +46,7 @@ pub(super) fn encode(
             let row = &registers[middle(y, height, picture.height) * picture.width as usize..];
             band.set_row(y - top, columns.iter().map(|x| row[*x]));
         }
-        band.push_sixels(&mut bytes);
+        band.drain_to_sixels(&mut bytes);
     }
     bytes.extend_from_slice(b"\x1b\\");
     bytes
@@ -75,7 +75,7 @@ impl SixelBand {
 
     /// Appends each color's sixels followed by a carriage return, then appends a line feed and clears the
     /// band.
-    fn push_sixels(&mut self, bytes: &mut Vec<u8>) {
+    fn drain_to_sixels(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
             let own = &mut self.sixels[register * self.width..][..self.width];

@@ -7,7 +7,7 @@ use crate::terminals::TerminalId;
 
 /// A device control string (DCS) being received.
 #[derive(Debug, Default)]
-pub(super) struct ControlString {
+pub(super) struct DeviceControlString {
     kind: ControlStringKind,
     text: Vec<u8>,
 }
@@ -25,7 +25,7 @@ enum ControlStringKind {
 /// Maximum number of bytes stored. Useful control strings are shorter.
 const LONGEST: usize = 256;
 
-impl ControlString {
+impl DeviceControlString {
     /// Starts a control string with these parameters.
     pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
         let kind = match (intermediates, action) {
@@ -123,6 +123,6 @@ mod tests {
         assert!(has_true_color(b"524742=38"));
         assert!(has_true_color(b"5463"));
         assert!(!has_true_color(b"544e=787465726d"));
-        assert_eq!(ControlString::begin(b"+", 0, 'r').parse_reply(), TerminalReply::Other);
+        assert_eq!(DeviceControlString::begin(b"+", 0, 'r').parse_reply(), TerminalReply::Other);
     }
 }

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
-use super::control_strings::{self, ControlString};
+use super::control_strings::{self, DeviceControlString};
 use super::decoded::DecodedInput;
 use crate::event::{KeyPress, MouseEvent, MouseEventKind};
 use crate::graphics::ImageProtocol;
@@ -19,7 +19,7 @@ pub(super) struct InputPerformer {
     /// Whether a paste has started.
     pub is_paste: bool,
     next: NextCharacterMode,
-    report: ControlString,
+    report: DeviceControlString,
 }
 
 /// How to interpret the next input character.
@@ -185,7 +185,7 @@ impl Perform for InputPerformer {
 
     fn hook(&mut self, params: &Params, intermediates: &[u8], _ignore: bool, action: char) {
         let first = params.iter().next().and_then(|it| it.first().copied()).unwrap_or(0);
-        self.report = ControlString::begin(intermediates, first, action);
+        self.report = DeviceControlString::begin(intermediates, first, action);
     }
 
     fn put(&mut self, byte: u8) {

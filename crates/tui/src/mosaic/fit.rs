@@ -1,7 +1,7 @@
 //! Approximates a cell's pixels with two colors and a block character.
 
 use super::tile::{BlockPattern, CellDivision, CellGrid};
-use crate::color::oklab;
+use crate::color::linear_to_oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
@@ -36,7 +36,7 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
 /// The division of a cell that minimizes the variance within its two parts.
 fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
-    let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
+    let labs: Vec<Vec3> = pixels.iter().map(|pixel| linear_to_oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
     let (mut best, mut most) = (CellDivision { first: 1, tile: BlockPattern::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);

@@ -59,13 +59,13 @@ impl BlockPattern {
 
 /// Returns the tile that a character draws, and true if the foreground is its second part. `None` if it is
 /// not a block character.
-pub(crate) fn from_symbol(symbol: char) -> Option<(BlockPattern, bool)> {
+pub(crate) fn block_pattern_for_symbol(symbol: char) -> Option<(BlockPattern, bool)> {
     // Letters, digits and punctuation have smaller code points than block characters.
     if symbol < '▀' {
         return None;
     }
     let mask = TABLE.masks.get(&symbol)?;
-    from_mask(*mask)
+    block_pattern_for_mask(*mask)
 }
 
 /// The grid squares a character fills with the foreground color, as 12 rows of 2 columns. `None` if it is not
@@ -81,7 +81,7 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
 
 /// Returns the tile with this mask as its first part, or as its second part if the mask excludes the top left
 /// corner.
-fn from_mask(mask: u32) -> Option<(BlockPattern, bool)> {
+fn block_pattern_for_mask(mask: u32) -> Option<(BlockPattern, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
     let symbol = |mask| TABLE.symbols.get(&mask).copied();
@@ -90,13 +90,13 @@ fn from_mask(mask: u32) -> Option<(BlockPattern, bool)> {
 }
 
 /// Characters and the grid squares they fill.
-struct BlockPatternTable {
+struct BlockSymbolTable {
     masks: HashMap<char, u32>,
     symbols: HashMap<u32, char>,
 }
 
-static TABLE: LazyLock<BlockPatternTable> = LazyLock::new(|| {
-    let mut table = BlockPatternTable { masks: HashMap::new(), symbols: HashMap::new() };
+static TABLE: LazyLock<BlockSymbolTable> = LazyLock::new(|| {
+    let mut table = BlockSymbolTable { masks: HashMap::new(), symbols: HashMap::new() };
     let mut add = |symbol: char, mask: u32| {
         table.masks.entry(symbol).or_insert(mask);
         table.symbols.entry(mask).or_insert(symbol);
@@ -233,7 +233,7 @@ fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
         let half = 1_u32 << (2 * rows - 1);
         // Iterate in Gray code order. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
-            let of_tile = from_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
+            let of_tile = block_pattern_for_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
             let is_new =
                 |tile: &BlockPattern| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
@@ -258,8 +258,8 @@ mod tests {
             for CellDivision { first, tile } in divisions {
                 assert_eq!(tile.first, expand_rows(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
                 let [front, back] = tile.symbols();
-                assert_eq!(from_symbol(front), Some((*tile, false)), "{front}");
-                assert_eq!(from_symbol(back), Some((*tile, true)), "{back}");
+                assert_eq!(block_pattern_for_symbol(front), Some((*tile, false)), "{front}");
+                assert_eq!(block_pattern_for_symbol(back), Some((*tile, true)), "{back}");
                 assert!(seen.insert(front) && seen.insert(back));
             }
             assert_eq!(divisions.len(), count, "{grid:?}");
@@ -283,10 +283,10 @@ mod tests {
     #[test]
     fn shades_fill_one_two_or_three_quarters() {
         for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
-            let (tile, is_second) = from_symbol(symbol).expect("a tile");
+            let (tile, is_second) = block_pattern_for_symbol(symbol).expect("a tile");
             assert_eq!(tile.part_sizes()[usize::from(is_second)], share, "{symbol}");
         }
-        assert_eq!(from_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
-        assert_eq!(from_symbol('a'), None);
+        assert_eq!(block_pattern_for_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
+        assert_eq!(block_pattern_for_symbol('a'), None);
     }
 }

@@ -31,13 +31,13 @@ pub(super) fn cell_color_candidates(
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     CandidateColors {
-        first: candidate_colors(&column(0), model),
-        second: candidate_colors(&column(1), model),
-        both: candidate_colors(&both, model),
+        first: candidate_colors_for_run(&column(0), model),
+        second: candidate_colors_for_run(&column(1), model),
+        both: candidate_colors_for_run(&both, model),
     }
 }
 
-fn candidate_colors(
+fn candidate_colors_for_run(
     wanted: &(impl Iterator<Item = TerminalColor> + Clone),
     model: RateDistortion,
 ) -> Vec<TerminalColor> {

@@ -7,7 +7,7 @@ use unicode_width::UnicodeWidthStr;
 use super::pen::{Pen, PenRequirements};
 use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
-use crate::mosaic::{BlockPattern, PLACES, from_symbol};
+use crate::mosaic::{BlockPattern, PLACES, block_pattern_for_symbol};
 
 /// Content of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl TwoColorCell {
             "█" => return Some(Self::uniform(fg)),
             _ => {}
         }
-        let (tile, is_second) = from_symbol(symbol.chars().next()?)?;
+        let (tile, is_second) = block_pattern_for_symbol(symbol.chars().next()?)?;
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
@@ -82,7 +82,7 @@ pub(super) struct TextCell {
 
 impl TextCell {
     /// Whether the character is a single code point and one column wide.
-    pub(super) fn is_plain(&self) -> bool {
+    pub(super) fn is_single_narrow_char(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
     }
 }
@@ -117,7 +117,7 @@ impl CellFill {
     }
 
     /// The layers that fill the first and second parts.
-    pub(super) fn layers(self) -> [ColorLayer; 2] {
+    pub(super) fn part_layers(self) -> [ColorLayer; 2] {
         match self {
             Self::Blank => [ColorLayer::Background; 2],
             Self::First => [ColorLayer::Foreground, ColorLayer::Background],
@@ -129,7 +129,7 @@ impl CellFill {
     /// Returns the glyph's pen requirements. Colors that it does not show are unconstrained.
     pub(super) fn pen_requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
-            |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
+            |layer| self.part_layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
         let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
         PenRequirements {
             fg: color(ColorLayer::Foreground),
@@ -142,7 +142,7 @@ impl CellFill {
 
     /// Whether this glyph can show these colors.
     pub(super) fn can_show(self, pair: [TerminalColor; 2]) -> bool {
-        let [first, second] = self.layers();
+        let [first, second] = self.part_layers();
         pair[0].is_allowed_in(first)
             && pair[1].is_allowed_in(second)
             && (first != second || pair[0] == pair[1])

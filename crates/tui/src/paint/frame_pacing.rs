@@ -6,7 +6,7 @@ use super::fidelity::Fidelity;
 
 /// Inputs for deciding whether to draw a new preview.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameTiming {
+pub struct PacingInputs {
     /// Connection bandwidth. `None` if it is too fast to measure.
     pub bytes_per_second: Option<f64>,
     /// Number of cells in the preview.
@@ -60,7 +60,7 @@ const SHARE: f64 = 0.5;
 /// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
 /// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
 /// the last one.
-pub fn advise(moment: &FrameTiming) -> PacingAdvice {
+pub fn advise(moment: &PacingInputs) -> PacingAdvice {
     if moment.is_final {
         return PacingAdvice::Aim(Fidelity::Still);
     }
@@ -69,7 +69,7 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
         let is_due = moment.is_shown && moment.since_aim >= moment.min_interval();
         return if is_due { PacingAdvice::Aim(Fidelity::Following) } else { PacingAdvice::Wait };
     }
-    let frame = moment.frame_send_time();
+    let frame = moment.estimate_send_duration();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
     let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
     if is_too_late || is_too_soon {
@@ -86,7 +86,7 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
     if is_worth_it { PacingAdvice::Aim(Fidelity::Moving) } else { PacingAdvice::Wait }
 }
 
-impl FrameTiming {
+impl PacingInputs {
     /// Minimum time between previews on a fast terminal.
     fn min_interval(&self) -> Duration {
         if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
@@ -98,7 +98,7 @@ impl FrameTiming {
     }
 
     /// Returns the time needed to send an intermediate preview.
-    fn frame_send_time(&self) -> Duration {
+    fn estimate_send_duration(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {
             Duration::try_from_secs_f64(bytes / rate.max(1.0))
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     /// Timing one second after a preview with one sample per pixel was drawn.
-    const MOMENT: FrameTiming = FrameTiming {
+    const MOMENT: PacingInputs = PacingInputs {
         bytes_per_second: None,
         cells: 2500,
         samples: 1.5,
@@ -131,23 +131,24 @@ mod tests {
     #[test]
     fn first_and_last_previews_are_always_drawn() {
         for bytes_per_second in [None, Some(0.0), Some(100.0), Some(f64::NAN)] {
-            let slow = FrameTiming { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
+            let slow =
+                PacingInputs { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
-                advise(&FrameTiming { aimed_samples: None, ..slow }),
+                advise(&PacingInputs { aimed_samples: None, ..slow }),
                 PacingAdvice::Aim(Fidelity::First)
             );
-            assert_eq!(advise(&FrameTiming { is_final: true, ..slow }), PacingAdvice::Aim(Fidelity::Still));
+            assert_eq!(advise(&PacingInputs { is_final: true, ..slow }), PacingAdvice::Aim(Fidelity::Still));
         }
     }
 
     #[test]
     fn intermediate_previews_double_the_samples() {
         assert_eq!(advise(&MOMENT), PacingAdvice::Wait);
-        assert_eq!(advise(&FrameTiming { samples: 2.0, ..MOMENT }), MOVING);
-        let late = FrameTiming { since_aim: Duration::from_secs(3), ..MOMENT };
+        assert_eq!(advise(&PacingInputs { samples: 2.0, ..MOMENT }), MOVING);
+        let late = PacingInputs { since_aim: Duration::from_secs(3), ..MOMENT };
         assert_eq!(advise(&late), MOVING, "after a long time, any progress is drawn");
         assert_eq!(
-            advise(&FrameTiming { samples: 1.0, ..late }),
+            advise(&PacingInputs { samples: 1.0, ..late }),
             PacingAdvice::Wait,
             "an unchanged preview is not redrawn"
         );
@@ -156,55 +157,55 @@ mod tests {
     #[test]
     fn fast_terminals_get_5_to_10_previews_per_second() {
         let following = PacingAdvice::Aim(Fidelity::Following);
-        let quick = FrameTiming { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
+        let quick = PacingInputs { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
         assert_eq!(advise(&quick), following, "drawn regardless of the number of new samples");
         assert_eq!(
-            advise(&FrameTiming { samples: 0.5, ..quick }),
+            advise(&PacingInputs { samples: 0.5, ..quick }),
             following,
             "drawn even if the sample count is lower"
         );
         assert_eq!(
-            advise(&FrameTiming { since_aim: Duration::from_millis(99), ..quick }),
+            advise(&PacingInputs { since_aim: Duration::from_millis(99), ..quick }),
             PacingAdvice::Wait
         );
         assert_eq!(
-            advise(&FrameTiming { is_shown: false, ..quick }),
+            advise(&PacingInputs { is_shown: false, ..quick }),
             PacingAdvice::Wait,
             "not drawn before the previous preview has been shown"
         );
-        let in_pixels = FrameTiming { is_in_pixels: true, ..quick };
+        let in_pixels = PacingInputs { is_in_pixels: true, ..quick };
         assert_eq!(advise(&in_pixels), PacingAdvice::Wait);
-        assert_eq!(advise(&FrameTiming { since_aim: Duration::from_millis(200), ..in_pixels }), following);
+        assert_eq!(advise(&PacingInputs { since_aim: Duration::from_millis(200), ..in_pixels }), following);
     }
 
     #[test]
     fn first_pass_is_drawn_in_steps() {
-        let coarse = FrameTiming { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
+        let coarse = PacingInputs { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
         assert_eq!(advise(&coarse), PacingAdvice::Wait);
-        assert_eq!(advise(&FrameTiming { samples: 0.25, ..coarse }), MOVING);
-        assert_eq!(advise(&FrameTiming { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
+        assert_eq!(advise(&PacingInputs { samples: 0.25, ..coarse }), MOVING);
+        assert_eq!(advise(&PacingInputs { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
     }
 
     #[test]
     fn slow_connections_get_few_previews() {
         // 15 kB take a quarter of a second at 60 kB/s.
-        let thin = FrameTiming { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
+        let thin = PacingInputs { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
         assert_eq!(advise(&thin), MOVING);
         assert_eq!(
-            advise(&FrameTiming { since_aim: Duration::from_millis(400), ..thin }),
+            advise(&PacingInputs { since_aim: Duration::from_millis(400), ..thin }),
             PacingAdvice::Wait
         );
         assert_eq!(
-            advise(&FrameTiming { is_shown: false, ..thin }),
+            advise(&PacingInputs { is_shown: false, ..thin }),
             PacingAdvice::Wait,
             "the previous preview is still being sent"
         );
         assert_eq!(
-            advise(&FrameTiming { is_shown: false, samples: 4.0, ..thin }),
+            advise(&PacingInputs { is_shown: false, samples: 4.0, ..thin }),
             MOVING,
             "the previous preview is much worse"
         );
-        let ending = FrameTiming { final_in: Some(Duration::from_millis(200)), ..thin };
+        let ending = PacingInputs { final_in: Some(Duration::from_millis(200)), ..thin };
         assert_eq!(advise(&ending), PacingAdvice::Wait, "it would delay the final preview");
     }
 
@@ -215,7 +216,7 @@ mod tests {
             // 2.5 seconds, with a preview every 66 ms.
             for preview in 0..38_u32 {
                 let seconds = f64::from(preview) * 0.066;
-                let moment = FrameTiming {
+                let moment = PacingInputs {
                     bytes_per_second,
                     samples: seconds / 2.5 * 64.0,
                     aimed_samples: aimed,

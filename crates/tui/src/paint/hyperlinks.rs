@@ -18,13 +18,13 @@ pub struct Hyperlink {
 
 /// URLs linked on the screen, numbered from 1. Numbers never change.
 #[derive(Debug, Default)]
-pub(super) struct Hyperlinks {
+pub(super) struct UrlTable {
     addresses: Vec<String>,
 }
 
-impl Hyperlinks {
+impl UrlTable {
     /// Returns a URL's number, or 0 if the URL is invalid or there are too many URLs.
-    pub(super) fn url_number(&mut self, address: &str) -> u16 {
+    pub(super) fn assign_url_number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;
         }
@@ -60,12 +60,19 @@ mod tests {
 
     #[test]
     fn hyperlinks_keep_their_numbers() {
-        let mut links = Hyperlinks::default();
+        let mut links = UrlTable::default();
         assert_eq!(
-            [links.url_number("file:///a"), links.url_number("file:///b"), links.url_number("file:///a")],
+            [
+                links.assign_url_number("file:///a"),
+                links.assign_url_number("file:///b"),
+                links.assign_url_number("file:///a")
+            ],
             [1, 2, 1]
         );
-        assert_eq!([links.url_number("a b"), links.url_number("\x1b]"), links.url_number("ä")], [0; 3]);
+        assert_eq!(
+            [links.assign_url_number("a b"), links.assign_url_number("\x1b]"), links.assign_url_number("ä")],
+            [0; 3]
+        );
         let mut out = Vec::new();
         links.push_link_start(2, &mut out);
         links.push_link_start(0, &mut out);

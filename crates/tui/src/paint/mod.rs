@@ -36,8 +36,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::fidelity::Fidelity;
-pub use self::frame_pacing::{FrameTiming, PacingAdvice, advise};
-use self::hyperlinks::Hyperlinks;
+pub use self::frame_pacing::{PacingAdvice, PacingInputs, advise};
+use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::as_text_lines;
 use self::picture::ByteBudget;
@@ -57,7 +57,7 @@ pub struct Painter {
     screen: Option<ScreenModel>,
     memory: StableCells,
     wanted: TargetScreen,
-    links: Hyperlinks,
+    links: UrlTable,
     budget: ByteBudget,
     /// Remaining drawing steps, in order.
     parts: vec::IntoIter<DrawStep>,
@@ -107,7 +107,7 @@ impl Painter {
             screen: None,
             memory: StableCells::default(),
             wanted: TargetScreen::empty(depth),
-            links: Hyperlinks::default(),
+            links: UrlTable::default(),
             budget: ByteBudget::default(),
             parts: Vec::new().into_iter(),
             part: None,
@@ -143,7 +143,7 @@ impl Painter {
         let mut wanted =
             TargetScreen::new(wanted, picture, fidelity, self.depth).with_delayed_text(extras.later);
         for Hyperlink { cells, address } in &extras.links {
-            wanted.link_cells(*cells, self.links.url_number(address));
+            wanted.link_cells(*cells, self.links.assign_url_number(address));
         }
         let size = (wanted.columns, wanted.rows);
         if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
@@ -153,7 +153,7 @@ impl Painter {
             self.rows = vec![RowProgress::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
-            row.is_done = row.is_done && self.wanted.row_satisfies(&wanted, y);
+            row.is_done = row.is_done && self.wanted.row_also_satisfies(&wanted, y);
             if fidelity == Fidelity::First && !row.is_done {
                 row.aim = 0;
             }
@@ -198,7 +198,7 @@ impl Painter {
         });
         loop {
             while let Some(stroke) = self.strokes.as_slice().first() {
-                if !screen.draw(stroke, &self.links, &mut slice) {
+                if !screen.draw_if_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
                 if let (Some(DrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {

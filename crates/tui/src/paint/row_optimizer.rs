@@ -242,7 +242,7 @@ impl ColorChanges {
             return;
         }
         let (fg_errors, bg_errors) = (self.errors(path.fg), self.errors(path.bg));
-        let pen = PenErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
+        let pen = PenWithErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
         for glyph in CellFill::ALL {
             ends.try_glyph(pen, 0, glyph);
         }
@@ -272,7 +272,7 @@ impl ColorChanges {
                     if fg.shade.is_allowed_in(ColorLayer::Foreground)
                         && bg.shade.is_allowed_in(ColorLayer::Background)
                     {
-                        ends.try_glyph(PenErrors::from_changes(fg, bg), bytes, glyph);
+                        ends.try_glyph(PenWithErrors::from_changes(fg, bg), bytes, glyph);
                     }
                 }
             }
@@ -309,7 +309,7 @@ impl<'a> PlanExtension<'a> {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
-    fn try_glyph(&mut self, ends: PenErrors, sgr: u32, glyph: CellFill) {
+    fn try_glyph(&mut self, ends: PenWithErrors, sgr: u32, glyph: CellFill) {
         // Inverting the medium shade yields a different pattern but the same character.
         if glyph == CellFill::Second && self.tile == BlockPattern::MEDIUM {
             return;
@@ -317,7 +317,7 @@ impl<'a> PlanExtension<'a> {
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
         let cost = bytes as f32 * self.byte + self.error + ends.error(glyph);
         if cost < self.bound {
-            let PenErrors { fg, bg, .. } = ends;
+            let PenWithErrors { fg, bg, .. } = ends;
             let parent = self.parent;
             let (pen, gap, glyph) = (pen_key(fg, bg), CursorGap::Cells(0), Some(glyph));
             self.beam.add(PartialRowPlan { fg, bg, pen, gap, bytes, cost, parent, glyph });
@@ -328,14 +328,14 @@ impl<'a> PlanExtension<'a> {
 
 /// A pen and the errors of its colors in both parts of a cell.
 #[derive(Clone, Copy)]
-struct PenErrors {
+struct PenWithErrors {
     fg: TerminalColor,
     fg_errors: [f32; 2],
     bg: TerminalColor,
     bg_errors: [f32; 2],
 }
 
-impl PenErrors {
+impl PenWithErrors {
     fn from_changes(fg: &ColorChange, bg: &ColorChange) -> Self {
         Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
     }
@@ -349,7 +349,7 @@ impl PenErrors {
     }
 
     fn error(&self, glyph: CellFill) -> f32 {
-        let of = |part: usize| match glyph.layers()[part] {
+        let of = |part: usize| match glyph.part_layers()[part] {
             ColorLayer::Foreground => self.fg_errors[part],
             ColorLayer::Background => self.bg_errors[part],
         };
@@ -366,7 +366,7 @@ fn trace_back(paths: &[Vec<PartialRowPlan>], wanted: &[Option<TwoColorCell>]) ->
     for (column, paths) in paths.iter().enumerate().skip(1).rev() {
         let Some(path) = paths.get(index) else { break };
         if let (Some(glyph), Some(mosaic)) = (path.glyph, wanted[column - 1]) {
-            let pair = glyph.layers().map(|layer| match layer {
+            let pair = glyph.part_layers().map(|layer| match layer {
                 ColorLayer::Foreground => path.fg,
                 ColorLayer::Background => path.bg,
             });
@@ -383,7 +383,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mosaic::from_symbol;
+    use crate::mosaic::block_pattern_for_symbol;
 
     const BLACK: TerminalColor = TerminalColor::Rgb([0, 0, 0]);
     const RED: TerminalColor = TerminalColor::Rgb([200, 0, 0]);
@@ -457,7 +457,7 @@ mod tests {
         let tile = prop_oneof![
             3 => Just(BlockPattern::HALVES),
             1 => proptest::sample::select(vec!['▌', '▚', '░', '▒', '🬟', '\u{1CD10}'])
-                .prop_map(|symbol| from_symbol(symbol).expect("a tile").0),
+                .prop_map(|symbol| block_pattern_for_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
             // Normalize like a tile read from a character: the first part is the foreground.

@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 
 use super::cell::{CellContent, CellFill, TextCell, TwoColorCell};
 use super::cursor_moves::{self, CellPosition};
-use super::hyperlinks::{Hyperlinks, LINK_OFF};
+use super::hyperlinks::{LINK_OFF, UrlTable};
 use super::pen::Pen;
 use super::terminal_color::TerminalColor;
 
@@ -91,7 +91,7 @@ impl ScreenModel {
     }
 
     /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
-    pub(super) fn push_clear(links: &Hyperlinks, slice: &mut OutputSlice) {
+    pub(super) fn push_clear(links: &UrlTable, slice: &mut OutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
         }
@@ -124,7 +124,12 @@ impl ScreenModel {
     }
 
     /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
-    pub(super) fn draw(&mut self, stroke: &Stroke, links: &Hyperlinks, slice: &mut OutputSlice) -> bool {
+    pub(super) fn draw_if_fits(
+        &mut self,
+        stroke: &Stroke,
+        links: &UrlTable,
+        slice: &mut OutputSlice,
+    ) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
         self.push_stroke(stroke, links, &mut slice.bytes);
         if start > 0 && slice.bytes.len() > slice.most {
@@ -136,7 +141,7 @@ impl ScreenModel {
         true
     }
 
-    fn push_stroke(&mut self, stroke: &Stroke, links: &Hyperlinks, bytes: &mut Vec<u8>) {
+    fn push_stroke(&mut self, stroke: &Stroke, links: &UrlTable, bytes: &mut Vec<u8>) {
         let (at, requirements) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
             Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.pen_requirements(mosaic.pair)),
@@ -172,7 +177,7 @@ impl ScreenModel {
             Stroke::Text { at, text } => {
                 self.store_cell(*at, CellContent::Text(text.clone()), text.columns);
                 // Terminals disagree about the width of other characters.
-                self.cursor = if text.is_plain() { self.position_after(*at, 1) } else { None };
+                self.cursor = if text.is_single_narrow_char() { self.position_after(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
                 for x in at.x..at.x + count {

@@ -53,7 +53,7 @@ impl StableCells {
             };
         }
         match wanted.fidelity {
-            Fidelity::First => self.begin_request(wanted),
+            Fidelity::First => self.compare_first_previews(wanted),
             Fidelity::Moving => self.noise = noise_threshold(self.median_difference(wanted, screen)),
             Fidelity::Following => match self.median_difference(wanted, screen) {
                 // There is hardly any noise left to hide, so redraw everything.
@@ -65,7 +65,7 @@ impl StableCells {
     }
 
     /// Compares a new request's first preview with the previous request's.
-    fn begin_request(&mut self, wanted: &TargetScreen) {
+    fn compare_first_previews(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
         self.newest = places.map(|(x, y)| wanted.preview_cell(x, y)).collect();
         self.noise = u8::MAX;

@@ -59,7 +59,7 @@ impl TargetScreen {
     }
 
     /// Whether a row drawn for this target would also satisfy `other`.
-    pub(super) fn row_satisfies(&self, other: &Self, y: u16) -> bool {
+    pub(super) fn row_also_satisfies(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
                 && other.fidelity == Fidelity::Moving);

@@ -2,7 +2,7 @@
 
 use ratatui::style::Color;
 
-use crate::color::fixed_color;
+use crate::color::fixed_palette_color;
 
 /// A terminal color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ impl TerminalColor {
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),
-            Self::Palette(index) => fixed_color(index),
+            Self::Palette(index) => fixed_palette_color(index),
             Self::DefaultBackground | Self::DefaultForeground => None,
         }
     }

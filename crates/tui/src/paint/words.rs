@@ -53,7 +53,7 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
     for x in first..to.x {
         let at = CellPosition { x, ..to };
         match screen.content(at) {
-            CellContent::Text(other) if other.pen == text.pen && other.is_plain() => {
+            CellContent::Text(other) if other.pen == text.pen && other.is_single_narrow_char() => {
                 bytes += other.symbol.len();
                 between.push(Stroke::Text { at, text: other.clone() });
             }

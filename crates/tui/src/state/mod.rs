@@ -15,7 +15,7 @@ pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, Pane, ViewList};
 pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStep, ImageProvenance, KeyOverrides, RequestState, format_stops};
-pub(super) use self::saving::{PendingChange, SavingState, SceneImageProgress, WrittenFile};
+pub(super) use self::saving::{SavingState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
 pub(super) use self::work::{AssetProgressBar, RenderState, WorkState, WorkerActivity};
 use super::color::{AnsiColors, ColorDepth};
@@ -105,7 +105,7 @@ impl State {
     }
 
     /// Returns a valid scene's diagnostics, plus the reason if its image could not be written.
-    pub(super) fn reported_diagnostics(&self) -> Vec<Diagnostic> {
+    pub(super) fn warnings_and_write_failure(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();
         let failed = failed.filter(|failed| self.saving.unwritten.is_some() && !failed.is_refused);

@@ -11,7 +11,7 @@ use crate::pipeline::protocol::{NormalizedRect, PreviewSize, Viewpoint};
 use crate::pipeline::settings::{AdjustableSettings, CameraChange, EffectiveSettings, Overrides, ViewMode};
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{is_mesh, list_changes};
+use crate::scene::{has_mesh_extension, list_changes};
 
 /// Settings changed with keys. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -220,7 +220,7 @@ impl RequestState {
     /// Records the newest request's input files. Includes a model but not a scene file, whose text is
     /// compared separately.
     pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
-        let is_model = is_mesh(&self.scene);
+        let is_model = has_mesh_extension(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
 
@@ -228,14 +228,14 @@ impl RequestState {
     pub(crate) fn image_provenance(&self, is_unfinished: bool) -> ImageProvenance {
         ImageProvenance {
             toggles: self.sent_toggles,
-            text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
+            text: self.text.clone().filter(|_| !has_mesh_extension(&self.scene)),
             files: self.files.clone(),
             is_unfinished,
         }
     }
 
     /// Overrides from the command line combined with changes made with keys.
-    pub(crate) fn overrides(&self) -> Overrides {
+    pub(crate) fn combined_overrides(&self) -> Overrides {
         let mut overrides = self.command_line.clone();
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
         overrides.integrator = self.toggles.integrator.or(overrides.integrator);
@@ -248,7 +248,7 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
-    pub(crate) fn command_line_overrides(&self) -> Option<Box<Overrides>> {
+    pub(crate) fn overrides_for_scene_image(&self) -> Option<Box<Overrides>> {
         (!self.has_no_key_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 

@@ -12,7 +12,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 
 /// A saved change that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct PendingChange {
+pub(crate) struct UndisplayedChange {
     pub generation: u64,
     pub noticed: Instant,
 }
@@ -53,7 +53,11 @@ impl WrittenFile {
     /// Describes how another program changed the file and how to write the image anyway.
     pub(crate) fn describe_external_change(&self) -> Option<String> {
         let describe = |lost: ExternalChange| {
-            if lost.is_kept() { messages::output_not_overwritten } else { messages::output_changed }
+            if lost.is_kept() {
+                messages::output_not_overwritten
+            } else {
+                messages::output_modified_externally
+            }
         };
         self.lost.map(|lost| describe(lost)(&self.name(), lost.describe()))
     }
@@ -76,7 +80,7 @@ pub(crate) struct SavingState {
     /// Whether the scene's files are complete, meaning that no program is writing them.
     pub is_settled: bool,
     /// The last save. `None` once its first changed cell is on the screen.
-    pub change: Option<PendingChange>,
+    pub change: Option<UndisplayedChange>,
     /// Time when the editor last exited.
     pub editor_closed: Option<Instant>,
     /// Time from the last save to the first changed cell on the screen, excluding time spent in the editor.

@@ -135,7 +135,7 @@ impl WorkState {
 
     /// Like [`WorkState::running_time`], but includes the time that earlier requests spent on the same
     /// samples.
-    pub(crate) fn rendering_time(&self, now: Instant) -> Option<Duration> {
+    pub(crate) fn total_rendering_time(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();
         self.running_time(now).map(|time| time.saturating_add(earlier))

@@ -196,7 +196,10 @@ fn command_line_exposure_is_not_a_change() {
     ui.press_character('[');
     show(&mut ui);
     ui.press_character(']');
-    assert_eq!((ui.state.request.toggles.exposure, ui.state.request.overrides().exposure), (None, Some(1.0)));
+    assert_eq!(
+        (ui.state.request.toggles.exposure, ui.state.request.combined_overrides().exposure),
+        (None, Some(1.0))
+    );
 }
 
 #[test]

@@ -466,7 +466,7 @@ fn reverted_toggle_is_not_a_change() {
         ui.finish_render(RED);
         let mut requests = Vec::new();
         for key in keys.chars() {
-            assert_eq!(ui.state.request.overrides() == base, requests.is_empty(), "{keys}");
+            assert_eq!(ui.state.request.combined_overrides() == base, requests.is_empty(), "{keys}");
             requests.extend(find_render_request(&ui.press_character(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");

@@ -298,7 +298,7 @@ fn older_render_is_shown_until_the_next_render() {
     ui.advance_clock(61_000);
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 61 s ago", messages::render_position(1, 2))),
+        ui.screen_text().contains(&format!("{}, 61 s ago", messages::render_number_label(1, 2))),
         "{}",
         ui.screen_text()
     );
@@ -427,7 +427,9 @@ fn header_marks_an_older_render() {
     ui.finish_render(BLUE);
     ui.press_character('b');
     let first = |ui: &mut TestUi| ui.screen_text().lines().next().map(str::to_owned).unwrap_or_default();
-    assert!(first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_position(1, 2)));
+    assert!(
+        first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_number_label(1, 2))
+    );
     // A key that has no effect clears the message.
     ui.press_character('y');
     let text = ui.screen_text();
@@ -532,13 +534,13 @@ fn exposure_changes_add_no_history_entry() {
     }
     assert_eq!(ui.state.work.renders, 2, "exposure changes should not be counted");
     ui.press_character('n');
-    assert!(ui.screen_text().contains(&messages::render_position(1, 2)), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::render_number_label(1, 2)), "{}", ui.screen_text());
     ui.press_character('N');
     // Toggling a setting adds an entry.
     ui.press_character('s');
     ui.finish_render(BLUE);
     ui.press_character('n');
-    assert!(ui.screen_text().contains(&messages::render_position(2, 3)), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::render_number_label(2, 3)), "{}", ui.screen_text());
 }
 
 #[test]
@@ -553,7 +555,7 @@ fn older_render_is_shown_with_its_changes() {
     }
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3)))
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_label(2, 3)))
             && ui.screen_text().contains(&format!("\nr 1 → 2 · {}", messages::HISTORY_KEYS.join(" · "))),
         "{}",
         ui.screen_text()

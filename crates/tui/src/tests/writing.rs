@@ -158,7 +158,8 @@ fn w_is_offered_only_if_it_replaces_the_file() {
         ui.worker_event(written_event(1, "cornell.png", true));
         ui.finish_render(RED);
         ui.handle_event(Event::Output(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
-        let words = if is_kept { messages::output_not_overwritten } else { messages::output_changed };
+        let words =
+            if is_kept { messages::output_not_overwritten } else { messages::output_modified_externally };
         assert_shows(&mut ui, &words("cornell.png", lost.describe()));
         ui.press_character(']');
         finish_unwritten(&mut ui, BLUE);

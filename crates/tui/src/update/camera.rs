@@ -11,7 +11,7 @@ use crate::messages;
 use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{State, format_stops};
 
@@ -52,7 +52,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
 }
 
 /// Widens the field of view by a number of steps.
-pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
+pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
@@ -118,12 +118,12 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
-    if !state.request.toggles.camera.has_changes() && !is_set && !is_mesh(&state.request.scene) {
+    if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
         return notify(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.conflicting_camera_saves();
     // Models do not contain a camera that could be overwritten.
-    if !saved.is_empty() && !is_mesh(&state.request.scene) {
+    if !saved.is_empty() && !has_mesh_extension(&state.request.scene) {
         // The message below lists the saved values, so they cause no further conflict.
         state.request.rebase_moves_on_scene();
         let saved = saved.join(", ");
@@ -143,7 +143,7 @@ pub(super) fn handle_saved_camera(
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            state.saving.has_scene_of_model |= is_mesh(&state.request.scene);
+            state.saving.has_scene_of_model |= has_mesh_extension(&state.request.scene);
             return prompt(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
@@ -221,7 +221,7 @@ pub(super) fn render_waiting_step_now(state: &mut State) -> Vec<Effect> {
 }
 
 /// Renders the waiting step if the previous one has a preview.
-pub(super) fn render_waiting_step(state: &mut State) -> Vec<Effect> {
+pub(super) fn try_render_waiting_step(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_camera_step_preview() {
         render_or_delay_step(state)
     } else {

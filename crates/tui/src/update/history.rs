@@ -39,7 +39,7 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step_back(steps, newest) {
-        Some(shown) => show_image(state, shown),
+        Some(shown) => show_older_render(state, shown),
         None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
     }
 }
@@ -52,7 +52,7 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.open_at(at, newest) {
-        Some(shown) => show_image(state, shown),
+        Some(shown) => show_older_render(state, shown),
         None => Vec::new(),
     }
 }
@@ -66,7 +66,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
-            let effects = show_image(state, shown);
+            let effects = show_older_render(state, shown);
             let edits = state.picture.history.edits_since_viewed();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
@@ -99,7 +99,7 @@ fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
     }
 }
 
-fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
+fn show_older_render(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header already shows the render's number and age.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_viewing_oldest())..];

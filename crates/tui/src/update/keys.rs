@@ -16,7 +16,7 @@ use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::ViewMode;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, IntegratorProperties, ShadowMode};
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 use crate::state::{KeyOverrides, Pane, State};
 
 pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
@@ -53,8 +53,8 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
         Action::DollyIn => camera::dolly(state, 1.0),
         Action::DollyOut => camera::dolly(state, -1.0),
-        Action::NarrowField => camera::zoom(state, -1.0),
-        Action::WidenField => camera::zoom(state, 1.0),
+        Action::NarrowField => camera::widen_field_of_view(state, -1.0),
+        Action::WidenField => camera::widen_field_of_view(state, 1.0),
         Action::Darken => camera::change_exposure(state, -1.0),
         Action::Brighten => camera::change_exposure(state, 1.0),
         Action::KeepCamera => camera::save_camera(state),
@@ -65,14 +65,16 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ActualPixels => toggle_actual_pixels(state),
         Action::RenderRegionFirst => region::handle_region_key(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
-        Action::Edit if is_mesh(&state.request.scene) => notify(state, messages::NO_EDITOR_FOR_MODELS),
+        Action::Edit if has_mesh_extension(&state.request.scene) => {
+            notify(state, messages::NO_EDITOR_FOR_MODELS)
+        }
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
         Action::CompareLastEdit => history::toggle_render_before_edit(state),
         Action::OlderRender => history::browse(state, 1),
         Action::NewerRender => history::browse(state, -1),
         Action::ResetSettings => reset_to_scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
-        Action::ToggleHelp => change_and_redraw(state, |state| {
+        Action::ToggleHelp => change_and_mark_dirty(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
         Action::ShowImageOnly => toggle_image_only(state),
@@ -83,7 +85,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
     }
 }
 
-fn change_and_redraw(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
+fn change_and_mark_dirty(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     how(state);
     state.dirty = true;
     Vec::new()
@@ -129,7 +131,7 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
 
 /// Toggles depth of field. If no setting has turned it off but it is off, the camera is a pinhole.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
-    let switched_off = state.request.overrides().dof == Some(false);
+    let switched_off = state.request.combined_overrides().dof == Some(false);
     match &state.request.effective {
         None => return notify(state, messages::NO_SCENE),
         Some(effective) if !effective.dof && !switched_off => {
@@ -218,11 +220,11 @@ fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
-    if state.overlays.problems.is_none() && state.reported_diagnostics().is_empty() {
+    if state.overlays.problems.is_none() && state.warnings_and_write_failure().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
         return notify(state, if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING });
     }
-    change_and_redraw(state, |state| {
+    change_and_mark_dirty(state, |state| {
         state.overlays.diagnostics.open = !state.overlays.diagnostics.open;
         state.overlays.diagnostics.scroll = 0;
     })

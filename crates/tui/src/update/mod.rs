@@ -24,7 +24,7 @@ use super::history::ShownImage;
 use super::messages;
 use super::options::ContentChange;
 use super::preview_kind::PreviewKind;
-use super::state::{Message, PendingChange, SceneImageProgress, State};
+use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{Command, SavedSceneImageState};
@@ -42,7 +42,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     state.now = now;
     let was_paused = state.work.paused;
     let mut effects = handle_event(state, event);
-    effects.extend(camera::render_waiting_step(state));
+    effects.extend(camera::try_render_waiting_step(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
         let message = state.overlays.message.take();
@@ -91,7 +91,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A change saved in the editor becomes visible only when the editor exits.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
-            state.saving.change = Some(PendingChange { generation: state.request.generation, noticed });
+            state.saving.change = Some(UndisplayedChange { generation: state.request.generation, noticed });
             effects
         }
         Event::Settled => {
@@ -124,7 +124,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
 
 fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
-        && is_complete_picture(&shown.picture)
+        && has_all_pixels(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.update_newest_while_viewing_older(&shown) {
@@ -135,7 +135,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         let is_its = |last: &ShownImage| last.generation == shown.generation || last.shows_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
-            Some(last) if state.display.dithers_colors() => keep_unchanged_pixels(shown, &last),
+            Some(last) if state.display.dithers_colors() => keep_nearly_unchanged_pixels(shown, &last),
             Some(_) | None => shown,
         });
         state.dirty = true;
@@ -145,7 +145,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
 
 /// Keeps the previous color of each pixel that has changed by at most one code value since the last preview,
 /// because even such a small difference could change the dither pattern.
-fn keep_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
+fn keep_nearly_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const MAX_DIFFERENCE: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
     if what(&shown) == what(last) {
@@ -160,7 +160,7 @@ fn keep_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage
     shown
 }
 
-fn is_complete_picture(picture: &Srgb8Image) -> bool {
+fn has_all_pixels(picture: &Srgb8Image) -> bool {
     picture.width > 0
         && picture.height > 0
         && u64::try_from(picture.pixels.len())

@@ -8,7 +8,7 @@ use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step, round_to_step};
 use crate::messages;
 use crate::pipeline::protocol::{Command, PickResult, PickedObject};
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
 use crate::view;
@@ -142,7 +142,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
-    let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
+    let in_text = picked.thing.as_ref().filter(|thing| !has_mesh_extension(&thing.path));
     state.selection.picked =
         in_text.map(|thing| FilePosition { path: thing.path.clone(), line: thing.line, column: 1 });
     match (state.selection.purpose, &picked.thing) {
@@ -155,11 +155,11 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
             Vec::new()
         }
         (PickPurpose::Focus, None) => notify(state, messages::NOTHING_TO_FOCUS),
-        (PickPurpose::Focus, Some(thing)) => focus_at(state, thing.depth),
+        (PickPurpose::Focus, Some(thing)) => focus_at_depth(state, thing.depth),
     }
 }
 
-fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
+fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = round_to_step(depth, decimal_step(depth));
     if !(distance > 0.0) {
         return notify(state, messages::NOTHING_TO_FOCUS);
@@ -210,7 +210,7 @@ fn inspected_values(PickResult { thing, color, pixel: [x, y] }: &PickResult) -> 
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
     // A model's scene is generated, so its lines do not exist in any file.
-    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
+    facts.extend((!has_mesh_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
         format!("distance {}", format_number(*distance)),

@@ -21,7 +21,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.
-        state.picture.history.reassign_to_next_request(state.request.generation);
+        state.picture.history.move_to_next_request(state.request.generation);
     }
     state.work.is_counted &= state.request.is_exposure_only;
     state.request.generation += 1;
@@ -40,10 +40,10 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     let request = Request {
         generation: state.request.generation,
         scene: state.request.scene.clone(),
-        overrides: state.request.overrides(),
+        overrides: state.request.combined_overrides(),
         preview: state.request.preview_size,
         write: if state.request.has_no_key_overrides() { WriteMode::Try } else { WriteMode::No },
-        own: state.request.command_line_overrides(),
+        own: state.request.overrides_for_scene_image(),
         saves: state.saving.edits,
         force,
         first: state.request.first_section,

@@ -10,7 +10,7 @@ use crate::keymap::OverlayAction;
 use crate::messages;
 use crate::pipeline::settings::ViewMode;
 use crate::state::State;
-use crate::view::views::rows_per_column;
+use crate::view::views::views_per_column;
 
 /// Handles an overlay action. `None` if the list is closed or covered by the help.
 pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
@@ -19,7 +19,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
     }
     let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     let last = ViewMode::ALL.len() - 1;
-    let column = rows_per_column(state);
+    let column = views_per_column(state);
     let chosen = match action {
         OverlayAction::LineUp => current.saturating_sub(1),
         OverlayAction::LineDown => (current + 1).min(last),
@@ -29,7 +29,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
         OverlayAction::PageUp => 0,
         OverlayAction::PageDown => last,
         OverlayAction::Find => {
-            search_view(state, String::new());
+            set_search_text(state, String::new());
             return Some(Vec::new());
         }
         OverlayAction::Take => {
@@ -55,7 +55,7 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
         _ => return None,
     }
     let found = find_view(&name);
-    search_view(state, name);
+    set_search_text(state, name);
     Some(found.map_or_else(Vec::new, |view| select_if_changed(state, view)))
 }
 
@@ -84,7 +84,7 @@ fn find_view(name: &str) -> Option<ViewMode> {
     all().find(begins).or_else(|| all().find(has)).copied()
 }
 
-fn search_view(state: &mut State, name: String) {
+fn set_search_text(state: &mut State, name: String) {
     state.open_view_list();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);

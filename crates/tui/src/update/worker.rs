@@ -44,7 +44,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
-            describe_files(state, generation, &report);
+            update_file_descriptions(state, generation, &report);
             return Vec::new();
         }
         event => event,
@@ -63,7 +63,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
             state.request.drop_saved_changes();
-            let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
+            let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_problems(state);
             state.picture.history.record_scene_read();
@@ -94,7 +94,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation, is_own, unfinished } => {
-            record_current_written_file(state, path, bytes, (generation, is_own), unfinished);
+            handle_written_file(state, path, bytes, (generation, is_own), unfinished);
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -143,18 +143,18 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             | CheckpointUpdate::Absent { .. }
             | CheckpointUpdate::Ignored { .. } => {}
         },
-        Event::Refused { conflicts, .. } => report_conflicts(state, conflicts),
+        Event::Refused { conflicts, .. } => report_output_conflicts(state, conflicts),
         Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
             show_notice(state, messages::WRITE_POSTPONED);
         }
         Event::Done { report, warnings, unchanged, .. } => {
-            let time = state.work.rendering_time(state.now);
+            let time = state.work.total_rendering_time(state.now);
             handle_done(state, report, warnings, unchanged);
             return notify_render_ended(state, time);
         }
         Event::Failed { failure, .. } => {
-            let time = state.work.rendering_time(state.now);
+            let time = state.work.total_rendering_time(state.now);
             handle_failure(state, failure);
             return notify_render_ended(state, time);
         }
@@ -261,7 +261,7 @@ fn report_written_files(state: &mut State, paths: &[PathBuf]) {
 }
 
 /// Records a written file. It is listed next to the image because a message would cover the keys.
-fn record_current_written_file(
+fn handle_written_file(
     state: &mut State,
     path: PathBuf,
     bytes: u64,
@@ -327,7 +327,7 @@ fn is_scene_image_complete(state: &State, generation: u64) -> bool {
 }
 
 /// Adds a description to the files that contain a finished request's image.
-fn describe_files(state: &mut State, generation: u64, report: &Report) {
+fn update_file_descriptions(state: &mut State, generation: u64, report: &Report) {
     let base = state.request.base_view();
     let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {
@@ -352,7 +352,7 @@ pub(super) fn handle_output_change(
 }
 
 /// Shows new conflicts immediately. If the user has closed the pane, only new conflicts reopen it.
-fn report_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
+fn report_output_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
     state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
     show_notice(state, messages::NOT_WRITTEN);
@@ -391,7 +391,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
         state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
-    describe_files(state, state.request.generation, &report);
+    update_file_descriptions(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
@@ -452,14 +452,14 @@ fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
 
 fn set_warnings(state: &mut State, warnings: Vec<Diagnostic>) {
     state.overlays.warnings = warnings;
-    state.overlays.diagnostics.open &= !state.reported_diagnostics().is_empty();
+    state.overlays.diagnostics.open &= !state.warnings_and_write_failure().is_empty();
     state.overlays.are_warnings_known = true;
 }
 
 /// Closes the diagnostics pane if it is empty.
 fn close_empty_pane(state: &mut State) {
     state.overlays.diagnostics.open &=
-        state.overlays.problems.is_some() || !state.reported_diagnostics().is_empty();
+        state.overlays.problems.is_some() || !state.warnings_and_write_failure().is_empty();
 }
 
 /// Handles a failure. Errors in a file that may be incomplete are withheld until the file has stopped

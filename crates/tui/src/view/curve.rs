@@ -93,7 +93,11 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     let bounds = [y[0] - margin, y[1] + margin];
     let style = |tone: TextRole| tone.style(depth);
     let dataset = |data, tone| {
-        Dataset::default().data(data).marker(marker(state)).graph_type(GraphType::Line).style(style(tone))
+        Dataset::default()
+            .data(data)
+            .marker(select_chart_marker(state))
+            .graph_type(GraphType::Line)
+            .style(style(tone))
     };
     let mut sets = Vec::new();
     sets.extend(line.as_ref().map(|line| dataset(&line[..], TextRole::Good)));
@@ -112,7 +116,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
 }
 
 /// The chart's marker: Braille dots, if the terminal is likely to support them.
-fn marker(state: &State) -> Marker {
+fn select_chart_marker(state: &State) -> Marker {
     let is_simple = state.display.kind == PreviewKind::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);
     if is_simple { Marker::Dot } else { Marker::Braille }

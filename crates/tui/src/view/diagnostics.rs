@@ -57,7 +57,7 @@ fn pane_area(area: Rect, lines: usize, is_panel: bool) -> Rect {
 
 /// Draws a horizontal rule with the number of errors and, if not all lines fit, the range of visible lines.
 fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
-    let reported = state.reported_diagnostics();
+    let reported = state.warnings_and_write_failure();
     let has_error = reported.iter().any(|one| one.severity == Severity::Error);
     let tone =
         if state.overlays.problems.is_some() || has_error { TextRole::Error } else { TextRole::Warning };
@@ -91,7 +91,7 @@ fn page_and_max_scroll(text: &[StyledLine], area: Rect) -> (usize, usize) {
 fn pane_lines(state: &State, area: Rect) -> Vec<StyledLine> {
     let width = usize::from(area.width);
     let Some(problems) = &state.overlays.problems else {
-        return format_diagnostics(&state.reported_diagnostics(), width);
+        return format_diagnostics(&state.warnings_and_write_failure(), width);
     };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
@@ -150,7 +150,7 @@ fn format_diagnostic_group(fault: &[&Diagnostic], width: usize) -> Vec<StyledLin
     // Drop the empty line and the count that end the report, because the title already contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
-    let places: Vec<String> = fault[1..].iter().filter_map(|one| format_position(one)).collect();
+    let places: Vec<String> = fault[1..].iter().filter_map(|one| format_line_and_column(one)).collect();
     if !places.is_empty() {
         let shown = places.len().min(MAX_PLACES - 1);
         let more = match places.len() - shown {
@@ -166,7 +166,7 @@ fn format_diagnostic_group(fault: &[&Diagnostic], width: usize) -> Vec<StyledLin
 }
 
 /// Formats a diagnostic's position as `line:column`.
-fn format_position(one: &Diagnostic) -> Option<String> {
+fn format_line_and_column(one: &Diagnostic) -> Option<String> {
     let place = one.place.as_ref()?;
     let (line, column) = report::line_and_column(&place.source, place.span.start);
     Some(format!("{line}:{column}"))

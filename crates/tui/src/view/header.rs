@@ -81,11 +81,11 @@ pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, Text
     if state.picture.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
-        work_label(state)
+        worker_activity_label(state)
     }
 }
 
-fn work_label(state: &State) -> (&'static str, &'static str, TextRole) {
+fn worker_activity_label(state: &State) -> (&'static str, &'static str, TextRole) {
     match state.work.activity {
         _ if state.work.paused => ("‖", "paused", TextRole::Warning),
         WorkerActivity::Running { .. } => ("●", "rendering", TextRole::Working),
@@ -99,8 +99,8 @@ fn work_label(state: &State) -> (&'static str, &'static str, TextRole) {
 }
 
 /// Returns a word for the worker's state, regardless of the displayed image.
-pub(super) fn work_word(state: &State) -> &'static str {
-    work_label(state).1
+pub(super) fn worker_activity_word(state: &State) -> &'static str {
+    worker_activity_label(state).1
 }
 
 /// Draws the scene path, the view and the image size.
@@ -167,7 +167,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));
-                (place, messages::render_position(run, newest_render_number(state)))
+                (place, messages::render_number_label(run, newest_render_number(state)))
             }
             None => {
                 let place = if is_unfinished { messages::STOPPED } else { messages::OLDER };

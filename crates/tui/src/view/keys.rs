@@ -11,7 +11,7 @@ use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 use crate::scene::report::summarize_counts;
 use crate::state::{KeyOverrides, State, ViewList, WorkerActivity};
 
@@ -159,7 +159,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     urgent.extend(hidden_diagnostics_hint(state));
     let named = |action, words| keymap::binding_for(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
-    if has_place && !is_mesh(&state.request.scene) {
+    if has_place && !has_mesh_extension(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
     if state.picture.history.is_viewing_older() {
@@ -195,8 +195,10 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         | WorkerActivity::Broken
         | WorkerActivity::Cancelled => &[],
     };
-    let first =
-        now.iter().filter_map(|action| KeyHint::for_action(*action)).map(|hint| pause_hint(hint, state));
+    let first = now
+        .iter()
+        .filter_map(|action| KeyHint::for_action(*action))
+        .map(|hint| relabel_pause_hint(hint, state));
     let (held, first): (Vec<KeyHint>, Vec<KeyHint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
     let is_other = |it: &&KeyBinding| {
@@ -241,7 +243,7 @@ const ELSEWHERE: [Action; 8] = [
     Action::CycleIntegrator,
 ];
 
-fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
+fn relabel_pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     let is_pause = keymap::binding_for(Action::TogglePause).is_some_and(|it| it.label == hint.key);
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
@@ -252,7 +254,7 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
         Some(_) => (super::header::format_error_count(state), activity_label(state).2),
-        None => match state.reported_diagnostics() {
+        None => match state.warnings_and_write_failure() {
             none if none.is_empty() => return None,
             reported => (summarize_counts(&reported), TextRole::Warning),
         },
@@ -261,5 +263,6 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
 }
 
 fn has_depth_of_field(state: &State) -> bool {
-    state.request.effective.as_ref().is_some_and(|it| it.dof) && state.request.overrides().dof != Some(false)
+    state.request.effective.as_ref().is_some_and(|it| it.dof)
+        && state.request.combined_overrides().dof != Some(false)
 }

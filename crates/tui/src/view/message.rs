@@ -72,13 +72,14 @@ pub(super) fn covers_preview(state: &State) -> bool {
 }
 
 /// Whether the panel has space for the inspected values.
-pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
+pub(super) fn inspected_values_fit_panel(state: &State, layout: &Layout) -> bool {
     let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
     layout.panel.height >= FACTS && !is_covered
 }
 
 fn message_text(state: &State, layout: &Layout) -> Option<(String, TextRole)> {
-    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(state, layout)) {
+    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !inspected_values_fit_panel(state, layout))
+    {
         return Some((facts.join(" · "), TextRole::Strong));
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;

@@ -28,7 +28,7 @@ use super::state::State;
 
 /// The worker's state as a single word.
 pub(super) fn activity_word(state: &State) -> &'static str {
-    header::work_word(state)
+    header::worker_activity_word(state)
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.

@@ -59,7 +59,7 @@ struct PanelLayout {
 }
 
 fn panel_layout(state: &State, area: Rect) -> PanelLayout {
-    let room = Rect { width: side_panel::lines_width(state, area), ..area };
+    let room = Rect { width: side_panel::available_line_width(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
     let mut lines = panel_lines(state, (room.width, room.width), true);
     if !is_one_column(&lines) {
@@ -109,7 +109,7 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
         .selection
         .facts
         .iter()
-        .filter(|_| message::is_in_panel(state, &Layout::for_state(state)))
+        .filter(|_| message::inspected_values_fit_panel(state, &Layout::for_state(state)))
         .flatten();
     let lines = facts.flat_map(|fact| wrap_text(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
     let mut lines: Vec<StyledLine> = lines.map(|line| vec![(line, TextRole::Strong)]).collect();
@@ -154,7 +154,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let mut add = |words: &str, tone| {
         lines.extend(wrap_text(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
     };
-    status_line::unsaved_messages(state).iter().for_each(|words| add(words, TextRole::Faint));
+    status_line::unsaved_image_messages(state).iter().for_each(|words| add(words, TextRole::Faint));
     status_line::changed_file_messages(state).for_each(|words| add(&words, TextRole::Warning));
     for written in status_line::current_image_files(state) {
         lines.push(vec![("→ ".to_owned(), TextRole::Good), (written.name(), TextRole::File)]);

@@ -11,7 +11,7 @@ use super::ramp::AsciiRamp;
 use super::text::{TextRole, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Srgb8Image;
-use crate::graphics::ImagePlacement;
+use crate::graphics::TerminalImage;
 use crate::history::ShownImage;
 use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
@@ -28,7 +28,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         Some(_) if is_drawn_as_pixels(state) => {}
         Some(shown) => {
             let kind = cell_based_kind(state.display.kind, state.display.depth);
-            let placed = PlacedImage::for_preview(state, shown, area, kind);
+            let placed = PreviewPlacement::for_preview(state, shown, area, kind);
             placed.draw(&shown.picture, kind, PreviewColors::for_state(state), buffer);
             marks::draw_marks(state, placed.cells, buffer);
         }
@@ -48,7 +48,8 @@ pub(super) fn draw_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, bu
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
         let kind = cell_based_kind(state.display.kind, state.display.depth);
-        let placed = PlacedImage::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
+        let placed =
+            PreviewPlacement::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
         placed.draw(picture, kind, PreviewColors::for_state(state), buffer);
     }
 }
@@ -57,7 +58,7 @@ pub(super) fn draw_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, bu
 pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::for_state(state).preview;
-    let cells = PlacedImage::for_preview(
+    let cells = PreviewPlacement::for_preview(
         state,
         shown,
         area,
@@ -91,11 +92,11 @@ fn is_drawn_as_pixels(state: &State) -> bool {
 }
 
 /// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
-pub(crate) fn image_placement(state: &State, area: Rect) -> Option<ImagePlacement> {
+pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<TerminalImage> {
     let shown = state.picture.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
-    let placed = PlacedImage::for_preview(state, shown, area, state.display.kind);
+    let placed = PreviewPlacement::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
-    (!cells.is_empty()).then_some(ImagePlacement { picture, cells, cell: state.display.window.cell_pixels })
+    (!cells.is_empty()).then_some(TerminalImage { picture, cells, cell: state.display.window.cell_pixels })
 }
 
 /// Color settings for a preview.
@@ -135,7 +136,12 @@ pub(crate) fn draw_image(
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
     let kind = cell_based_kind(PreviewKind::from_choice(choice, inks.depth), inks.depth);
-    PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
+    PreviewPlacement::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(
+        picture,
+        kind,
+        inks,
+        &mut buffer,
+    );
     buffer
 }
 
@@ -149,19 +155,19 @@ pub(crate) fn size_in_cells(
 ) -> (u16, u16) {
     let kind = PreviewKind::from_choice(PreviewChoice::HalfBlock, depth);
     let area = Rect::new(0, 0, columns, rows);
-    let cells = PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
+    let cells = PreviewPlacement::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
     (cells.width, cells.height)
 }
 
 /// Placement of an image: the cells it covers and its size in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct PlacedImage {
+struct PreviewPlacement {
     cells: Rect,
     width: u32,
     height: u32,
 }
 
-impl PlacedImage {
+impl PreviewPlacement {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
     fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, CellGrid::columns);
@@ -280,8 +286,8 @@ mod tests {
         Srgb8Image { width, height, pixels }
     }
 
-    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> PlacedImage {
-        PlacedImage::fit(
+    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> PreviewPlacement {
+        PreviewPlacement::fit(
             &picture(width, height, |_, _| [0; 3]),
             Rect::new(3, 1, area.0, area.1),
             kind,
@@ -293,11 +299,11 @@ mod tests {
     #[test]
     fn image_with_the_requested_size_is_not_scaled() {
         let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
-        assert_eq!(placed, PlacedImage { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
+        assert_eq!(placed, PreviewPlacement { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
         let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
         assert_eq!(narrow.cells, Rect::new(18, 1, 20, 20));
         let odd = fit(50, 31, (50, 20), PreviewKind::HalfBlock, 2.0);
-        assert_eq!(odd, PlacedImage { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
+        assert_eq!(odd, PreviewPlacement { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
     }
 
     #[test]
@@ -338,7 +344,7 @@ mod tests {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
         let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
-        PlacedImage::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
+        PreviewPlacement::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
             PreviewKind::HalfBlock,
             PreviewColors::for_state(&state),
@@ -356,7 +362,7 @@ mod tests {
             [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
         {
             let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
-            PlacedImage::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
+            PreviewPlacement::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
                 &sharp,
                 kind,
                 PreviewColors::for_state(&state),

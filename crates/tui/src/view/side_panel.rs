@@ -16,21 +16,21 @@ const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
 /// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
 /// history.
-pub(super) fn lines_width(state: &State, panel: Rect) -> u16 {
-    let is_divided = is_wide(state) && panel.width >= DIVIDED;
+pub(super) fn available_line_width(state: &State, panel: Rect) -> u16 {
+    let is_divided = is_window_wide(state) && panel.width >= DIVIDED;
     if is_divided { COLUMN } else { panel.width }
 }
 
-fn is_wide(state: &State) -> bool {
+fn is_window_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
 /// Returns the area left for the curve and the history, next to or below the lines.
 fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
-    if !is_wide(state) || state.overlays.views.is_some() {
+    if !is_window_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
-    let used = lines_width(state, panel);
+    let used = available_line_width(state, panel);
     let area = if used < panel.width {
         super::text::right_part(panel, used + 2)
     } else {

@@ -143,7 +143,7 @@ fn format_stage_summary(state: &State, is_long: bool, counts: impl Fn(&StageRepo
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
         let stages = if is_long { format_count(reused, "stage") } else { reused.to_string() };
-        line.push((comma.to_owned() + &messages::cached_stages(&stages), TextRole::Faint));
+        line.push((comma.to_owned() + &messages::cached_stage_count(&stages), TextRole::Faint));
     }
     line
 }

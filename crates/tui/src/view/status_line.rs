@@ -16,7 +16,7 @@ use crate::messages;
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress, SavedSceneImageState};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
-use crate::scene::is_mesh;
+use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{SceneImageProgress, State, WorkerActivity, WrittenFile};
 
@@ -75,7 +75,7 @@ fn status_content(state: &State) -> StatusContent {
 pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
     match status_content(state) {
         StatusContent::Nothing => 0,
-        StatusContent::ProgressBar => text_columns(&progress_text(state, layout).1),
+        StatusContent::ProgressBar => text_columns(&progress_fraction_and_text(state, layout).1),
         StatusContent::Summary => {
             written_file_pieces(state, layout).iter().flatten().map(|(text, _)| text_columns(text)).sum()
         }
@@ -90,8 +90,8 @@ pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
 }
 
 /// Progress bar fraction and text for the asset being loaded or for the render.
-fn progress_text(state: &State, layout: &Layout) -> (f64, String) {
-    let time = state.work.rendering_time(state.now).map_or(String::new(), format_running_time);
+fn progress_fraction_and_text(state: &State, layout: &Layout) -> (f64, String) {
+    let time = state.work.total_rendering_time(state.now).map_or(String::new(), format_running_time);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let samples = if progress.is_total_fixed {
@@ -112,7 +112,7 @@ fn progress_text(state: &State, layout: &Layout) -> (f64, String) {
 /// Draws the progress bar for the asset being loaded or the render.
 fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let name = running_stage(state).unwrap_or_default();
-    let (fraction, words) = progress_text(state, layout);
+    let (fraction, words) = progress_fraction_and_text(state, layout);
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // While paused, the remaining time is unknown.
@@ -171,7 +171,7 @@ fn draw_summary(
     };
     if layout.panel.is_empty() {
         let mut comma = comma;
-        for words in unsaved_messages(state) {
+        for words in unsaved_image_messages(state) {
             is_room(vec![(format!("{comma}{words}"), TextRole::Faint)]);
             comma = " · ";
         }
@@ -186,7 +186,7 @@ fn draw_summary(
     }
     let used = drawn.put_line_with_links(state, area, &pieces, buffer);
     let free = right_part(area, used + 2);
-    let short = if is_mesh(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
+    let short = if has_mesh_extension(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
     let words = [save_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| text_columns(words) <= free.width);
@@ -226,7 +226,7 @@ pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &Writte
 }
 
 /// Returns messages about a displayed image that has not been written, and about the images that have.
-pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
+pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     let saving = &state.saving;
     if current_image_files(state).next().is_some() {
         return Vec::new();
@@ -281,7 +281,7 @@ pub(super) fn save_hint(state: &State) -> String {
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = escape_invisible_chars(&name);
     // Models are usually exported by a program rather than saved by the user.
-    if is_mesh(&state.request.scene) {
+    if has_mesh_extension(&state.request.scene) {
         return messages::renders_on_changes(&name);
     }
     messages::save_to_render(&name, state.picture.shown.is_some() || state.work.renders > 0)

@@ -74,7 +74,7 @@ fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buf
     // The text next to the thumbnail starts at the same column with or without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", render_label(state, *index)),
-        changes: history.changes(*index, is_entry_rendering(state, *index)),
+        changes: history.describe_changes(*index, is_entry_rendering(state, *index)),
     };
     let beside = right_part(*cells, place.width + 1);
     let lines = fit_text(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));

@@ -45,7 +45,7 @@ pub(super) fn draw_view_list(state: &State, layout: &Layout, buffer: &mut Buffer
 }
 
 /// Number of views per column in the view list.
-pub(crate) fn rows_per_column(state: &State) -> usize {
+pub(crate) fn views_per_column(state: &State) -> usize {
     usize::from(list_area(&Layout::for_state(state)).height).max(1)
 }
 

@@ -52,7 +52,7 @@ impl ConvergenceChart {
     }
 
     /// Adds a point. Clears the chart if the point belongs to another scene.
-    pub(super) fn add(&mut self, scene: &str, method: &str, point: (f64, f64)) {
+    pub(super) fn add_point(&mut self, scene: &str, method: &str, point: (f64, f64)) {
         if self.scene != scene {
             *self = Self { scene: scene.to_owned(), methods: Vec::new() };
         }
@@ -196,9 +196,9 @@ mod tests {
     fn progress_charts_show_one_scene() {
         let mut lines = ConvergenceChart::default();
         assert_eq!(lines.render_text((80, 24), false), "");
-        lines.add("a.toml", "path", (0.1, 0.5));
-        lines.add("a.toml", "path", (0.4, 0.1));
-        lines.add("a.toml", "whitted", (0.1, 0.01));
+        lines.add_point("a.toml", "path", (0.1, 0.5));
+        lines.add_point("a.toml", "path", (0.4, 0.1));
+        lines.add_point("a.toml", "whitted", (0.1, 0.01));
         let text = lines.render_text((80, 24), false);
         assert!(text.contains("o path") && text.contains("x whitted"), "{text}");
         assert!(text.lines().count() == 16 && text.lines().all(|line| line.chars().count() < 80), "{text}");
@@ -207,7 +207,7 @@ mod tests {
             (lines.render_text((80, 13), false), lines.render_text((30, 24), false)),
             Default::default()
         );
-        lines.add("b.toml", "path", (0.1, 0.5));
+        lines.add_point("b.toml", "path", (0.1, 0.5));
         assert!(!lines.render_text((80, 24), false).contains("whitted"));
     }
 }

@@ -38,7 +38,11 @@ enum OutputKind {
 
 impl BenchOutputs {
     /// Checks the outputs before measuring and reports errors.
-    pub(super) fn check_args(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
+    pub(super) fn from_checked_args(
+        args: &BenchArgs,
+        scenes: &[PathBuf],
+        console: &Console,
+    ) -> Result<Self, Exit> {
         let all = [
             ("--csv", &args.csv, OutputKind::Csv),
             ("--json", &args.json, OutputKind::Json),
@@ -62,7 +66,7 @@ impl BenchOutputs {
     }
 
     fn check_output(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
-        self.check_replaceable(index, path)?;
+        self.check_path_conflicts(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
         if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
             let (option, ..) = self.files[index];
@@ -75,11 +79,11 @@ impl BenchOutputs {
                 format!("cannot write {}: plots are SVG files; use the extension .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
-        output::check_path(path)
+        output::check_file_target(path)
     }
 
     /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.
-    fn check_replaceable(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+    fn check_path_conflicts(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         if FileIdentity::from_path(real).is_none() {
             return Ok(());
         }
@@ -160,11 +164,11 @@ impl BenchOutputs {
         let (_, path, kind) = &self.files[index];
         let bytes = format_content(*kind, results)
             .map_err(|why| format!("cannot write {}: {why}", path.display()))?;
-        let may_replace = |real: &Path| self.check_replaceable(index, real);
+        let may_replace = |real: &Path| self.check_path_conflicts(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses = AttributeLossPolicy::Report(&|what| progress.report_warning(&what));
+        let losses = AttributeLossPolicy::Report(&|what| progress.report_write_warning(&what));
         let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        let written = write::atomic_guarded(path, &bytes, &guard, token);
+        let written = write::atomic_with_policy(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }

@@ -77,7 +77,7 @@ impl BenchProgress {
             }
             BenchEvent::Point { scene, method, seconds, relmse } => {
                 if let ProgressFormat::Bar(_, lines) = &mut self.format {
-                    lines.add(&scene, &method, (seconds, relmse));
+                    lines.add_point(&scene, &method, (seconds, relmse));
                     self.redraw(false);
                 }
             }
@@ -158,7 +158,7 @@ impl BenchProgress {
     }
 
     /// Reports a warning about a written file.
-    pub(super) fn report_warning(&self, message: &str) {
+    pub(super) fn report_write_warning(&self, message: &str) {
         if self.is_text() {
             self.console.print_message(&format!("warning: {message}"));
         } else {

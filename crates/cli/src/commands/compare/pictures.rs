@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 use super::format_significant_digits;
-use crate::args::{CompareArgs, ImageDisplayMode};
+use crate::args::{CompareArgs, ImageVisibility};
 use crate::compare::{self, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::film::RadianceImage;
@@ -19,9 +19,9 @@ const MIN_VISIBLE_FLIP: f32 = 0.1;
 pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
-        ImageDisplayMode::Auto => is_terminal,
-        ImageDisplayMode::On => true,
-        ImageDisplayMode::Off => false,
+        ImageVisibility::Auto => is_terminal,
+        ImageVisibility::On => true,
+        ImageVisibility::Off => false,
     };
     if !is_wanted {
         return String::new();

@@ -192,7 +192,7 @@ impl Server<'_> {
         match method.as_str() {
             DidOpenTextDocument::METHOD => {
                 if let Some(DidOpenTextDocumentParams { text_document: one }) = parse_params(params) {
-                    self.store_document(&one.uri, one.version, one.text);
+                    self.store_and_diagnose_document(&one.uri, one.version, one.text);
                     self.queue_file_check(&one.uri);
                 }
             }
@@ -205,7 +205,11 @@ impl Server<'_> {
                             "ignored an incremental change: this server needs full text synchronization",
                         );
                     } else if let Some(last) = content_changes.pop() {
-                        self.store_document(&text_document.uri, text_document.version, last.text);
+                        self.store_and_diagnose_document(
+                            &text_document.uri,
+                            text_document.version,
+                            last.text,
+                        );
                     }
                 }
             }
@@ -231,7 +235,7 @@ impl Server<'_> {
     }
 
     /// Stores a document and publishes its diagnostics.
-    fn store_document(&self, uri: &Uri, version: i32, text: String) {
+    fn store_and_diagnose_document(&self, uri: &Uri, version: i32, text: String) {
         let document = OpenDocument::new(uri_to_path(uri), version, text);
         let found = diagnostics::text_diagnostics(&document);
         self.documents().insert(uri.as_str().to_owned(), document);

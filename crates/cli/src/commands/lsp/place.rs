@@ -2,7 +2,7 @@
 //! syntax errors.
 
 use crate::scene::keys::find_table;
-use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
+use crate::scene::keys::key::{KeyInfo, TableInfo, TableTypeInfo};
 
 /// The kind of text to complete at the cursor.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub(super) enum CursorContext {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CursorTable {
     pub(super) info: &'static TableInfo,
-    pub(super) kind: Option<&'static TypeInfo>,
+    pub(super) kind: Option<&'static TableTypeInfo>,
 }
 
 impl CursorTable {
@@ -207,7 +207,7 @@ fn header_name(line: &str) -> Option<&str> {
 }
 
 /// Returns the table's type: the value of its key `type`, or the default type.
-fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
+fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TableTypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
         (key.trim() == "type").then(|| first_string(value)).flatten()

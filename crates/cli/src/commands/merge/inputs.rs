@@ -12,7 +12,7 @@ use crate::scene::referenced_files;
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// Input files of the parts and their scenes.
-pub(super) struct MergeInputs<'a> {
+pub(super) struct RenderInputFiles<'a> {
     parts: &'a [PartFile],
     token: &'a CancelToken,
     /// The parts' scenes, and the files that these scenes name.
@@ -21,7 +21,7 @@ pub(super) struct MergeInputs<'a> {
     companions: OnceCell<BTreeSet<PathBuf>>,
 }
 
-impl<'a> MergeInputs<'a> {
+impl<'a> RenderInputFiles<'a> {
     /// Collects the input files that a merge into `out` must not replace.
     pub(super) fn new(parts: &'a [PartFile], out: &Path, token: &'a CancelToken) -> Self {
         // The output may be a link into the scene's folder.

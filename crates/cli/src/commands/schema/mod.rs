@@ -13,7 +13,7 @@ use crate::args::SchemaDraft;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::scene::keys::all_tables;
-use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TypeInfo};
+use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo};
 
 /// The file name of the schema.
 pub const FILE: &str = "glimt.schema.json";
@@ -83,7 +83,7 @@ fn object_schema(
 ) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
     let is_required =
-        |key: &&&KeyInfo| matches!(key.default, DefaultValue::Required(_)) && !is_conditional(key);
+        |key: &&&KeyInfo| matches!(key.default, DefaultValue::Required(_)) && !has_alternative_key(key);
     let required: Vec<&str> = keys.iter().filter(is_required).map(|key| key.name).collect();
     let mut object = json!({ "type": "object", "properties": properties, "additionalProperties": false });
     // Draft 4 does not allow an empty list.
@@ -94,7 +94,7 @@ fn object_schema(
 }
 
 /// Whether a key can be omitted in favor of another key.
-fn is_conditional(key: &KeyInfo) -> bool {
+fn has_alternative_key(key: &KeyInfo) -> bool {
     matches!(key.name, "position" | "look_at")
 }
 
@@ -143,7 +143,7 @@ fn schema_by_type(info: &'static TableInfo) -> Value {
 }
 
 /// Returns the condition that a table has this type. The key `type` is optional for the default type.
-fn type_condition(info: &TableInfo, kind: &TypeInfo) -> Value {
+fn type_condition(info: &TableInfo, kind: &TableTypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
     let required: &[&str] = if is_default { &[] } else { &["type"] };
     json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
@@ -179,7 +179,7 @@ fn all_types_schema(info: &'static TableInfo) -> Value {
 }
 
 /// Returns the schema for a key shared by several types. Accepts the values that any of these types accepts.
-fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Value {
     let draft = SchemaDraft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();
     values.dedup();
@@ -194,7 +194,7 @@ fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
 }
 
 /// Returns the dependency that restricts a key to its types.
-fn type_dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+fn type_dependency(info: &TableInfo, keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
     let mut schema = json!({ "properties": { "type": { "enum": names } } });

@@ -5,7 +5,7 @@ use super::description::{Alpha, Glass, ImportNotes, ModelMaterial, TextureRef, T
 use super::json::{
     CLAMP, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureInfoExtensions, TextureTransform,
 };
-use super::{GltfError, GltfFile, ImageBytes};
+use super::{GltfError, GltfFile, ImageLocation};
 use crate::math::{DVec3, Vec2};
 
 impl JsonMaterial {
@@ -217,17 +217,17 @@ impl MaterialReader<'_> {
     fn may_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.locate_image(image) {
-            Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,
-            Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\x89PNG") => {
+            Ok(ImageLocation::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,
+            Ok(ImageLocation::Inside(bytes)) if bytes.starts_with(b"\x89PNG") => {
                 // Gray and RGB images may define a transparent color.
                 let has_key = || memchr::memmem::find(&bytes[..bytes.len().min(1 << 12)], b"tRNS").is_some();
                 bytes.get(COLOR_TYPE).is_some_and(|kind| kind & 4 != 0) || has_key()
             }
-            Ok(ImageBytes::File(path)) => {
+            Ok(ImageLocation::File(path)) => {
                 let extension = path.extension().unwrap_or_default();
                 !(extension.eq_ignore_ascii_case("jpg") || extension.eq_ignore_ascii_case("jpeg"))
             }
-            Ok(ImageBytes::Inside(_)) => true,
+            Ok(ImageLocation::Inside(_)) => true,
             Err(_) => false,
         }
     }

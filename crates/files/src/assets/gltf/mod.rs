@@ -88,7 +88,7 @@ pub struct GltfFile {
 
 /// Location of an image's bytes.
 #[derive(Debug, PartialEq)]
-pub enum ImageBytes<'a> {
+pub enum ImageLocation<'a> {
     /// In the glTF file itself.
     Inside(&'a [u8]),
     /// In a separate file.
@@ -157,7 +157,7 @@ impl GltfFile {
             companions,
             first_part_with_same_mesh: Vec::new(),
         };
-        container.first_part_with_same_mesh = container.deduplicate_parts().map_err(wrong)?;
+        container.first_part_with_same_mesh = container.map_duplicate_parts().map_err(wrong)?;
         monitor.report_progress(2 * length, 2 * length)?;
         Ok(container)
     }
@@ -168,7 +168,7 @@ impl GltfFile {
     }
 
     /// Buffer files outside the glTF file.
-    pub fn companions(&self) -> &[Companion] {
+    pub fn external_buffers(&self) -> &[Companion] {
         &self.companions
     }
 
@@ -190,8 +190,8 @@ impl GltfFile {
     ///
     /// # Errors
     /// The image does not exist, or its bytes are out of range.
-    pub fn locate_image(&self, number: usize) -> Result<ImageBytes<'_>, AssetError> {
-        self.image_bytes(number)
+    pub fn locate_image(&self, number: usize) -> Result<ImageLocation<'_>, AssetError> {
+        self.find_image_location(number)
             .map_err(|wrong| self.malformed_error(wrong.add_location(format!("images[{number}]"))))
     }
 
@@ -199,29 +199,29 @@ impl GltfFile {
     ///
     /// # Errors
     /// Same as [`GltfFile::locate_image`]. Also fails if the image file cannot be read.
-    pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
+    pub fn read_image_bytes(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
         match self.locate_image(number)? {
-            ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
-            ImageBytes::File(file) => {
+            ImageLocation::Inside(bytes) => Ok(bytes.to_vec()),
+            ImageLocation::File(file) => {
                 read::read_bytes(&file, FILE_LIMIT, Monitor { progress: &ignore_progress, token })
             }
         }
     }
 
-    fn image_bytes(&self, number: usize) -> Result<ImageBytes<'_>, GltfError> {
+    fn find_image_location(&self, number: usize) -> Result<ImageLocation<'_>, GltfError> {
         let images = &self.root.images;
         let image = images
             .get(number)
             .ok_or_else(|| GltfError::index_out_of_range("images", number, images.len()))?;
         match (&image.uri, image.buffer_view) {
-            (Some(Uri::Data(bytes)), _) => Ok(ImageBytes::Inside(bytes)),
-            (Some(Uri::File(uri)), _) => Ok(ImageBytes::File(resolve_uri(&self.path, uri)?)),
+            (Some(Uri::Data(bytes)), _) => Ok(ImageLocation::Inside(bytes)),
+            (Some(Uri::File(uri)), _) => Ok(ImageLocation::File(resolve_uri(&self.path, uri)?)),
             (None, Some(view)) => {
                 let views = &self.root.buffer_views;
                 let json = views
                     .get(view)
                     .ok_or_else(|| GltfError::index_out_of_range("bufferViews", view, views.len()))?;
-                accessor::view_bytes(self, json).map(ImageBytes::Inside)
+                accessor::view_bytes(self, json).map(ImageLocation::Inside)
             }
             (None, None) => Err(GltfError::new("it has neither a URI nor a buffer view")),
         }
@@ -238,7 +238,7 @@ impl GltfFile {
 
     /// Maps each part to the first part with the same mesh. Rejects files whose meshes reuse the same buffer
     /// bytes so often that they would need many times the file size in memory.
-    fn deduplicate_parts(&self) -> Result<Vec<usize>, GltfError> {
+    fn map_duplicate_parts(&self) -> Result<Vec<usize>, GltfError> {
         /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
         let mut first = HashMap::new();
@@ -286,8 +286,8 @@ impl GltfFile {
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {
-            ImageBytes::File(file) => image::size(&file, encoding, limits, token),
-            ImageBytes::Inside(bytes) => {
+            ImageLocation::File(file) => image::size(&file, encoding, limits, token),
+            ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
                 image::size_embedded(image, encoding, limits, token)
             }
@@ -302,8 +302,8 @@ impl GltfFile {
     pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let texels = match self.locate_image(number)? {
-            ImageBytes::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),
-            ImageBytes::Inside(bytes) => {
+            ImageLocation::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),
+            ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
                 image::load_embedded(image, encoding, limits, &ignore_progress, token)
             }

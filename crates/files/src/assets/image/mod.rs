@@ -193,7 +193,7 @@ fn load_source(
     monitor.report_progress(0, length)?;
     let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
-        if let Some(words) = convert::alpha_warning(&image, encoding, &metadata) {
+        if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
             metadata.warn(words);
         }
         Ok((convert::texels(image, encoding, &metadata), metadata.warnings))
@@ -300,7 +300,7 @@ pub fn build_coverage_mipmaps(
     cutoff: f32,
     token: &CancelToken,
 ) -> Result<Mipmaps, Cancelled> {
-    mipmaps(&texels.threshold(cutoff), token)
+    mipmaps(&texels.threshold_red_channel(cutoff), token)
 }
 
 /// Bytes of an image: an open file, a file in memory, or an embedded image.

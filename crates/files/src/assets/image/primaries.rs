@@ -77,7 +77,7 @@ pub(super) fn is_identity(matrix: &DMat3) -> bool {
 
 /// Matrix from XYZ with this white point to linear Rec. 709.
 fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
-    let to_cones = bradford_matrix();
+    let to_cones = bradford_cone_response();
     let [from, to] = [white, Primaries::REC_709.white_xyz()].map(|white| to_cones * white);
     let adapted = inverse(to_cones)? * DMat3::from_diagonal(to / from) * to_cones;
     let matrix = inverse(Primaries::REC_709.to_xyz()?)? * adapted;
@@ -85,7 +85,7 @@ fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
 }
 
 /// Bradford cone response matrix (Lam, *Metamerism and Colour Constancy*, University of Bradford, 1985).
-fn bradford_matrix() -> DMat3 {
+fn bradford_cone_response() -> DMat3 {
     DMat3::from_cols_array(&[0.8951, -0.7502, 0.0389, 0.2664, 1.7135, -0.0685, -0.1614, 0.0367, 1.0296])
 }
 

@@ -139,7 +139,7 @@ impl ColorSpace {
     }
 
     /// Creates a color space that differs from the default only in its primaries.
-    pub(super) fn from_rec_709_matrix(matrix: DMat3) -> Self {
+    pub(super) fn with_matrix_to_rec_709(matrix: DMat3) -> Self {
         Self::new(None, matrix)
     }
 

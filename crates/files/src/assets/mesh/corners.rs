@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::parsed::ParsedMesh;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::NormalGroup;
+use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::Vec2;
 
 /// Number of corners between polls of the cancel token.
@@ -53,7 +53,8 @@ pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Re
     if !colors.is_empty() {
         parsed.colors = new_colors;
     }
-    let group = |vertex: &usize| NormalGroup { normal: *vertex as u32, group: NormalGroup::BY_ANGLE };
+    let group =
+        |vertex: &usize| VertexNormalGroup { normal: *vertex as u32, group: VertexNormalGroup::BY_ANGLE };
     parsed.normal_groups = sources.iter().map(group).collect();
     Ok(())
 }

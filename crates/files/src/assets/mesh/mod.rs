@@ -43,7 +43,7 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let (parse, read): (ParseFn, ReadFn) = match extension.as_str() {
+    let (parse, read): (ParseFn, ReadFileFn) = match extension.as_str() {
         "obj" => (obj::parse, read::read_text),
         "off" => (off::parse, read::read_text_or_binary),
         "ply" => (ply::parse, read::read_text_or_binary),
@@ -83,7 +83,7 @@ pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
 }
 
 type ParseFn = fn(&MeshSource<'_>) -> Result<LoadedMesh, AssetError>;
-type ReadFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
+type ReadFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]

@@ -132,7 +132,7 @@ impl OffColors {
         self.all.extend(std::iter::repeat_n(color, times));
     }
 
-    fn add_alpha(&mut self, alpha: f64, at: usize) {
+    fn track_lowest_alpha(&mut self, alpha: f64, at: usize) {
         if self.least_alpha.is_none_or(|(least, _)| alpha < least) {
             self.least_alpha = Some((alpha, at));
         }
@@ -313,7 +313,7 @@ impl OffReader<'_> {
     fn add_color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
         colors.push(color, times, self.cursor.offset());
         match color {
-            [_, _, _, alpha] => colors.add_alpha(*alpha, self.cursor.offset()),
+            [_, _, _, alpha] => colors.track_lowest_alpha(*alpha, self.cursor.offset()),
             [_] => self.indices.add(self.cursor.offset()),
             [] | [_, _, _] => {}
             [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.offset()),

@@ -43,14 +43,14 @@ pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
 }
 
 fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
-    let [a, b] = [0, 1].map(|which| tile_features(pair, which, tile, filters));
+    let [a, b] = [0, 1].map(|which| perceived_colors_and_features(pair, which, tile, filters));
     let colors = a.0.iter().zip(&b.0).map(|(a, b)| color_error(a.distance(b), max));
     let features = a.1.differences(&b.1);
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
 
 /// Computes the perceived colors and the features of one image within a tile.
-fn tile_features(
+fn perceived_colors_and_features(
     pair: &Pair,
     which: usize,
     tile: Rect,

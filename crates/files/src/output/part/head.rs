@@ -290,7 +290,7 @@ const FILE: &str = "file ";
 
 impl Dependency {
     /// Creates an input for a setting.
-    pub fn setting(name: &str, value: impl Into<String>) -> Self {
+    pub fn from_setting(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }
     }
 
@@ -300,7 +300,7 @@ impl Dependency {
     }
 
     /// Creates the input that contains the hash of everything the image depends on.
-    pub fn combined_hash(key: impl Into<String>) -> Self {
+    pub fn from_combined_hash(key: impl Into<String>) -> Self {
         Self { name: EVERYTHING.to_owned(), value: key.into() }
     }
 }

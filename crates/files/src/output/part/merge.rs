@@ -172,9 +172,9 @@ fn sum_blocks(
     let mut sum = StoredTile::default();
     for (index, position) in order.values() {
         let (part, stored) = &tiles[*index];
-        let added = sum.add_block(stored, *position);
+        let added = sum.add_block_from(stored, *position);
         added.map_err(|_| damaged(part, format!("a block of tile {tile} is missing")))?;
     }
-    tiles.iter().for_each(|(_, stored)| sum.add_counts(stored));
+    tiles.iter().for_each(|(_, stored)| sum.add_counts_from(stored));
     Ok(Some((sum, order.len() == block_count as usize)))
 }

@@ -8,14 +8,14 @@ use std::sync::mpsc::{self, SyncSender};
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Durability, WritePolicy, atomic_with};
+use super::super::write::{Durability, WritePolicy, atomic_generated};
 use super::{Digest, FOOTER, Footer, MARK, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
 /// may keep adding samples to the film. Each tile is written with the samples it has at that moment. Returns
-/// the file, like [`atomic_with`].
+/// the file, like [`atomic_generated`].
 ///
 /// # Errors
 /// The file cannot be written.
@@ -27,7 +27,7 @@ pub fn save(
     guard: &WritePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
-    atomic_with(path, &|file| write(file, head, film, state, token), guard, (token, durability))
+    atomic_generated(path, &|file| write(file, head, film, state, token), guard, (token, durability))
 }
 
 /// Size of the chunks passed to the writing thread.

@@ -37,9 +37,9 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
     PartHeader {
         kind: PartKind::Part,
         identity: vec![
-            Dependency::setting("seed", "7"),
+            Dependency::from_setting("seed", "7"),
             Dependency::file("knot.obj", "12ab"),
-            Dependency::combined_hash("ff"),
+            Dependency::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
         picture: ImageHeader::new(film, &finish()),
@@ -230,7 +230,8 @@ fn metadata_differences_are_listed() {
 
 #[test]
 fn parts_from_different_builds_do_not_match() {
-    let inputs = |build: &str| vec![Dependency::setting("glimt", build), Dependency::setting("width", "4")];
+    let inputs =
+        |build: &str| vec![Dependency::from_setting("glimt", build), Dependency::from_setting("width", "4")];
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
     assert_eq!(dependency_differences(&a, &a, ("here", "there")), [""; 0]);
     let found = dependency_differences(&a, &b, ("here", "there"));

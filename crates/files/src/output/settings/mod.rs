@@ -126,7 +126,7 @@ pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
             return Ok(info);
         }
     }
-    read_header(&start).map_err(|why| match why {
+    read_info_from_start(&start).map_err(|why| match why {
         Some(why) => ImageInfoError::Damaged { path: path.to_owned(), why },
         None => ImageInfoError::NotAnImage { path: path.to_owned() },
     })
@@ -142,7 +142,7 @@ fn read_start(file: &File) -> std::io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// Description of the damage to the header. `None` if the file has another format.
-fn read_header(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
+fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => read_png(bytes).ok_or_else(|| wrong("PNG")),

@@ -21,7 +21,7 @@ fn settings_round_trip_in_all_image_formats() {
     for extension in Format::extensions() {
         let format = Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format");
         let bytes = encode(&image, &options, format, &CancelToken::new()).expect("encoded");
-        let mut info = read_header(&bytes).expect(extension);
+        let mut info = read_info_from_start(&bytes).expect(extension);
         assert_eq!(info.size, Some((12, 7)), "{extension}");
         assert_eq!(info.program.as_deref(), Some(SOFTWARE), "{extension}");
         assert!(info.is_written_by_glimt() && info.frames.is_none());
@@ -42,7 +42,7 @@ fn settings_round_trip_in_animations() {
         [(AnimationFormat::Gif, "GIF", Some(3)), (AnimationFormat::Apng, "APNG", Some(3))]
     {
         let bytes = animation::encode(&vec![frame.clone(); 3], &settings(), format, &CancelToken::new());
-        let mut info = read_header(&bytes.expect("encoded")).expect("read");
+        let mut info = read_info_from_start(&bytes.expect("encoded")).expect("read");
         assert_eq!((info.format.as_str(), info.size, info.frames), (name, Some((5, 4)), frames));
         info.settings.sort();
         assert_eq!(info.settings.len(), 3);
@@ -55,9 +55,9 @@ fn foreign_images_have_no_settings() {
     let mut bytes = Vec::new();
     let foreign = image::RgbImage::new(3, 2);
     foreign.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("encoded");
-    let info = read_header(&bytes).expect("an image");
+    let info = read_info_from_start(&bytes).expect("an image");
     assert!(!info.is_written_by_glimt() && info.settings.is_empty() && info.size == Some((3, 2)));
-    assert_eq!(read_header(b"[camera]\n"), Err(None));
+    assert_eq!(read_info_from_start(b"[camera]\n"), Err(None));
 }
 
 /// A truncated or corrupted header is either an error or read as an image without settings.
@@ -76,7 +76,7 @@ fn corrupt_headers_do_not_panic() {
     let mut next = crate::math::random::unit_generator(5);
     for bytes in files {
         for end in 0..bytes.len() {
-            let _ = read_header(&bytes[..end]);
+            let _ = read_info_from_start(&bytes[..end]);
         }
         for _ in 0..300 {
             let mut bytes = bytes.clone();
@@ -84,7 +84,7 @@ fn corrupt_headers_do_not_panic() {
                 let at = (next() * bytes.len() as f32) as usize % bytes.len();
                 bytes[at] = (next() * 256.0) as u8;
             }
-            let _ = read_header(&bytes);
+            let _ = read_info_from_start(&bytes);
         }
     }
 }
@@ -110,5 +110,5 @@ fn all_gif_frames_are_counted() {
     let cut = read_info(&path).expect("read");
     assert_eq!((cut.frames, cut.size), (None, Some((400, 400))));
     let local = b"GIF89a\x01\0\x01\0\0\0\0,\0\0\0\0\x01\0\x01\0\x80\0\0\0\xff\xff\xff\x02\x02L\x01\0;";
-    assert_eq!(read_header(local).expect("read").frames, Some(1));
+    assert_eq!(read_info_from_start(local).expect("read").frames, Some(1));
 }

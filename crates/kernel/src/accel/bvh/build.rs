@@ -35,7 +35,7 @@ pub(super) struct PrimitiveReference {
 
 impl PrimitiveReference {
     /// Twice the center of the box.
-    fn centroid(&self) -> Vec3 {
+    fn doubled_center(&self) -> Vec3 {
         self.bounds.min + self.bounds.max
     }
 }
@@ -112,7 +112,7 @@ fn build_subtree(
     token: &CancelToken,
 ) -> Result<BuiltSubtree, Cancelled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
-    let Some((middle, by_size)) = partition(references, bounds, &start) else {
+    let Some((middle, by_size)) = partition_unless_leaf_is_cheaper(references, bounds, &start) else {
         let leaf = ChildRef { first: start.place as u32, count: references.len() as u32 };
         return Ok(BuiltSubtree { root: leaf, bounds, depth: 0, is_nested: false });
     };
@@ -146,7 +146,7 @@ fn build_subtree(
 
 /// Partitions the references into two halves. Returns the size of the first half and whether the split was by
 /// size, or `None` if a leaf is cheaper.
-fn partition(
+fn partition_unless_leaf_is_cheaper(
     references: &mut [PrimitiveReference],
     bounds: Aabb,
     start: &OutputPosition,
@@ -155,7 +155,7 @@ fn partition(
     if count == 1 {
         return None;
     }
-    let centroids = Aabb::from_points(references.iter().map(PrimitiveReference::centroid));
+    let centroids = Aabb::from_points(references.iter().map(PrimitiveReference::doubled_center));
     let split = (start.depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
     let is_above_median = start.depth < SURFACE_AREA_LEVELS;
     match split {
@@ -175,7 +175,7 @@ fn partition(
         None if count > LEAF_SIZE => {
             let axis = longest_axis(centroids.extent());
             references.select_nth_unstable_by(count / 2, |a, b| {
-                a.centroid()[axis].total_cmp(&b.centroid()[axis]).then(a.id.cmp(&b.id))
+                a.doubled_center()[axis].total_cmp(&b.doubled_center()[axis]).then(a.id.cmp(&b.id))
             });
             Some((count / 2, false))
         }
@@ -218,7 +218,7 @@ struct Split {
 
 impl Split {
     fn is_left(&self, reference: &PrimitiveReference) -> bool {
-        bin_index(reference.centroid()[self.axis], self.start, self.bins_per_length) < self.bin
+        bin_index(reference.doubled_center()[self.axis], self.start, self.bins_per_length) < self.bin
     }
 }
 
@@ -233,7 +233,7 @@ fn best_split(references: &[PrimitiveReference], centroids: Aabb) -> Option<Spli
     let mut bounds = [[Aabb::EMPTY; BINS]; 3];
     let mut counts = [[0_u32; BINS]; 3];
     for reference in references {
-        let centroid = reference.centroid();
+        let centroid = reference.doubled_center();
         for axis in 0..3 {
             let bin = bin_index(centroid[axis], centroids.min[axis], bins_per_length[axis]);
             bounds[axis][bin] = bounds[axis][bin].union(reference.bounds);

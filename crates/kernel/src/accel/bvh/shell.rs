@@ -108,7 +108,7 @@ pub enum OverlappingItem {
     /// A primitive whose surface may intersect the box.
     Primitive(u32),
     /// A subtree in which every primitive encloses the box, identified by its index in
-    /// [`Bvh::last_primitives_of_subtrees`].
+    /// [`Bvh::highest_ids_by_subtree`].
     Enclosing(usize),
 }
 
@@ -121,7 +121,7 @@ impl Bvh {
     }
 
     /// Adds shells if many primitives are nested. `shell` returns the shell of one primitive.
-    pub fn with_shells(self, shell: impl Fn(u32) -> SphericalShell) -> Self {
+    pub fn with_shells_if_nested(self, shell: impl Fn(u32) -> SphericalShell) -> Self {
         if !self.is_nested {
             return self;
         }
@@ -132,7 +132,7 @@ impl Bvh {
 
     /// For each subtree, the `N` highest primitive ids that satisfy `counts`, in descending order. Empty
     /// without shells.
-    pub fn last_primitives_of_subtrees<const N: usize>(
+    pub fn highest_ids_by_subtree<const N: usize>(
         &self,
         counts: impl Fn(u32) -> bool,
     ) -> Vec<ArrayVec<u32, N>> {

@@ -21,7 +21,7 @@ fn tree(spheres: &[Sphere]) -> Bvh {
     let boxes: Vec<_> = spheres.iter().map(Sphere::bounds).collect();
     let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
     tree.validate(&boxes).expect("a valid tree");
-    tree.with_shells(|id| {
+    tree.with_shells_if_nested(|id| {
         SphericalShell::from_sphere(spheres[id as usize].center, spheres[id as usize].radius)
     })
 }
@@ -76,7 +76,7 @@ fn nested_box_queries_match_brute_force() {
     for spread in [0.0, 1e-4, 0.02] {
         let spheres = spheres(200, spread);
         let tree = tree(&spheres);
-        let last = tree.last_primitives_of_subtrees::<3>(|id| id.is_multiple_of(2));
+        let last = tree.highest_ids_by_subtree::<3>(|id| id.is_multiple_of(2));
         let mut next = random(3);
         for i in 0..500 {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;

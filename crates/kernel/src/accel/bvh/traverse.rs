@@ -17,14 +17,14 @@ impl Bvh {
         if let Some(shells) = &self.shells {
             self.closest_hit_with_shells(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
-            self.closest_hit_with_stack::<SHALLOW_STACK>(ray, test);
+            self.closest_hit_with_stack_size::<SHALLOW_STACK>(ray, test);
         } else {
-            self.closest_hit_with_stack::<DEEP_STACK>(ray, test);
+            self.closest_hit_with_stack_size::<DEEP_STACK>(ray, test);
         }
     }
 
     #[inline]
-    fn closest_hit_with_stack<const STACK_SIZE: usize>(
+    fn closest_hit_with_stack_size<const STACK_SIZE: usize>(
         &self,
         ray: &Ray,
         mut test: impl FnMut(u32, f32) -> Option<f32>,
@@ -88,15 +88,15 @@ impl Bvh {
         if let Some(shells) = &self.shells {
             self.any_hit_with_shells(shells, ray, &mut test)
         } else if self.depth < SHALLOW_STACK {
-            self.any_hit_with_stack::<SHALLOW_STACK>(ray, test)
+            self.any_hit_with_stack_size::<SHALLOW_STACK>(ray, test)
         } else {
-            self.any_hit_with_stack::<DEEP_STACK>(ray, test)
+            self.any_hit_with_stack_size::<DEEP_STACK>(ray, test)
         }
     }
 
     /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend. `own` receives the id and depth of each leaf entry.
-    pub fn visit_along_ray(
+    pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
         mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool,
@@ -139,7 +139,7 @@ impl Bvh {
     }
 
     #[inline]
-    fn any_hit_with_stack<const STACK_SIZE: usize>(
+    fn any_hit_with_stack_size<const STACK_SIZE: usize>(
         &self,
         ray: &Ray,
         mut test: impl FnMut(u32) -> bool,

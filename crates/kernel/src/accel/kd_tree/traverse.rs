@@ -57,7 +57,7 @@ impl PlaneRay {
 
     /// Interval of the ray inside a box.
     fn box_interval(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
-        let (mut near, mut far) = (0.0_f32, self.scaled_end(t_max));
+        let (mut near, mut far) = (0.0_f32, self.scale_ray_end(t_max));
         for axis in 0..3 {
             let (low, high) =
                 (self.plane_distance(axis, bounds.min[axis]), self.plane_distance(axis, bounds.max[axis]));
@@ -70,7 +70,7 @@ impl PlaneRay {
 
     /// Scaled ray parameter at which a ray with end `t_max` ends.
     #[inline(always)]
-    fn scaled_end(&self, t_max: f32) -> f32 {
+    fn scale_ray_end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
@@ -149,7 +149,7 @@ impl KdTree {
                 NodeKind::Leaf { first, count } => {
                     let references = &self.references[first as usize..][..count as usize];
                     let Some(t_max) = test(references) else { return };
-                    let end = planes.scaled_end(t_max);
+                    let end = planes.scale_ray_end(t_max);
                     loop {
                         if size == 0 {
                             return;

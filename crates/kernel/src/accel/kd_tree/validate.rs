@@ -59,8 +59,9 @@ impl KdTree {
                     }
                     let [below, above] = split_box(cell, axis, at);
                     for (place, cell) in [(right, above), (place + 1, below)] {
-                        let touches =
-                            |id: &&u32| !ClippedTriangle::clipped(corners(**id), &cell).points().is_empty();
+                        let touches = |id: &&u32| {
+                            !ClippedTriangle::clip_to_box(corners(**id), &cell).points().is_empty()
+                        };
                         let inside = inside.iter().filter(touches).copied().collect();
                         pending.push(NodeVisit { place, cell, depth: depth + 1, inside });
                     }
@@ -96,7 +97,7 @@ fn check_leaf(
     if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
         return Err(format!("leaf {place} refers to a triangle twice"));
     }
-    if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::from_points(corners(id)))) {
+    if let Some(id) = sorted.iter().find(|&&id| !boxes_overlap(cell, &Aabb::from_points(corners(id)))) {
         return Err(format!("leaf {place} refers to triangle {id}, which is outside its cell"));
     }
     let must = |id: &&u32| triangle_enters_cell(cell, corners(**id));
@@ -106,13 +107,13 @@ fn check_leaf(
     }
 }
 
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
+fn boxes_overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
 /// Whether a triangle extends into a cell, not counting parts of the triangle that are in a face of the cell.
 fn triangle_enters_cell(cell: &Aabb, corners: [Vec3; 3]) -> bool {
-    let (min, max) = ClippedTriangle::clipped(corners, cell).bounds();
+    let (min, max) = ClippedTriangle::clip_to_box(corners, cell).bounds();
     (0..3).all(|axis| {
         let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
         let rounding = 1e-12 * low.abs().max(high.abs());

@@ -108,7 +108,7 @@ impl WideBvh {
 
     /// Visits the nodes whose boxes the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn visit_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
@@ -146,7 +146,7 @@ impl WideBvh {
     pub fn closest_hit_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
-        if !self.nodes.is_empty() && !simd::closest_hit_packet(self, rays, ends, hits) {
+        if !self.nodes.is_empty() && !simd::try_closest_hit_packet(self, rays, ends, hits) {
             for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
                 *hit = self.closest_hit(&Ray { t_max: ends[lane], ..rays[lane] });
             }
@@ -160,7 +160,7 @@ impl WideBvh {
         if self.nodes.is_empty() {
             return 0;
         }
-        if let Some(bits) = simd::any_hit_packet(self, rays, ends, except) {
+        if let Some(bits) = simd::try_any_hit_packet(self, rays, ends, except) {
             return bits;
         }
         let alone = |lane: usize| {
@@ -173,7 +173,7 @@ impl WideBvh {
         let mut bits = 0;
         for_each_coherent_group(rays, ends, |group, count| {
             let as_packet =
-                (count >= SMALL_GROUP).then(|| simd::any_hit_packet(self, rays, group, except)).flatten();
+                (count >= SMALL_GROUP).then(|| simd::try_any_hit_packet(self, rays, group, except)).flatten();
             let one_by_one = || (0..rays.len()).filter(|&lane| group[lane] >= 0.0).map(alone).sum();
             bits |= as_packet.unwrap_or_else(one_by_one);
         });
@@ -293,8 +293,8 @@ fn for_each_coherent_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::packet_t_max;
-    use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, rays};
+    use crate::accel::packet_ray_ends;
+    use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, difficult_rays};
     use crate::geometry::watertight::ShearedRay;
     use crate::math::random::signed_generator as random;
 
@@ -323,7 +323,7 @@ mod tests {
                 of_each(mesh).iter().flat_map(|tree| InstructionSet::ALL.map(|one| (tree, one)))
             {
                 let tree = tree.clone().with_instruction_set(instructions);
-                for ray in rays(mesh) {
+                for ray in difficult_rays(mesh) {
                     let expected = closest_by_brute_force(mesh, &ray);
                     let found = tree.closest_hit(&ray);
                     assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
@@ -340,7 +340,8 @@ mod tests {
     /// Packets of all sizes. Some contain rays in similar directions, others random rays.
     fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
         let mut next = random(17);
-        let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET_SIZE).map(<[Ray]>::to_vec).collect();
+        let mut packets: Vec<Vec<Ray>> =
+            difficult_rays(mesh).chunks(PACKET_SIZE).map(<[Ray]>::to_vec).collect();
         for i in 0..600 {
             let origin = Vec3::new(next(), next(), next()) * 15.0;
             let triangle = mesh.get(i * 7 % mesh.len().max(1)).copied().unwrap_or([Vec3::ZERO; 3]);
@@ -365,7 +366,7 @@ mod tests {
                 tree = tree.with_instruction_set(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
-                    tree.closest_hit_packet(&rays, &packet_t_max(&rays), &mut found);
+                    tree.closest_hit_packet(&rays, &packet_ray_ends(&rays), &mut found);
                     let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
                     let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
                         let bits = |hit: &ShapeHit| {
@@ -377,7 +378,7 @@ mod tests {
                     let except: Vec<_> = (0..rays.len())
                         .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
                         .collect();
-                    let any = tree.any_hit_packet(&rays, &packet_t_max(&rays), &except);
+                    let any = tree.any_hit_packet(&rays, &packet_ray_ends(&rays), &except);
                     for (i, ray) in rays.iter().enumerate() {
                         let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
                         let others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
@@ -409,22 +410,22 @@ mod tests {
             let are_vectors = tree.instruction_set() != InstructionSet::Portable;
             let mut hits = [None; PACKET_SIZE];
             assert_eq!(
-                simd::closest_hit_packet(&tree, &rays, &packet_t_max(&rays), &mut hits),
+                simd::try_closest_hit_packet(&tree, &rays, &packet_ray_ends(&rays), &mut hits),
                 are_vectors,
                 "{instructions:?}"
             );
             assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET_SIZE } else { 0 });
             let all = (1 << PACKET_SIZE) - 1;
             assert_eq!(
-                simd::any_hit_packet(&tree, &rays, &packet_t_max(&rays), &[]),
+                simd::try_any_hit_packet(&tree, &rays, &packet_ray_ends(&rays), &[]),
                 are_vectors.then_some(all)
             );
             assert!(
-                !simd::closest_hit_packet(&tree, &apart, &packet_t_max(&apart), &mut hits[..2]),
+                !simd::try_closest_hit_packet(&tree, &apart, &packet_ray_ends(&apart), &mut hits[..2]),
                 "{instructions:?}"
             );
             assert_eq!(
-                simd::any_hit_packet(&tree, &apart, &packet_t_max(&apart), &[]),
+                simd::try_any_hit_packet(&tree, &apart, &packet_ray_ends(&apart), &[]),
                 None,
                 "{instructions:?}"
             );

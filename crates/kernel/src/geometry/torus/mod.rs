@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
-    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, radial_direction, unrounded_t,
+    self, AxialFrame, LocalLine, direction_at_u, radial_direction, u_from_direction, unrounded_t,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
@@ -55,7 +55,7 @@ impl Torus {
             return None;
         }
         let t = line.start + unit_line.first_crossing(from, leave)? * unit;
-        ray.accept(t).map(|_| (t, 0))
+        ray.round_if_in_range(t).map(|_| (t, 0))
     }
 
     /// The line through a ray, the same line in units of the circle's radius, and the length of that unit in
@@ -72,11 +72,11 @@ impl Torus {
     }
 
     /// Values of t (at most two) at which a ray that starts outside enters the torus.
-    pub fn entry_points(&self, ray: &RayF64) -> [Option<f64>; 2] {
+    pub fn entry_parameters(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
-        unit_line.entry_points(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
+        unit_line.entry_parameters(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
     /// Surface point at a hit.
@@ -95,7 +95,7 @@ impl Torus {
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let (out, from_circle) = self.circle_directions(point);
-        DVec2::new(angle_to_u(out), angle_to_u(from_circle))
+        DVec2::new(u_from_direction(out), u_from_direction(from_circle))
     }
 
     /// Mean curvature at a point on the surface.
@@ -113,7 +113,7 @@ impl Torus {
         SurfacePoint::from_f64(
             point,
             normal,
-            Vec2::new(angle_to_u(out) as f32, angle_to_u(from_circle) as f32),
+            Vec2::new(u_from_direction(out) as f32, u_from_direction(from_circle) as f32),
             self.frame.vector_to_world((out.perp() * (TAU * ring)).extend(0.0)),
             self.frame.vector_to_world((out * -up).extend(across) * (TAU * self.tube)),
             reach,
@@ -243,7 +243,9 @@ mod tests {
     #[test]
     fn entries_are_complete_and_in_order() {
         let entries = |origin: Vec3, direction: Vec3| {
-            ring().entry_points(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
+            ring()
+                .entry_parameters(&Ray::new(origin, direction).to_f64())
+                .map(|entry| entry.map(|t| t as f32))
         };
         let x = |x: f32| Vec3::new(x, 0.0, 0.0);
         assert_eq!(entries(x(-9.0), Vec3::X), [Some(6.5), Some(10.5)]);

@@ -49,7 +49,7 @@ impl ShapeEmitter for BoxEmitter {
             if is_first { values[0] } else { rest }
         };
         let face = BoxFace {
-            rectangle: SphericalRectangle::combine_three(faces.map(|face| face.rectangle), of),
+            rectangle: SphericalRectangle::zip_fields(faces.map(|face| face.rectangle), of),
             solid_angle: of([a, b, c]),
         };
         let rest = (target - of([0.0, a, a + b])) / face.solid_angle;
@@ -73,7 +73,7 @@ impl ShapeEmitter for BoxEmitter {
         let own = own.into_iter().find(|(_, (_, axis))| axis.dot(met.normal).abs() > 0.9);
         match own {
             Some((_, (face, _))) if !(face.solid_angle > 0.0) => 0.0,
-            Some((_, (face, _))) if face.rectangle.is_accurate() => 1.0 / total,
+            Some((_, (face, _))) if face.rectangle.has_accurate_solid_angle() => 1.0 / total,
             Some((k, (face, _))) => {
                 let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
                 met.uniform_area_pdf(f64::from(area)) * (face.solid_angle / total)
@@ -117,7 +117,8 @@ impl BoxFace {
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
         let (_, _, by_area) = rectangle.sample_by_area([0.5; 2]);
-        let solid_angle = if rectangle.is_accurate() { rectangle.solid_angle() } else { by_area };
+        let solid_angle =
+            if rectangle.has_accurate_solid_angle() { rectangle.solid_angle() } else { by_area };
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
 
@@ -126,7 +127,7 @@ impl BoxFace {
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;
         let (by_area, [x, y]) = (rectangle.sample_by_area(u), rectangle.sample(u));
-        let is_accurate = rectangle.is_accurate();
+        let is_accurate = rectangle.has_accurate_solid_angle();
         (
             if is_accurate { x } else { by_area.0 },
             if is_accurate { y } else { by_area.1 },

@@ -127,7 +127,7 @@ impl DiskView {
 
     /// Upper bound on the solid angle. It is at most 20 % too large.
     #[inline(always)]
-    pub fn solid_angle(&self) -> f64 {
+    pub fn solid_angle_bound(&self) -> f64 {
         TAU * self.a * self.b / (self.p * self.q).sqrt()
     }
 
@@ -158,7 +158,7 @@ impl DiskView {
     /// Computes the inverse pdf from cos²φ and Q + √Q.
     #[inline(always)]
     fn inverse_pdf(&self, cos2: f64, slice: f64) -> f64 {
-        self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
+        self.solid_angle_bound() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
     }
 
     /// Pdf in sr⁻¹ of a direction inside the cone.

@@ -19,7 +19,7 @@ pub struct InwardEmitter {
 
 impl ShapeEmitter for InwardEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        match self.shape.encloses(point.as_dvec3()) {
+        match self.shape.encloses_point(point.as_dvec3()) {
             Some(true) => self.sample_directions(point, u),
             Some(false) => LightSamplePoint::NOTHING,
             None => self.sample_by_area(point, u),
@@ -27,7 +27,7 @@ impl ShapeEmitter for InwardEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        match self.shape.encloses(from.as_dvec3()) {
+        match self.shape.encloses_point(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
             None if self.is_first_hit(from, met.direction, met.distance) => {

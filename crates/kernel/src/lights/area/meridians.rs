@@ -33,7 +33,7 @@ impl SinCos {
         Self { sin, cos }
     }
 
-    fn add_angle(self, other: Self) -> Self {
+    fn plus_angle(self, other: Self) -> Self {
         Self {
             sin: self.sin * other.cos + self.cos * other.sin,
             cos: self.cos * other.cos - self.sin * other.sin,
@@ -41,7 +41,7 @@ impl SinCos {
     }
 
     /// Computes the sine and cosine of an angle.
-    pub fn from_angle(angle: f64) -> Self {
+    pub fn from_radians(angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self { sin, cos }
     }
@@ -55,7 +55,7 @@ impl AzimuthDistribution {
         let mut turn = SinCos { sin: 0.0, cos: 1.0 };
         let weights = std::array::from_fn(|_| {
             let own = weight(turn);
-            turn = turn.add_angle(step);
+            turn = turn.plus_angle(step);
             own
         });
         Self { reach: libm::atan2(reach.sin, reach.cos), share: PiecewiseLinear(weights) }

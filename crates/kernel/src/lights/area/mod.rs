@@ -71,14 +71,14 @@ pub struct AreaLight {
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
-    pub part: LightCoverage,
+    pub part: EmittingPart,
     /// Bounds on the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
 /// The part of an object to which a light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightCoverage {
+pub enum EmittingPart {
     /// The entire object.
     Whole,
     /// The triangles that the emitter lists.
@@ -185,7 +185,7 @@ pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Ar
         Shape::Plane(_) => return None,
     };
     let bounds = emission_bounds(shape, radiance)?;
-    let (side, texture, part) = (Side::Front, None, LightCoverage::Whole);
+    let (side, texture, part) = (Side::Front, None, EmittingPart::Whole);
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
@@ -290,7 +290,7 @@ impl AreaLight {
     pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.geometry());
+            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -299,7 +299,7 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn geometry(&self) -> LightGeometry {
+    pub(super) fn scene_geometry(&self) -> LightGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }

@@ -26,14 +26,14 @@ pub(crate) use triangle_packet_of;
 impl AreaLight {
     /// [`AreaLight::sample_untextured`] for the points in the mask `used`.
     #[inline(always)]
-    pub fn sample_packet(
+    pub fn sample_untextured_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.geometry();
+        let source = self.scene_geometry();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {
@@ -51,7 +51,7 @@ impl AreaLight {
                 set_lane(&mut offsets, i, quad.offset_to_corner(lane(points, i)));
             }
             let mut row = packet_of!(source, i => {
-                let sample = quad.sample_from(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
+                let sample = quad.sample_with_corner_offset(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
                 (sample.direction, sample.target, self.radiance * sample.factor)
             });
             if let Some(two) = of_two {

@@ -37,7 +37,7 @@ impl ShapeEmitter for QuadEmitter {
     /// Samples rectangles by solid angle and other parallelograms by area.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        self.sample_from(point, self.offset_to_corner(point), u)
+        self.sample_with_corner_offset(point, self.offset_to_corner(point), u)
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
@@ -45,7 +45,7 @@ impl ShapeEmitter for QuadEmitter {
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        self.solid_angle_pdf(to_corner).unwrap_or_else(|| met.uniform_area_pdf(f64::from(self.area)))
+        self.pdf_by_solid_angle(to_corner).unwrap_or_else(|| met.uniform_area_pdf(f64::from(self.area)))
     }
 
     fn center(&self) -> DVec3 {
@@ -56,14 +56,19 @@ impl ShapeEmitter for QuadEmitter {
 impl QuadEmitter {
     /// [`ShapeEmitter::sample`] with a precomputed offset from the point to the corner.
     #[inline(always)]
-    pub(super) fn sample_from(&self, point: Vec3, to_corner: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    pub(super) fn sample_with_corner_offset(
+        &self,
+        point: Vec3,
+        to_corner: Vec3,
+        u: [f32; 2],
+    ) -> LightSamplePoint {
         let by_area = self.sample_by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
                 let spherical = rectangle.project_to_sphere(to_corner, self.normal);
                 let [x, y] = spherical.sample(u);
                 let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
-                let is_accurate = spherical.is_accurate();
+                let is_accurate = spherical.has_accurate_solid_angle();
                 let x = if is_accurate { offset.x } else { by_area.0.x };
                 let y = if is_accurate { offset.y } else { by_area.0.y };
                 let z = if is_accurate { offset.z } else { by_area.0.z };
@@ -106,13 +111,13 @@ impl QuadEmitter {
     #[inline(always)]
     pub(super) fn sample_by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
-        (offset, self.inverse_area_pdf(offset))
+        (offset, self.inverse_pdf_by_area(offset))
     }
 
     /// Solid angle that the quad would have if its entire area were at this offset from the point. Not
     /// positive if the point is behind the quad.
     #[inline(always)]
-    pub(super) fn inverse_area_pdf(&self, offset: Vec3) -> f32 {
+    pub(super) fn inverse_pdf_by_area(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
         let height = -offset.dot(self.normal) * self.area;
         height * nearness * nearness * nearness
@@ -121,10 +126,12 @@ impl QuadEmitter {
     /// Pdf of solid-angle sampling in sr⁻¹, for points in front of the quad. `None` if the quad is sampled by
     /// area.
     #[inline(always)]
-    pub(super) fn solid_angle_pdf(&self, to_corner: Vec3) -> Option<f32> {
+    pub(super) fn pdf_by_solid_angle(&self, to_corner: Vec3) -> Option<f32> {
         let spherical =
             self.rectangle.as_ref().map(|rectangle| rectangle.project_to_sphere(to_corner, self.normal));
-        spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
+        spherical
+            .filter(SphericalRectangle::has_accurate_solid_angle)
+            .map(|spherical| 1.0 / spherical.solid_angle)
     }
 
     /// Vectors whose dot products with an offset from the corner are the coordinates along the edges.
@@ -194,7 +201,7 @@ impl SphericalRectangle {
 
     /// Combines three rectangles field by field. `of` maps the three values to one.
     #[inline(always)]
-    pub fn combine_three(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
+    pub fn zip_fields(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
             x: [of(three.map(|one| one.x[0])), of(three.map(|one| one.x[1]))],
             y: [of(three.map(|one| one.y[0])), of(three.map(|one| one.y[1]))],
@@ -229,7 +236,7 @@ impl SphericalRectangle {
 
     /// Whether the solid angle is precise enough for sampling.
     #[inline(always)]
-    pub fn is_accurate(&self) -> bool {
+    pub fn has_accurate_solid_angle(&self) -> bool {
         self.solid_angle >= MIN_SOLID_ANGLE
     }
 

@@ -58,7 +58,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
         let (direction, distance, factor) = match (view.side, view.cap) {
             (Some((side, meridians)), _) if u[0] < share => {
                 let (angle, density) = meridians.sample(u[1]);
-                let around = SinCos::from_angle(angle);
+                let around = SinCos::from_radians(angle);
                 let (from_pole, distance) = side.point_at(around, f64::from(u[0] / share));
                 let factor = side.cosine_extent(around) / (density * f64::from(share));
                 (side.pole().direction(from_pole, around), distance, factor)
@@ -82,7 +82,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
             (Some((side, meridians)), _) => {
                 let angle = side.pole().azimuth(met.direction);
-                share * meridians.pdf(angle) / side.cosine_extent(SinCos::from_angle(angle.abs()))
+                share * meridians.pdf(angle) / side.cosine_extent(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -104,7 +104,7 @@ impl<S: RevolutionSide> RevolutionEmitter<S> {
         let caps = self.caps.iter().flatten().map(|cap| (cap.view_from(point), cap.normal()));
         let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
         let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
-        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
+        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle_bound());
         let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
         RevolutionView { side, cap, share }
     }

@@ -53,7 +53,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
         let own = self.quad.sample(point, u);
         if by_texture {
             let direction = offset * (1.0 / offset.length_squared().sqrt());
-            let quad_pdf = self.quad.solid_angle_pdf(to_corner).unwrap_or(1.0 / by_area);
+            let quad_pdf = self.quad.pdf_by_solid_angle(to_corner).unwrap_or(1.0 / by_area);
             let density = self.share * cell_factor / by_area + (1.0 - self.share) * quad_pdf;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
             return LightSamplePoint { direction, target: point + offset, factor };
@@ -116,7 +116,7 @@ impl TexturedQuadEmitter {
             (if place > 0.0 { place as usize } else { 0 }).min(self.size[axis] - 1)
         };
         let cell_factor = self.cell_pdf_ratio(cell(0), cell(1));
-        self.share * cell_factor / self.quad.inverse_area_pdf(offset) + (1.0 - self.share) * quad_pdf
+        self.share * cell_factor / self.quad.inverse_pdf_by_area(offset) + (1.0 - self.share) * quad_pdf
     }
 
     /// Area density of a cell, relative to a constant texture.

@@ -92,7 +92,7 @@ impl ShapeEmitter for TorusEmitter {
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
         let turn = libm::sinh(tau) / view.closeness;
-        let Some(slice) = view.slice(SinCos::from_angle(turn.copysign(side))) else {
+        let Some(slice) = view.slice(SinCos::from_radians(turn.copysign(side))) else {
             return LightSamplePoint::NOTHING;
         };
         let (sine, in_slice) = slice.elevation_density(&view).sample(f64::from(u[1]));
@@ -233,7 +233,7 @@ impl TorusView {
         direction: DVec3,
     ) -> (f64, Option<f64>) {
         let ray = RayF64 { origin: self.point, direction, t_max: f64::INFINITY };
-        let entries = torus.entry_points(&ray);
+        let entries = torus.entry_parameters(&ray);
         let sum = entries.iter().flatten().map(|t| self.pdf(slices, direction * *t)).sum();
         (sum, entries[0])
     }

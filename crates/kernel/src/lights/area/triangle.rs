@@ -37,7 +37,7 @@ impl ShapeEmitter for TriangleEmitter {
         let Some((offsets, spherical)) = self.spherical_triangle(point.as_dvec3()) else {
             return LightSamplePoint::NOTHING;
         };
-        let (direction, distance, factor) = if spherical.is_accurate() {
+        let (direction, distance, factor) = if spherical.has_accurate_solid_angle() {
             let direction = spherical.sample(u.map(f64::from));
             let distance = offsets[0].dot(self.normal) / direction.dot(self.normal);
             let farthest = offsets.iter().map(|offset| offset.length()).fold(0.0, f64::max);
@@ -56,7 +56,9 @@ impl ShapeEmitter for TriangleEmitter {
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         match self.spherical_triangle(from.as_dvec3()) {
-            Some((_, spherical)) if spherical.is_accurate() => (1.0 / spherical.solid_angle) as f32,
+            Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
+                (1.0 / spherical.solid_angle) as f32
+            }
             Some(_) => met.uniform_area_pdf(self.area),
             None => 0.0,
         }
@@ -95,7 +97,7 @@ impl TriangleEmitter {
 }
 
 impl SphericalTriangle {
-    fn is_accurate(&self) -> bool {
+    fn has_accurate_solid_angle(&self) -> bool {
         (MIN_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
     }
 

@@ -15,7 +15,7 @@ use crate::math::lanes::{Vec3x16, lane};
 /// A light without extent: a point light or a spotlight.
 pub trait DeltaLight {
     /// An isotropic light with the same position, falloff, and peak intensity.
-    fn isotropic_equivalent(&self) -> &PointLight;
+    fn isotropic_at_peak_intensity(&self) -> &PointLight;
 
     /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
     fn relative_intensity(&self, away: Vec3) -> f32;
@@ -34,14 +34,15 @@ pub trait DeltaLight {
     /// position).
     #[inline(always)]
     fn direction_and_irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
-        let (direction, weight) = self.isotropic_equivalent().irradiance(point);
+        let (direction, weight) =
+            self.isotropic_at_peak_intensity().direction_and_isotropic_irradiance(point);
         (direction, weight * self.relative_intensity(-direction))
     }
 
     /// Implements [`Light::sample`](super::Light::sample). There is only one direction.
     fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.direction_and_irradiance(point);
-        let end = ShadowRayEnd::At(self.isotropic_equivalent().position.as_vec3());
+        let end = ShadowRayEnd::At(self.isotropic_at_peak_intensity().position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample {
             end,
             direction,
@@ -53,7 +54,7 @@ pub trait DeltaLight {
     /// [`DeltaLight::sample`] for a packet of points.
     #[inline(always)]
     fn sample_packet(&self, points: &Vec3x16) -> LightSamplePacket {
-        let target = self.isotropic_equivalent().position.as_vec3();
+        let target = self.isotropic_at_peak_intensity().position.as_vec3();
         packet_of!(LightGeometry::Nothing, i => {
             let (direction, weight) = self.direction_and_irradiance(lane(points, i));
             (direction, target, weight)

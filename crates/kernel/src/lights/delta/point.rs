@@ -32,7 +32,7 @@ choice! {
 impl PointLight {
     /// Unit direction to the light, and irradiance at normal incidence (0 at the light's position).
     #[inline(always)]
-    pub(super) fn irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
+    pub(super) fn direction_and_isotropic_irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
         let to_light = self.position - point.as_dvec3();
         let distance_squared = to_light.length_squared();
         let direction = (to_light * (1.0 / distance_squared.sqrt())).as_vec3();
@@ -45,7 +45,7 @@ impl PointLight {
 }
 
 impl DeltaLight for PointLight {
-    fn isotropic_equivalent(&self) -> &PointLight {
+    fn isotropic_at_peak_intensity(&self) -> &PointLight {
         self
     }
 
@@ -72,6 +72,6 @@ impl DeltaLight for PointLight {
 
     #[inline(always)]
     fn direction_and_irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
-        self.irradiance(point)
+        self.direction_and_isotropic_irradiance(point)
     }
 }

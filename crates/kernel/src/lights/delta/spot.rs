@@ -23,7 +23,7 @@ pub struct SpotLight {
 }
 
 impl DeltaLight for SpotLight {
-    fn isotropic_equivalent(&self) -> &PointLight {
+    fn isotropic_at_peak_intensity(&self) -> &PointLight {
         &self.point
     }
 

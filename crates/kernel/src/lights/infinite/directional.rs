@@ -38,7 +38,7 @@ impl DirectionalLight {
 
     /// Samples the disk uniformly over its solid angle.
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        let (direction, weight) = self.direction_and_irradiance(u);
+        let (direction, weight) = self.sample_direction_and_irradiance(u);
         (weight != Vec3::ZERO).then_some(LightSample {
             end: ShadowRayEnd::Beyond,
             direction,
@@ -50,13 +50,13 @@ impl DirectionalLight {
     /// [`DirectionalLight::sample`] for a packet.
     #[inline(always)]
     pub fn sample_packet(&self, u: &[F32x16; 2]) -> LightSamplePacket {
-        infinite_packet_of!(i => self.direction_and_irradiance([u[0][i], u[1][i]]))
+        infinite_packet_of!(i => self.sample_direction_and_irradiance([u[0][i], u[1][i]]))
     }
 
     /// Samples a unit direction to the light. Also returns the radiance divided by the pdf, or the irradiance
     /// if the light has no extent.
     #[inline(always)]
-    pub fn direction_and_irradiance(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    pub fn sample_direction_and_irradiance(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_single_direction() {
             return (self.to_light, self.irradiance);
         }
@@ -89,11 +89,11 @@ impl DirectionalLight {
 
 impl InfiniteLight for DirectionalLight {
     fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        self.direction_and_irradiance(u)
+        self.sample_direction_and_irradiance(u)
     }
 
     fn power_through(&self, area: f64) -> Vec3 {
-        (self.direction_and_irradiance([0.5; 2]).1.as_dvec3() * area).as_vec3()
+        (self.sample_direction_and_irradiance([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 
     fn bounds(&self) -> LightBounds {
@@ -107,7 +107,7 @@ impl InfiniteLight for DirectionalLight {
         }
     }
 
-    fn center(&self) -> Option<Vec3> {
+    fn direction_to_center(&self) -> Option<Vec3> {
         Some(self.to_light)
     }
 

@@ -178,7 +178,7 @@ impl InfiniteLight for Environment {
         }
     }
 
-    fn center(&self) -> Option<Vec3> {
+    fn direction_to_center(&self) -> Option<Vec3> {
         None
     }
 

@@ -189,7 +189,7 @@ impl EnvironmentMap {
         let (mut columns, mut rows) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let (x, y) = self.coordinates(lane(directions, i), turn);
+            let (x, y) = self.cell_coordinates(lane(directions, i), turn);
             (columns[i], rows[i]) = self.cell(x, y);
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
@@ -211,7 +211,7 @@ impl EnvironmentMap {
 
     #[inline(always)]
     fn texel_position(&self, direction: Vec3, turn: f32) -> TexelPosition {
-        let (x, y) = self.coordinates(direction, turn);
+        let (x, y) = self.cell_coordinates(direction, turn);
         let (column, row) = self.cell(x, y);
         let between = [x - column as f32, y - row as f32];
         TexelPosition { column, row, between, along: [between[0], self.height_fraction(row, direction.y)] }
@@ -219,7 +219,7 @@ impl EnvironmentMap {
 
     /// Cell coordinates of a unit direction.
     #[inline(always)]
-    fn coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
+    fn cell_coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
         let (width, height) = (self.texels.width as f32, self.texels.height as f32);
         let turns = 0.5 + atan2(direction.x, -direction.z) * (0.5 / PI) + turn;
         let x = (turns - turns.floor()) * width - 0.5;
@@ -258,10 +258,10 @@ impl EnvironmentMap {
         // Avoid `map` because it may not be inlined.
         let [a, b, c, d] = self.corner_indices(column, row);
         [
-            self.texels.linear_value(a),
-            self.texels.linear_value(b),
-            self.texels.linear_value(c),
-            self.texels.linear_value(d),
+            self.texels.linear_color_at_index(a),
+            self.texels.linear_color_at_index(b),
+            self.texels.linear_color_at_index(c),
+            self.texels.linear_color_at_index(d),
         ]
     }
 

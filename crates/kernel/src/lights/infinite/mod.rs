@@ -27,7 +27,7 @@ pub trait InfiniteLight {
     fn bounds(&self) -> LightBounds;
 
     /// Unit direction to the light's center. `None` if the light surrounds the scene.
-    fn center(&self) -> Option<Vec3>;
+    fn direction_to_center(&self) -> Option<Vec3>;
 
     /// Whether the light has no angular extent.
     fn is_single_direction(&self) -> bool;

@@ -96,7 +96,7 @@ impl PhotonTargets {
     }
 
     /// Total area of the targets' disks.
-    pub fn disk_area(&self) -> f64 {
+    pub fn total_disk_area(&self) -> f64 {
         PI * self.pick_by_disk.total()
     }
 
@@ -105,7 +105,7 @@ impl PhotonTargets {
     pub fn cross_section_pdf(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
         // Disks are chosen with probabilities proportional to their areas, so each one contributes the same
         // density.
-        self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
+        self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.total_disk_area()
     }
 
     /// The targets seen from an emission point.

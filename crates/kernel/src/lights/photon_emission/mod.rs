@@ -247,7 +247,7 @@ impl PhotonSource {
         match self.lights.get(number as u32).family() {
             LightFamily::Delta(light) => {
                 let sends = EmissionProfile::Light { light, spread: source.spread };
-                let PointLight { position, intensity, .. } = *light.isotropic_equivalent();
+                let PointLight { position, intensity, .. } = *light.isotropic_at_peak_intensity();
                 let (direction, ratio) = self.sample_direction_from(position, &sends, targets, u, || {
                     light.sample_direction(u.direction)
                 });
@@ -361,10 +361,10 @@ impl PhotonSource {
         let part = match light.family() {
             LightFamily::Delta(light) => {
                 let sends = EmissionProfile::Light { light, spread: source.spread };
-                targets.view_from(light.isotropic_equivalent().position, &sends).total_power_bound()
+                targets.view_from(light.isotropic_at_peak_intensity().position, &sends).total_power_bound()
                     / source.spread
             }
-            LightFamily::Infinite(_) => targets.disk_area() / disk,
+            LightFamily::Infinite(_) => targets.total_disk_area() / disk,
             LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
                     let (u, piece) = (low_discrepancy_point(i), (i as f32 + 0.5) / PLACES as f32);
@@ -402,7 +402,7 @@ impl LightEmission {
         match light.family() {
             LightFamily::Delta(light) => {
                 let spread = light.effective_solid_angle();
-                let PointLight { intensity, falloff, .. } = light.isotropic_equivalent();
+                let PointLight { intensity, falloff, .. } = light.isotropic_at_peak_intensity();
                 let power = match falloff {
                     Falloff::Square => (intensity.as_dvec3() * spread).as_vec3(),
                     Falloff::None => Vec3::ZERO,

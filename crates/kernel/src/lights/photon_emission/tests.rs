@@ -15,7 +15,7 @@ use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionTexture, Emitter, LightCoverage, MeshEmitter, UvMapping, UvTriangle, front_area_light,
+    AreaLight, EmissionTexture, Emitter, EmittingPart, MeshEmitter, UvMapping, UvTriangle, front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};

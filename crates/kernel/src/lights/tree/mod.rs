@@ -126,7 +126,7 @@ impl LightTree {
 
     /// Position of a light in tree order, where nearby lights are close together.
     #[inline(always)]
-    pub fn leaf_position(&self, light: u32) -> u32 {
+    pub fn tree_order_position(&self, light: u32) -> u32 {
         self.positions[light as usize]
     }
 

@@ -36,7 +36,11 @@ impl LightTree {
         if !self.is_single_node() {
             return None;
         }
-        Some(simd.call(ImportanceKernel { node: &self.nodes[ROOT as usize], receivers, has_lobes }))
+        Some(simd.call_out_of_line(ImportanceKernel {
+            node: &self.nodes[ROOT as usize],
+            receivers,
+            has_lobes,
+        }))
     }
 
     /// Whether the tree consists of a single node.

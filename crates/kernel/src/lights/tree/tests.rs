@@ -12,7 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{AreaLight, Emitter, Light, LightCoverage, Lights, MeshEmitter, Side, front_area_light};
+use crate::lights::{AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light};
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
@@ -133,7 +133,7 @@ proptest! {
         for _ in 0..4 {
             let (mut point, normal) = place(&mut next);
             // Also test points close to a light.
-            if let (true, Some((crate::lights::LightCenter::At(middle), _))) = (next() < 0.5, lights[0].center()) {
+            if let (true, Some((crate::lights::LightCenter::At(middle), _))) = (next() < 0.5, lights[0].center_and_geometry()) {
                 point = middle + point * 0.01;
             }
             let cut = cut_for(&tree, point, normal, NODES);
@@ -439,7 +439,7 @@ fn mesh_pdf_matches_its_samples() {
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,
-            part: LightCoverage::Listed,
+            part: EmittingPart::Listed,
             bounds,
             texture: None,
         };

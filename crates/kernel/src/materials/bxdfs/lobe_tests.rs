@@ -1,7 +1,7 @@
 //! Checks for microfacet lobes. The tests of each kind of BSDF use them. Compares values with an `f64`
 //! reference, samples with pdfs, and albedos.
 
-use crate::materials::bsdf::{DielectricSamplePacket, LobeFilter, LobeSet};
+use crate::materials::bsdf::{DielectricSamplePacket, LobeFilter, SampledLobes};
 use crate::materials::bxdf::{Bxdf, SurfaceDirections};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -132,7 +132,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// f, the part of f from the wide lobes, and the pdf, for light from each direction.
-    pub fn evaluate(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
+    pub fn evaluate(&self, lobes: SampledLobes, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
             let mut rows = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
@@ -159,7 +159,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// Directions sampled with `side` × `side` stratified random numbers.
-    pub fn sample_directions(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
+    pub fn sample_directions(&self, lobes: SampledLobes, side: u32) -> Vec<DVec3> {
         let rows = stratified_packets(side)
             .map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
         let mut all: Vec<DVec3> =
@@ -189,7 +189,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Albedo of all lobes, estimated as the mean of f·cos/pdf over samples.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
-        self.mean_sample_weight(&self.sample_directions(LobeSet::All, side))
+        self.mean_sample_weight(&self.sample_directions(SampledLobes::All, side))
     }
 
     /// [`TestSurface::sampled_albedo`] with 16 lobe choices per cell.
@@ -202,7 +202,7 @@ impl<B: Bxdf> TestSurface<B> {
             let choices =
                 std::array::from_fn(|i| ((i as f32 + next()) / PACKET_SIZE as f32).min(0.999_999_9));
             let u = [[x; PACKET_SIZE], [y; PACKET_SIZE]];
-            let directions = self.row.sample(LobeSet::All, &self.normals(), &choices, &u);
+            let directions = self.row.sample(SampledLobes::All, &self.normals(), &choices, &u);
             samples.extend((0..PACKET_SIZE).map(|i| lane(&directions, i).as_dvec3()));
         }
         self.mean_sample_weight(&samples)
@@ -210,8 +210,8 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Maximum of f·cos/pdf over samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
-        let samples = self.sample_directions(LobeSet::All, side);
-        let values = self.evaluate(LobeSet::All, &samples);
+        let samples = self.sample_directions(SampledLobes::All, side);
+        let values = self.evaluate(SampledLobes::All, &samples);
         let weights = samples.iter().zip(values).map(|(direction, (f, _, pdf))| {
             if pdf > 0.0 { f.max_element() * self.height(*direction).max(0.0) / pdf } else { 0.0 }
         });
@@ -220,7 +220,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Mean of f·cos/pdf.
     fn mean_sample_weight(&self, samples: &[DVec3]) -> DVec3 {
-        let values = self.evaluate(LobeSet::All, samples);
+        let values = self.evaluate(SampledLobes::All, samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)
@@ -245,7 +245,7 @@ impl<B: Bxdf> TestSurface<B> {
             .chunks(PACKET_SIZE)
             .map(|some| {
                 let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
-                let values = self.evaluate(LobeSet::All, &directions);
+                let values = self.evaluate(SampledLobes::All, &directions);
                 some.iter().zip(values).map(|((_, weight), (f, wide, _))| (f - wide) * *weight).sum::<DVec3>()
             })
             .sum();
@@ -256,7 +256,8 @@ impl<B: Bxdf> TestSurface<B> {
                 spherical_direction(cosine2.sqrt(), f64::from(i % steps) / f64::from(steps) * TAU)
             })
             .collect();
-        let wide: DVec3 = self.evaluate(LobeSet::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
+        let wide: DVec3 =
+            self.evaluate(SampledLobes::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
@@ -316,7 +317,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// χ² test that compares samples with the pdf in cells of the half-vector map. The statistic must be at
     /// most six standard deviations above its mean.
-    pub fn check_samples(&self, what: &str, lobes: LobeSet) {
+    pub fn check_samples(&self, what: &str, lobes: SampledLobes) {
         const CELLS: u32 = 16;
         // Near total reflection, refraction has a square-root singularity.
         let fine = if let NarrowLightPath::Refracted(_) = self.light { 36 } else { 12 };
@@ -390,9 +391,9 @@ pub fn check_values<B: Bxdf>(
             if light.z < 0.02 {
                 continue;
             }
-            let (f, _, _) = there.evaluate(LobeSet::All, &[light])[0];
+            let (f, _, _) = there.evaluate(SampledLobes::All, &[light])[0];
             let (back, _, _) =
-                TestSurface::<B>::new(point, alphas, light).evaluate(LobeSet::All, &[to_eye])[0];
+                TestSurface::<B>::new(point, alphas, light).evaluate(SampledLobes::All, &[to_eye])[0];
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
@@ -444,11 +445,11 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
         let numbers = |row: &BxdfPacket<B>, i: usize| {
             let values = row.f(&light);
             let mut bits: Vec<u32> = lane(&values.f(), i).to_array().map(f32::to_bits).to_vec();
-            for lobes in [LobeSet::All, LobeSet::Narrow] {
+            for lobes in [SampledLobes::All, SampledLobes::Narrow] {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
                 // If there is no narrow lobe, its sample is never used.
-                if lobes == LobeSet::All || row.narrow_lobe_mask() & 1 << i != 0 {
+                if lobes == SampledLobes::All || row.narrow_lobe_mask() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }

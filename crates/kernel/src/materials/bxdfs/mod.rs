@@ -17,7 +17,7 @@ pub use rough_dielectric::RoughDielectricPoint;
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobeFilter, LobeSet, NarrowLobe,
+    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes,
     UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, SurfaceDirections, facing_normal};
@@ -79,13 +79,13 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn evaluate_textures(&self, point: &TexturePoint, lookups: &mut u64) -> BxdfPoint {
                 let lookup = &mut PointLookup { point, lookups };
-                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.point(lookup))),+ }
+                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.look_up_parameters(lookup))),+ }
             }
 
             /// The material with white textures.
             #[inline]
             pub fn with_white_textures(&self) -> BxdfPoint {
-                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.point(&mut WhiteLookup))),+ }
+                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.look_up_parameters(&mut WhiteLookup))),+ }
             }
 
             /// The material's main color. Counts texture lookups in `lookups`.
@@ -105,14 +105,14 @@ macro_rules! kinds {
             /// All textures, by use.
             fn collect_textures(&self) -> TextureCollector<'_> {
                 let mut textures = TextureCollector::default();
-                match self { $(Self::$kind(material) => { material.point(&mut textures); }),+ }
+                match self { $(Self::$kind(material) => { material.look_up_parameters(&mut textures); }),+ }
                 textures
             }
 
-            /// [`BxdfMaterial::packet_color`].
+            /// [`BxdfMaterial::packet_color_parameter`].
             #[inline]
-            fn packet_color(&self) -> Option<&ColorParameter> {
-                match self { $(Self::$kind(material) => material.packet_color()),+ }
+            fn packet_color_parameter(&self) -> Option<&ColorParameter> {
+                match self { $(Self::$kind(material) => material.packet_color_parameter()),+ }
             }
 
             /// [`BxdfMaterial::is_anisotropic`].
@@ -229,9 +229,9 @@ macro_rules! kinds {
                 })+
             }
 
-            /// [`BxdfPacket::fill_lanes`] for a material of the same kind as the packet.
+            /// [`BxdfPacket::set_lanes_to_material`] for a material of the same kind as the packet.
             #[inline(always)]
-            pub fn fill_lanes(
+            pub fn set_lanes_to_material(
                 &mut self,
                 material: &NonSpecular,
                 uv: Option<&UvPacket>,
@@ -239,18 +239,18 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> u32 {
                 $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
-                    let point = material.point(&mut WhiteLookup);
-                    let texture = material.packet_color().and_then(ColorParameter::texture);
-                    return row.fill_lanes(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
+                    let point = material.look_up_parameters(&mut WhiteLookup);
+                    let texture = material.packet_color_parameter().and_then(ColorParameter::texture);
+                    return row.set_lanes_to_material(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0
             }
 
-            /// [`BxdfPacket::orient`].
+            /// [`BxdfPacket::set_normals_and_directions`].
             #[inline(always)]
-            pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
+            pub fn set_normals_and_directions(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
                 match self {
-                    $(Self::$kind(row) => row.orient(of, normals, directions),)+
+                    $(Self::$kind(row) => row.set_normals_and_directions(of, normals, directions),)+
                     $(Self::$part(_) => {}),+
                 }
             }
@@ -279,7 +279,7 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn pdf(
                 &self,
-                lobes: LobeSet,
+                lobes: SampledLobes,
                 normals: &Vec3x16,
                 wi: &Vec3x16,
                 values: &BsdfValues,
@@ -295,7 +295,7 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn sample(
                 &self,
-                lobes: LobeSet,
+                lobes: SampledLobes,
                 normals: &Vec3x16,
                 choices: &F32x16,
                 u: &[F32x16; 2],
@@ -413,14 +413,14 @@ impl NonSpecular {
     /// The texture that packets look up. `None` if there is no such texture.
     #[inline]
     pub fn packet_texture(&self) -> Option<&Texture> {
-        self.packet_color()?.texture().map(|texture| &**texture)
+        self.packet_color_parameter()?.texture().map(|texture| &**texture)
     }
 }
 
 impl BxdfPoint {
     /// The BSDF for transmitted light. It has a different kind. `None` if no light is transmitted.
     #[inline(always)]
-    pub fn transmission(&self) -> Option<Self> {
+    pub fn transmission_bsdf(&self) -> Option<Self> {
         match self {
             Self::DielectricReflection(glass) => Some(Self::DielectricTransmission(*glass)),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),

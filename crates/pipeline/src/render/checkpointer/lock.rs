@@ -27,7 +27,7 @@ impl CheckpointLock {
     /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
     /// file.
     pub(super) fn lock_abandoned(&mut self, path: &Path) {
-        let Some(file) = open(path) else { return };
+        let Some(file) = open_if_regular(path) else { return };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {}
             // If locking is unsupported, the file's identity is enough to recognize it.
@@ -50,7 +50,7 @@ impl CheckpointLock {
     /// Whether another running process holds the file at this path.
     pub(super) fn is_held_by_another_process(&self, path: &Path) -> bool {
         let is_locked = |file: File| matches!(file.try_lock(), Err(TryLockError::WouldBlock));
-        !self.is_held_by_this_process(path) && open(path).is_some_and(is_locked)
+        !self.is_held_by_this_process(path) && open_if_regular(path).is_some_and(is_locked)
     }
 
     /// Records a failure. Returns whether it is the first one in the request.
@@ -68,7 +68,7 @@ impl CheckpointLock {
 }
 
 /// Opens a regular file. Returns `None` for other kinds of files, because opening a pipe would block.
-fn open(path: &Path) -> Option<File> {
+fn open_if_regular(path: &Path) -> Option<File> {
     if path.metadata().is_ok_and(|found| found.is_file()) { File::open(path).ok() } else { None }
 }
 

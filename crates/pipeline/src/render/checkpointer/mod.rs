@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 pub(crate) use self::lock::CheckpointLock;
-use self::state::CheckpointState;
+use self::state::SavedRenderState;
 use super::film_state::FilmState;
 use super::share::Shard;
 use crate::control::CancelToken;
@@ -148,7 +148,7 @@ impl<'a> Checkpointer<'a> {
         let Err(error) = self.restore(state, samples) else {
             self.around.lock.borrow_mut().lock_abandoned(&self.path);
             self.is_own.set(true);
-            let (path, samples) = (self.path.clone(), state.min_samples(samples));
+            let (path, samples) = (self.path.clone(), state.min_unfinished_samples(samples));
             self.send_update(CheckpointUpdate::Resumed { path, samples });
             return Ok(true);
         };
@@ -276,7 +276,7 @@ impl<'a> Checkpointer<'a> {
     fn is_superseded(
         &self,
         head: &PartHeader,
-        there: &CheckpointState,
+        there: &SavedRenderState,
         state: &FilmState,
         rays: RayCounters,
     ) -> bool {
@@ -296,7 +296,7 @@ impl<'a> Checkpointer<'a> {
         file.check_kind(PartKind::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
-        let read: CheckpointState =
+        let read: SavedRenderState =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
         if !read.is_plausible() {
             return Err(damaged("its state contains implausible numbers"));
@@ -308,7 +308,7 @@ impl<'a> Checkpointer<'a> {
         read.restore_into(state).ok_or_else(|| damaged("its state does not match the film"))?;
         state.recount_samples();
         if !state.has_at_most_samples(samples) {
-            return Err(other(vec![messages::too_many_samples_message(samples)]));
+            return Err(other(vec![messages::oversampled_checkpoint_message(samples)]));
         }
         Ok(())
     }
@@ -337,7 +337,7 @@ impl<'a> Checkpointer<'a> {
             return;
         }
         let begin = Instant::now();
-        self.write(state, rays, seconds, Durability::Power);
+        self.write_and_report(state, rays, seconds, Durability::Power);
         let pause = Duration::from_secs_f64(self.settings.seconds.min(1e9)).max(begin.elapsed() * TIME_SHARE);
         self.due.set(Instant::now() + pause);
     }
@@ -352,11 +352,11 @@ impl<'a> Checkpointer<'a> {
             Interruption::Ended => true,
         };
         // Do not wait for the disk, because the process is being terminated.
-        is_kept && state.has_samples() && self.write(state, rays, seconds, Durability::Process)
+        is_kept && state.has_samples() && self.write_and_report(state, rays, seconds, Durability::Process)
     }
 
     /// Checks whether this process has already saved a checkpoint of this render during an earlier request.
-    pub(crate) fn check_already_saved(&self, state: &FilmState) {
+    pub(crate) fn record_whether_already_saved(&self, state: &FilmState) {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         let is_own = is_held
             && PartFile::read_header(&self.path)
@@ -377,7 +377,7 @@ impl<'a> Checkpointer<'a> {
             (false, false) if !was_long && !is_ended => return,
             (false, _) | (true, true) => {
                 let durability = if is_ended { Durability::Process } else { Durability::Power };
-                self.write(state, rays, state.render_seconds, durability);
+                self.write_and_report(state, rays, state.render_seconds, durability);
                 return;
             }
             (true, false) => {}
@@ -398,7 +398,13 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Saves a checkpoint. Returns whether it succeeded.
-    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) -> bool {
+    fn write_and_report(
+        &self,
+        state: &FilmState,
+        rays: RayCounters,
+        seconds: f64,
+        durability: Durability,
+    ) -> bool {
         // 0 disables checkpoints.
         if self.settings.seconds <= 0.0 {
             return false;
@@ -408,9 +414,9 @@ impl<'a> Checkpointer<'a> {
             return false;
         }
         let head = self.create_header(PartKind::Checkpoint, state);
-        let written = serde_json::to_value(CheckpointState::from_film(state, rays, seconds))
+        let written = serde_json::to_value(SavedRenderState::from_film(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
-            .and_then(|value| self.save(&head, &state.film, &value, durability));
+            .and_then(|value| self.save_and_keep_locked(&head, &state.film, &value, durability));
         match &written {
             Ok(()) => {
                 self.is_own.set(true);
@@ -422,7 +428,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Saves a checkpoint and keeps it locked. Never replaces other kinds of files.
-    fn save(
+    fn save_and_keep_locked(
         &self,
         head: &PartHeader,
         film: &Film,
@@ -501,9 +507,9 @@ fn rejection_reason(error: &PartError) -> String {
 }
 
 /// Reads the header and state of a valid checkpoint.
-fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, CheckpointState)> {
+fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, SavedRenderState)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(PartKind::Checkpoint).ok()?;
-    let state: CheckpointState = serde_json::from_value(file.state).ok()?;
+    let state: SavedRenderState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))
 }

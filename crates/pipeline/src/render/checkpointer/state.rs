@@ -7,7 +7,7 @@ use crate::render::film_state::{EarlierWork, FilmState};
 
 /// Render state that is not part of the film.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct CheckpointState {
+pub(super) struct SavedRenderState {
     /// Sample goals decided for both halves of each cell.
     goals: Vec<[u32; 2]>,
     /// Sample count at which each tile's noise was last evaluated.
@@ -25,7 +25,7 @@ pub(super) struct CheckpointState {
     processor_seconds: f64,
 }
 
-impl CheckpointState {
+impl SavedRenderState {
     pub(super) fn from_film(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
         let RayCounters {
             camera_rays,
@@ -105,8 +105,8 @@ impl CheckpointState {
 mod tests {
     use super::*;
 
-    fn state() -> CheckpointState {
-        CheckpointState {
+    fn state() -> SavedRenderState {
+        SavedRenderState {
             goals: vec![[4, 4]],
             judged: vec![2],
             brightness: Some(0.5),
@@ -121,16 +121,16 @@ mod tests {
     fn implausible_numbers_are_detected() {
         assert!(state().is_plausible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
-            assert!(!CheckpointState { seconds, ..state() }.is_plausible(), "{seconds}");
-            assert!(!CheckpointState { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!SavedRenderState { seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!SavedRenderState { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
         }
         for brightness in [-1.0, f64::NAN, f64::INFINITY] {
             assert!(
-                !CheckpointState { brightness: Some(brightness), ..state() }.is_plausible(),
+                !SavedRenderState { brightness: Some(brightness), ..state() }.is_plausible(),
                 "{brightness}"
             );
         }
-        assert!(!CheckpointState { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
-        assert!(!CheckpointState { cell_rays: vec![1 << 57], ..state() }.is_plausible());
+        assert!(!SavedRenderState { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
+        assert!(!SavedRenderState { cell_rays: vec![1 << 57], ..state() }.is_plausible());
     }
 }

@@ -107,7 +107,7 @@ impl Forecast {
 
     /// Measures the film's noise if a measurement is due. `seconds` is the time since the stage started.
     pub(crate) fn measure_noise_if_due(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
-        let least = state.min_samples(u32::MAX);
+        let least = state.min_unfinished_samples(u32::MAX);
         pool.install(|| self.noise.measure_if_due(&state.film, least, (state.cpu_seconds(), seconds)));
     }
 
@@ -138,7 +138,7 @@ impl Forecast {
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
-            noise: self.noise.progress(work, self.rate.rate(), left),
+            noise: self.noise.predict_noise(work, self.rate.rate(), left),
         }
     }
 
@@ -190,6 +190,6 @@ fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
     let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
-    let passes = photons.map_or([0; 2], |_| state.photon_pass_counts(most));
+    let passes = photons.map_or([0; 2], |_| state.current_and_final_photon_passes(most));
     WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
 }

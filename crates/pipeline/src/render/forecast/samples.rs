@@ -1,7 +1,7 @@
 //! Predicts how many samples each part of the image needs to reach the noise target. Each prediction is
 //! needed only until the part's goal is decided.
 
-use crate::film::{CELLS, Convergence, samples_to_reduce_error};
+use crate::film::{CELLS, Convergence, total_samples_to_reduce_error};
 use crate::render::noise_goals::{AIM, LEAST, MOST, NoiseMeasurements, SampleGoals, TileNoise};
 
 /// Assumed factor by which the variance decreases from two to four samples and again from four to eight. This
@@ -37,7 +37,7 @@ impl ExpectedSamples {
         let NoiseMeasurements { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
-            noise.filter(|_| goals.is_undecided(tile, done, *samples)).map(|noise| (tile, noise))
+            noise.filter(|_| goals.has_undecided_half(tile, done, *samples)).map(|noise| (tile, noise))
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
@@ -45,7 +45,7 @@ impl ExpectedSamples {
         for (tile, TileNoise { halves, fall }) in tiles {
             // Average the noise of both halves of the tile.
             let squares = halves.iter().flatten().map(|half| {
-                let noise = aim.relative(half);
+                let noise = aim.relative_noise(half);
                 noise * noise
             });
             let mean = squares.sum::<f64>() / halves.iter().flatten().count() as f64;
@@ -119,7 +119,7 @@ impl NoiseDecay {
         let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
         let samples = self.samples.saturating_mul(1 << self.doublings);
         if noise > 0.0 {
-            samples_to_reduce_error(self.power, bound / noise, samples).min(MOST)
+            total_samples_to_reduce_error(self.power, bound / noise, samples).min(MOST)
         } else {
             self.samples
         }

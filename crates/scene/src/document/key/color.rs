@@ -62,11 +62,11 @@ impl TableKey<'_> {
             let scale = table.optional_key("scale");
             let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
             table.report_invalid_keys();
-            return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::constant(scale?) });
+            return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
         self.reject_texture_name(textures, EMISSION)?;
         self.color_in_limits(Limits::AtLeast(0.0), EMISSION)
-            .map(|color| EmissionSource::constant(color.as_vec3()))
+            .map(|color| EmissionSource::from_constant(color.as_vec3()))
     }
 
     /// Returns `None` and reports an error if the value is a bare texture name.
@@ -109,7 +109,7 @@ impl TableKey<'_> {
     /// If the value looks like a color with components from 0 to 255, reports `issue` at the value's span and
     /// suggests the equivalent `#rrggbb`. Returns whether it does.
     pub(in super::super) fn report_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
-        let (Some(span), Some(color)) = (self.span(), self.suggested_hex()) else { return false };
+        let (Some(span), Some(color)) = (self.span(), self.byte_color_to_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
         self.context.report(issue(span).with_label("this looks like 0–255").with_help(help));
         true
@@ -117,7 +117,7 @@ impl TableKey<'_> {
 
     /// Converts one or three integers up to 255 to `#rrggbb`, if any of them is too large for a linear
     /// component.
-    fn suggested_hex(&self) -> Option<String> {
+    fn byte_color_to_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.decode() {
             TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),
             TomlValue::String(_)

@@ -118,7 +118,7 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
     let (first, second) = (first?, second?);
-    if !keys[0].check_distance(first, &keys[1], second) {
+    if !keys[0].check_points_far_apart(first, &keys[1], second) {
         return None;
     }
     if first == second {

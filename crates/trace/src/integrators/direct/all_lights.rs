@@ -123,7 +123,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
                 ShadowMode::Soft => false,
-                ShadowMode::Hard => light.center().is_some(),
+                ShadowMode::Hard => light.center_and_geometry().is_some(),
                 ShadowMode::Off => true,
             };
             // If only one sample is possible, take one. Otherwise, take the requested number.
@@ -139,8 +139,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     }
                     Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };
-                let samples = light.sample_packet(&self.row.from, &self.row.normal, self.used, &u);
-                let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, simd);
+                let samples = light.sample_untextured_packet(&self.row.from, &self.row.normal, self.used, &u);
+                let (mut values, active, response) =
+                    self.unoccluded_contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
                     values = self.apply_emission_texture(pattern, &samples, active, values);
@@ -175,7 +176,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
             // Trace the single ray to the light's center.
             if pending.active != 0 {
-                self.resolve_pending_light(light.center(), &pending, sums, simd);
+                self.resolve_pending_light(light.center_and_geometry(), &pending, sums, simd);
             }
         }
     }
@@ -248,9 +249,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             pending.active |= active;
             add_masked_lanes(active, values, &mut pending.light);
         } else {
-            let traced = active & !self.row.below_horizon(&samples.directions, simd);
+            let traced = active & !self.row.below_horizon_mask(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.add_unoccluded((&rays, &ends, traced), &samples.sources, values, sums, simd);
+            self.trace_shadow_rays((&rays, &ends, traced), &samples.sources, values, sums, simd);
         }
     }
 
@@ -282,13 +283,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = pending.active & !self.row.below_horizon(&direction, simd);
+        let traced = pending.active & !self.row.below_horizon_mask(&direction, simd);
         for i in 0..PACKET_SIZE {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayPacket::from_soa(self.row.from, direction)
             .with_start_triangle(self.row.start_triangles(&direction));
-        self.add_unoccluded(
+        self.trace_shadow_rays(
             (&rays, &ends, traced),
             &LightGeometryPacket::splat(source),
             &pending.light,
@@ -300,7 +301,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Traces the shadow rays in `traced` and adds the light that arrives along the unoccluded rays. Rays
     /// that are not traced have a `t_max` below 0.
     #[inline(always)]
-    pub fn add_unoccluded(
+    pub fn trace_shadow_rays(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,
@@ -313,17 +314,17 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_see_through() {
-            return self.add_attenuated((rays, ends, traced), sources, values, sums);
+            return self.trace_attenuated_shadow_rays((rays, ends, traced), sources, values, sums);
         }
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
     }
 
-    /// Like [`SampleAllLights::add_unoccluded`], for scenes with null interactions, where shadow rays have a
+    /// Like [`SampleAllLights::trace_shadow_rays`], for scenes with null interactions, where shadow rays have a
     /// transmittance.
     #[cold]
     #[inline(never)]
-    fn add_attenuated(
+    fn trace_attenuated_shadow_rays(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,
@@ -335,7 +336,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
         for i in lane_indices(arriving) {
-            let value = lane(&values, i) * null_transmittance(lane(&weakened.left, i), self.aov);
+            let value = lane(&values, i) * transmittance_for_aov(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
         add_masked_lanes(arriving, &values, &mut sums.light);
@@ -344,7 +345,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
     /// vertices' BSDF responses.
     #[inline(always)]
-    pub fn contributions(
+    pub fn unoccluded_contributions(
         &self,
         samples: &LightSamplePacket,
         share: f32,
@@ -424,7 +425,7 @@ pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
 }
 
 /// Transmittance of null interactions for a light AOV.
-pub fn null_transmittance(left: Vec3, aov: LightAov) -> Vec3 {
+pub fn transmittance_for_aov(left: Vec3, aov: LightAov) -> Vec3 {
     match aov {
         LightAov::Radiance(_) | LightAov::TraversalCost => left,
         LightAov::LitFraction => Vec3::splat(luminance(left)),

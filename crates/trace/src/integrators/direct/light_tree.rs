@@ -54,7 +54,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
         let mut sums = LightSums::ZERO;
         // Sample all infinite lights, if the tree excludes them.
         if selection.leaves_beyond {
-            sums = simd.call(SampleAllLights { only_infinite: true, ..lighting });
+            sums = simd.call_out_of_line(SampleAllLights { only_infinite: true, ..lighting });
         }
         let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
@@ -274,7 +274,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             inverse[i] *= pick.weighed[i];
         }
         // Compute the unoccluded contributions.
-        let (mut values, active, response) = self.contributions(&samples, 1.0, simd);
+        let (mut values, active, response) = self.unoccluded_contributions(&samples, 1.0, simd);
         let active = active & used;
         if MIS {
             // Each group of picks has its own pdf and competes with all requested BSDF samples.
@@ -303,19 +303,19 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             ShadowMode::Soft => {}
         }
         // Trace the shadow rays, or queue them with other rays to the same lights.
-        let traced = active & !row.below_horizon(&samples.directions, simd);
+        let traced = active & !row.below_horizon_mask(&samples.directions, simd);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
             Some(pool) if self.aov != LightAov::TraversalCost => {
                 sums.rays.shadow += u64::from(traced.count_ones());
                 let mut places = [0; PACKET_SIZE];
                 for i in 0..PACKET_SIZE {
-                    places[i] = tree.leaf_position(lights[i]);
+                    places[i] = tree.tree_order_position(lights[i]);
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
             Some(_) | None => {
-                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, simd);
+                self.trace_shadow_rays((&rays, &ends, traced), &samples.sources, &values, sums, simd);
             }
         }
     }
@@ -323,7 +323,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Aims rays at the centers of all lights that have a center.
     fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
         for i in lane_indices(active) {
-            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center() else { continue };
+            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center_and_geometry() else {
+                continue;
+            };
             let direction = match middle {
                 LightCenter::At(middle) => {
                     set_lane(&mut samples.targets, i, middle);

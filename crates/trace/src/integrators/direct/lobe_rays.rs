@@ -7,7 +7,7 @@ use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::SampledLobes;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::Dimension;
@@ -47,12 +47,12 @@ impl SimdKernel for LobeRayKernel<'_> {
             if row.bsdf.extends_narrow_lobe_paths() {
                 [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
-            let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
+            let wi = row.bsdf.sample(SampledLobes::Narrow, &row.normal, &choices, &u, simd);
             let BsdfResponse { bsdf, cosines } = row.evaluate_bsdf(&wi, simd);
-            let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, simd);
+            let pdfs = row.bsdf.pdf(SampledLobes::Narrow, &row.normal, &wi, &bsdf, simd);
             let narrow = &bsdf.narrow;
             // Select the rays above the horizon.
-            let mut sent = sharp & !row.below_horizon(&wi, simd);
+            let mut sent = sharp & !row.below_horizon_mask(&wi, simd);
             let mut ends = [-1.0; PACKET_SIZE];
             for i in 0..PACKET_SIZE {
                 let bit = 1 << i;
@@ -98,11 +98,13 @@ impl SimdKernel for LobeRayKernel<'_> {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
                         let normal = lane(&row.normal, i);
-                        let radiance = tile.emitter_radiance(&rays.ray(i), normal, &hit, pdf, lookups);
+                        let radiance =
+                            tile.lobe_ray_emitter_radiance(&rays.ray(i), normal, &hit, pdf, lookups);
                         radiance * transmittance(i, hit.shape.t)
                     }
                     None => {
-                        let radiance = tile.infinite_radiance(&rays.ray(i), lane(&row.normal, i), pdf);
+                        let radiance =
+                            tile.lobe_ray_radiance_from_infinity(&rays.ray(i), lane(&row.normal, i), pdf);
                         radiance * transmittance(i, f32::MAX)
                     }
                 };

@@ -7,7 +7,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::{BsdfValues, LobeSet};
+use crate::materials::bsdf::{BsdfValues, SampledLobes};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -64,9 +64,9 @@ impl CompetingTechnique {
         // Weight each sample against the lobes from which BSDF samples are drawn.
         let (lobes, start) = match self {
             Self::Nothing => return values,
-            Self::Paths => (LobeSet::All, !0),
-            Self::NarrowPaths => (LobeSet::Narrow, !0),
-            Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
+            Self::Paths => (SampledLobes::All, !0),
+            Self::NarrowPaths => (SampledLobes::Narrow, !0),
+            Self::Lobes(sharp) => (SampledLobes::Narrow, sharp),
         };
         let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, simd);
         let mut weights = [1.0; PACKET_SIZE];
@@ -76,13 +76,13 @@ impl CompetingTechnique {
         }
         // Apply the weights to the light reflected by these lobes.
         match lobes {
-            LobeSet::All => {
+            SampledLobes::All => {
                 for i in 0..PACKET_SIZE {
                     let value = lane(&values, i) * weights[i];
                     set_lane(&mut values, i, value);
                 }
             }
-            LobeSet::Narrow => {
+            SampledLobes::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
                     let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
@@ -139,7 +139,7 @@ impl TileContext<'_> {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
         if pdf.is_nan() || pdf <= 0.0 {
-            return lights.radiance_from_infinity_with(sky, path.ray.direction, |_, _| 1.0);
+            return lights.radiance_from_infinity_with_sky(sky, path.ray.direction, |_, _| 1.0);
         }
         // If light samples skip the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.paths_find_sky { 0.0 } else { of_sky }));
@@ -147,13 +147,13 @@ impl TileContext<'_> {
         self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, share)
     }
 
-    /// Like [`TileContext::emitter_radiance`], for a lobe ray that leaves the scene.
-    pub fn infinite_radiance(&self, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
-        self.radiance_from_infinite_light(None, ray, normal, pdf)
+    /// Like [`TileContext::lobe_ray_emitter_radiance`], for a lobe ray that leaves the scene.
+    pub fn lobe_ray_radiance_from_infinity(&self, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
+        self.lobe_ray_radiance_from_light(None, ray, normal, pdf)
     }
 
-    /// Like [`TileContext::infinite_radiance`], but restricted to light `number`, unless it is `None`.
-    pub fn radiance_from_infinite_light(
+    /// Like [`TileContext::lobe_ray_radiance_from_infinity`], but restricted to light `number`, unless it is `None`.
+    pub fn lobe_ray_radiance_from_light(
         &self,
         number: Option<u32>,
         ray: &Ray,
@@ -182,7 +182,7 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
-        lights.radiance_from_infinity_with(sky, ray.direction, |number, pdf| {
+        lights.radiance_from_infinity_with_sky(sky, ray.direction, |number, pdf| {
             if only.is_none_or(|only| only == number) { share(pdf * samples.for_light(number)) } else { 0.0 }
         })
     }
@@ -202,7 +202,7 @@ impl TileContext<'_> {
 
     /// Radiance of the emitter hit by a lobe ray, multiplied by the MIS weight for equal numbers of light
     /// samples and lobe rays.
-    pub fn emitter_radiance(
+    pub fn lobe_ray_emitter_radiance(
         &self,
         ray: &Ray,
         from_normal: Vec3,
@@ -245,13 +245,13 @@ impl TileContext<'_> {
         let (mut along, mut next) = (*ray, first);
         for _ in 0..=MAX_NULL_INTERACTIONS {
             let Some(hit) = next else {
-                let beyond = self.infinite_radiance(ray, from_normal, pdf);
+                let beyond = self.lobe_ray_radiance_from_infinity(ray, from_normal, pdf);
                 return sum + left * beyond * transmittance(f32::MAX);
             };
             // Add the surface's emission, using the hit distance along the original ray.
             let distance = passed + hit.shape.t;
             let met = Hit { shape: ShapeHit { t: distance, ..hit.shape }, ..hit };
-            let radiance = self.emitter_radiance(ray, from_normal, &met, pdf, lookups);
+            let radiance = self.lobe_ray_emitter_radiance(ray, from_normal, &met, pdf, lookups);
             sum += left * radiance * transmittance(distance);
             // Continue if the surface may be a null interaction.
             if !self.world.materials[self.world.material_index(&hit)].has_null_interaction() {

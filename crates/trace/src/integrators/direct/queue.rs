@@ -21,7 +21,7 @@ use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
 use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::materials::BxdfKind;
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::SampledLobes;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
 use crate::scene::description::ShadowMode;
@@ -103,7 +103,7 @@ impl DirectLightQueue {
     pub fn flush(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, only_specular_before) = path(place);
-            accumulator.add_direct(slot, *light, only_specular_before);
+            accumulator.add_clamped_direct(slot, *light, only_specular_before);
         }
     }
 
@@ -169,7 +169,7 @@ impl DirectLightQueue {
         };
         row.set_vertex(lane, tile, lit, aov, interiors);
         if let Some((beyond, interiors)) = far_side {
-            row.set_far_side(lane, beyond, interiors);
+            row.set_far_side_origin(lane, beyond, interiors);
         }
     }
 
@@ -219,7 +219,7 @@ impl DirectLightQueue {
         // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
-        let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
+        let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, SampledLobes::Narrow));
         let of_row = |row: &VertexBatch| {
             let own = if row.bsdf.extends_narrow_lobe_paths() {
                 continuation.or_else(mirrors)
@@ -261,7 +261,7 @@ impl DirectLightQueue {
                     used: row.used & contributing_vertex_mask(row, aov),
                     shares_with_paths,
                 };
-                let mut arrived = self.add_lobe_rays(request, tile, aov, sums);
+                let mut arrived = self.reflected_light_with_lobe_rays(request, tile, aov, sums);
                 if let Some(gathered) = gather(row) {
                     add_masked_lanes(row.used, &gathered, &mut arrived.light);
                 }
@@ -352,7 +352,7 @@ impl DirectLightQueue {
     }
 
     /// Reflected light, including the light found by lobe rays.
-    fn add_lobe_rays(
+    fn reflected_light_with_lobe_rays(
         &self,
         request: DirectLightRequest,
         tile: &TileContext<'_>,

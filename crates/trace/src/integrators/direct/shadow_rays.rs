@@ -1,7 +1,7 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_masked_lanes, null_transmittance};
+use super::all_lights::{LightSums, add_masked_lanes, transmittance_for_aov};
 use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -165,7 +165,7 @@ fn attenuate(
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);
     for from in lane_indices(traced & !weakened.occluded) {
-        let left = null_transmittance(lane(&weakened.left, from), aov);
+        let left = transmittance_for_aov(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;
         set_lane(&mut row.values, to, value);

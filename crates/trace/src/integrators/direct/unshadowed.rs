@@ -41,7 +41,7 @@ impl UnshadowedLobeRay<'_> {
             };
             let distance = passed + hit.shape.t;
             let met = Hit { shape: ShapeHit { t: distance, ..hit.shape }, ..hit };
-            let radiance = tile.emitter_radiance(ray, normal, &met, *pdf, &mut rays.lookups);
+            let radiance = tile.lobe_ray_emitter_radiance(ray, normal, &met, *pdf, &mut rays.lookups);
             if radiance != Vec3::ZERO {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
@@ -53,7 +53,7 @@ impl UnshadowedLobeRay<'_> {
         }
         // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
-            let radiance = tile.radiance_from_infinite_light(Some(number), ray, normal, *pdf);
+            let radiance = tile.lobe_ray_radiance_from_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
                 sum += radiance * transmittance(f32::MAX) * self.unoccluded_fraction(light, rays);
             }
@@ -68,7 +68,7 @@ impl UnshadowedLobeRay<'_> {
             ShadowMode::Hard | ShadowMode::Soft => {}
         }
         // An environment has no center, so test the ray itself.
-        let (segment, source) = match light.center() {
+        let (segment, source) = match light.center_and_geometry() {
             Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
             None => (self.ray, LightGeometry::Nothing),

@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 
 use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::local_geometry::{Extent, FlatPolygon, NearestSurface};
+use crate::geometry::local_geometry::{FlatPolygon, LocalSurfaceShape, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, NonSpecular};
 use crate::math::frame::Frame;
@@ -61,7 +61,9 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
     let is_exact = world.geometry.visit_objects_in_box(&bounds, |id, object| match object {
-        Object::Shape(shape) => around.add_shape(shape, || can_store_photons(material(world, id, 0))),
+        Object::Shape(shape) => {
+            around.add_shape(shape, || can_store_photons(primitive_material(world, id, 0)))
+        }
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
     match around.coverage().filter(|_| is_exact) {
@@ -72,7 +74,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
 }
 
 /// Material of an object's primitive.
-pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
+pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Material {
     let shape = ShapeHit { primitive, ..ShapeHit::from_t(0.0) };
     &world.materials[world.material_index(&Hit { shape, object })]
 }
@@ -174,8 +176,8 @@ impl KernelNeighborhood {
     /// false.
     fn add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
-            Extent::Flat(reach) => reach > FAR * self.radius,
-            Extent::Round(radius) => radius > WIDE * self.radius,
+            LocalSurfaceShape::Flat(reach) => reach > FAR * self.radius,
+            LocalSurfaceShape::Round(radius) => radius > WIDE * self.radius,
         };
         let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
         self.whole += u32::from(is_wide && is_same && receives());
@@ -206,7 +208,7 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_polygon(&piece, || can_store_photons(material(world, id, triangle)))
+            self.add_polygon(&piece, || can_store_photons(primitive_material(world, id, triangle)))
         })
     }
 

@@ -16,14 +16,14 @@ use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::crossing::CrossingMemory;
 use crate::integrators::transport::interface::{
-    FresnelSplit, fresnel_split, reflected_path, sheet_transmission,
+    FresnelSplit, diffusing_sheet_transmission, fresnel_split, reflected_path,
 };
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
+use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
 use crate::integrators::transport::walk::{
     Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, OpaqueHit, PathStepper, opacity_at,
     walk_to_interaction,
@@ -31,7 +31,7 @@ use crate::integrators::transport::walk::{
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource};
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::SampledLobes;
 use crate::materials::{Bsdf, BxdfPoint, Coated, NonSpecular, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
@@ -94,7 +94,7 @@ impl PhotonTracer<'_> {
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET_SIZE) {
                 self.tile.token.check()?;
-                wavefront.intersect(packet, &mut row, &mut surfaces);
+                wavefront.trace_and_shade_packet(packet, &mut row, &mut surfaces);
             }
             // Scatter the individually queued vertices, and apply Russian roulette.
             wavefront.scatter_queued_vertices();
@@ -207,7 +207,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn handle_pane(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'a>,
+        vertex: &SurfaceVertex<'a>,
         _: OpaqueHit,
         pane: &ThinDielectric,
     ) -> NullInteraction {
@@ -267,7 +267,12 @@ impl PhotonWavefront<'_> {
     }
 
     /// Traces a packet of photons to their hits, where they are stored and scattered.
-    fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfacePacket) {
+    fn trace_and_shade_packet(
+        &mut self,
+        rays: &[PathRay],
+        row: &mut VertexBatch,
+        surfaces: &mut SurfacePacket,
+    ) {
         let tile = self.tracing.tile;
         let packet = tile.intersect(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;
@@ -279,7 +284,7 @@ impl PhotonWavefront<'_> {
             }
             row.retain_lanes(row.only_specular_before);
             for i in lane_indices(row.used & row.has_facet) {
-                let counts = row.photon_weight(i, -rays[i].ray.direction);
+                let counts = row.adjoint_photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
             }
             self.scatter(row);
@@ -304,7 +309,7 @@ impl PhotonWavefront<'_> {
     fn shade_surface(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
         match &vertex.material.bsdf {
@@ -328,7 +333,7 @@ impl PhotonWavefront<'_> {
     fn shade_coated(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         coated: &Coated,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
@@ -352,12 +357,12 @@ impl PhotonWavefront<'_> {
     fn shade_rough(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         rough: &NonSpecular,
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let mut bsdf = rough.evaluate_textures(&vertex.texture_point, &mut self.counters.texture_lookups);
-        vertex.tint(&mut bsdf);
+        vertex.tint_by_vertex_color(&mut bsdf);
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         }
@@ -367,7 +372,7 @@ impl PhotonWavefront<'_> {
     fn store_and_scatter(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         bsdf: BxdfPoint,
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
@@ -382,7 +387,7 @@ impl PhotonWavefront<'_> {
         };
         // Queue the photon for scattering.
         let shading = vertex.shading_normals(&mut self.counters);
-        let behind = bsdf.transmission().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
         let interiors = self.interior_lists.insert(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
@@ -391,7 +396,7 @@ impl PhotonWavefront<'_> {
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
         self.open.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
-        let counts = self.open.photon_weight(i, vertex.wo) * by_chance;
+        let counts = self.open.adjoint_photon_weight(i, vertex.wo) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
@@ -400,7 +405,7 @@ impl PhotonWavefront<'_> {
             1.0 / (eta * eta)
         } else {
             // For a camera path, this is transmission from the other side.
-            sheet_transmission(tile.world, far, &path.interiors)
+            diffusing_sheet_transmission(tile.world, far, &path.interiors)
         };
         let interiors = self.interior_lists.insert(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
@@ -420,7 +425,7 @@ impl PhotonWavefront<'_> {
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &InteriorList) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
         if !self.may_scatter() {
             return;
         }
@@ -443,7 +448,13 @@ impl PhotonWavefront<'_> {
     /// Queues a photon after a specular bounce. If the shading normal differs from the geometric normal, the
     /// photon is weighted by the adjoint BSDF (see the module documentation). `eta` is the index of
     /// refraction on the far side relative to the near side.
-    fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
+    fn push(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        (shading, eta): (Vec3, f32),
+        mut ray: PathRay,
+    ) {
         let facet = vertex.normal;
         if shading != facet {
             let (wi, wo) = (vertex.wo, ray.ray.direction);
@@ -483,7 +494,7 @@ impl PhotonWavefront<'_> {
             set_lane(&mut row.normal, i, facet);
             row.shading_normal_cosine[i] = UNPERTURBED;
         }
-        let continuation = Continuation { continues: true, uses_roulette: false, lobes: LobeSet::All };
+        let continuation = Continuation { continues: true, uses_roulette: false, lobes: SampledLobes::All };
         let used = row.used;
         SampleBsdf { tile: self.tracing.tile, row, used, continuation }.scatter(
             &self.interior_lists,

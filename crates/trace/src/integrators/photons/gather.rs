@@ -77,7 +77,7 @@ impl SimdKernel for GatherPhotons<'_> {
                 if gathers && looks[i] < chance {
                     // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
-                    let (light, photon) = kernel_sum((row, i), (map, &look), aov, random, simd);
+                    let (light, photon) = gather_reflected_light((row, i), (map, &look), aov, random, simd);
                     sum += light * (coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance);
                 }
             }
@@ -116,7 +116,7 @@ fn coverage_factor(
 
 /// Light from a map's photons that a vertex reflects toward the viewer, and one of these photons.
 #[inline(always)]
-fn kernel_sum(
+fn gather_reflected_light(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
     aov: LightAov,
@@ -129,16 +129,16 @@ fn kernel_sum(
     let is_flat = row.has_facet & 1 << i == 0;
     match row.bsdf.constant_f(i).filter(|_| is_flat) {
         Some(f) => {
-            let (irradiance, photon) = map.irradiance(look, random, simd);
+            let (irradiance, photon) = map.irradiance_and_chosen_photon(look, random, simd);
             (f * irradiance, photon)
         }
-        None => reflected_kernel_sum((row, i), (map, look), random, simd),
+        None => gather_with_bsdf_per_photon((row, i), (map, look), random, simd),
     }
 }
 
-/// Like [`kernel_sum`], but evaluates the BSDF for each photon's direction.
+/// Like [`gather_reflected_light`], but evaluates the BSDF for each photon's direction.
 #[inline(always)]
-fn reflected_kernel_sum(
+fn gather_with_bsdf_per_photon(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
@@ -147,7 +147,7 @@ fn reflected_kernel_sum(
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit_photons(look, simd, |photon, density| {
         let [shown, all] = row.bsdf.lane_f(i, photon.direction);
-        let scale = density * row.photon_weight(i, photon.direction);
+        let scale = density * row.adjoint_photon_weight(i, photon.direction);
         sum += shown * photon.flux * scale;
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
         let weight = (all * photon.flux * scale).element_sum();

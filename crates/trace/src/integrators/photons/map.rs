@@ -224,7 +224,7 @@ impl PhotonMap {
     /// Irradiance in W·m⁻² from the photons around a point, and one of these photons. The photon is chosen
     /// with two random numbers, in proportion to its contribution.
     #[inline(always)]
-    pub fn irradiance(
+    pub fn irradiance_and_chosen_photon(
         &self,
         look: &GatherPoint,
         random: [f32; 2],
@@ -519,7 +519,8 @@ mod tests {
             let mut sum = 0.0;
             let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
             map.visit_photons(&look, PortableSimd, |_, density| sum += density * step * step);
-            let flux = f64::from(map.irradiance(&look, [0.5; 2], PortableSimd).0.x * step * step);
+            let flux =
+                f64::from(map.irradiance_and_chosen_photon(&look, [0.5; 2], PortableSimd).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "got {flux}, expected {sum}");
             sum
         };

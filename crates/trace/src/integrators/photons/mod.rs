@@ -162,7 +162,7 @@ impl PhotonMapper {
             let size =
                 own.emission.as_ref().map_or(1.0, |emission| emission.finite_scene_bounds().radius as f32);
             let radii = kinds.into_par_iter().zip(WANTED);
-            let radii = radii.map(|(of, wanted)| radius_for_count(of, wanted, size, token));
+            let radii = radii.map(|(of, wanted)| radius_for_neighbor_count(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
         }
@@ -314,7 +314,7 @@ fn radius_factor(pass: u32) -> f64 {
 
 /// Radius within which the median photon has `wanted` neighbors. `size` is the radius of the scene's bounding
 /// sphere.
-fn radius_for_count(
+fn radius_for_neighbor_count(
     photons: &[Photon],
     wanted: f32,
     size: f32,
@@ -467,7 +467,8 @@ mod tests {
             all.map(place).collect()
         };
         let radius = |side, size| {
-            radius_for_count(&photons(side), 12.0, size, &CancelToken::new()).expect("never canceled")
+            radius_for_neighbor_count(&photons(side), 12.0, size, &CancelToken::new())
+                .expect("never canceled")
         };
         assert_eq!(radius(10, 1.0), 0.05);
         assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));

@@ -1,6 +1,6 @@
 //! Unbiased estimate of the reciprocal of a kernel's coverage, from random trials.
 
-use super::coverage::{KernelCoverage, can_store_photons, material};
+use super::coverage::{KernelCoverage, can_store_photons, primitive_material};
 use super::kernel::sample;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
 use super::occlusion::is_occluded;
@@ -85,7 +85,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = PhotonPosition { point: surface.point, normal };
         if cosine.abs() > MIN_COSINE
-            && can_store_photons(material(world, hit.object, hit.shape.primitive))
+            && can_store_photons(primitive_material(world, hit.object, hit.shape.primitive))
             && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;

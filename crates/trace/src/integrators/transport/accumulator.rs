@@ -41,7 +41,7 @@ impl Accumulator<'_> {
     pub fn add_emitter_hit(&mut self, path: &PathRay, radiance: Vec3) {
         match self.aov {
             LightAov::Radiance(parts) if path.state.contributes_to_view(parts.paths) => {
-                self.add_direct(path.slot, radiance, false);
+                self.add_clamped_direct(path.slot, radiance, false);
             }
             LightAov::Radiance(_) | LightAov::LitFraction | LightAov::TraversalCost => {}
         }
@@ -85,7 +85,7 @@ impl Accumulator<'_> {
         if path.state.only_specular_before {
             self.add_non_reflected(path.slot, NonReflectedTerm::Ambient, radiance);
         } else if self.accepts_ambient(path) {
-            self.add_direct(path.slot, radiance, false);
+            self.add_clamped_direct(path.slot, radiance, false);
         }
     }
 
@@ -97,7 +97,7 @@ impl Accumulator<'_> {
     }
 
     /// Adds direct light at a vertex, clamped unless the camera sees the vertex.
-    pub fn add_direct(&mut self, slot: u32, contribution: Vec3, only_specular_before: bool) {
+    pub fn add_clamped_direct(&mut self, slot: u32, contribution: Vec3, only_specular_before: bool) {
         let largest = contribution.max_element();
         let is_clamped = !only_specular_before && self.clamp > 0.0 && largest > self.clamp;
         let kept = if is_clamped { self.clamp / largest } else { 1.0 };

@@ -200,7 +200,7 @@ impl VertexBatch {
     }
 
     /// Stores the ray origin on the other side of a vertex and the index of the glass around it.
-    pub fn set_far_side(&mut self, i: usize, beyond: Vec3, interiors: u32) {
+    pub fn set_far_side_origin(&mut self, i: usize, beyond: Vec3, interiors: u32) {
         set_lane(&mut self.beyond, i, beyond);
         self.interiors_beyond[i] = interiors;
     }
@@ -283,7 +283,7 @@ impl VertexBatch {
     /// Weight of a photon at a vertex: the cosine at the shading normal times the terminator factor, divided
     /// by the cosine at the geometric normal.
     #[inline(always)]
-    pub fn photon_weight(&self, i: usize, direction: Vec3) -> f32 {
+    pub fn adjoint_photon_weight(&self, i: usize, direction: Vec3) -> f32 {
         if self.has_facet & 1 << i == 0 {
             return 1.0;
         }
@@ -324,7 +324,7 @@ impl VertexBatch {
 
     /// Mask of lanes whose direction is below the vertex's horizon.
     #[inline(always)]
-    pub fn below_horizon(&self, wi: &Vec3x16, simd: impl Simd) -> u32 {
+    pub fn below_horizon_mask(&self, wi: &Vec3x16, simd: impl Simd) -> u32 {
         let mut hidden = [0; PACKET_SIZE];
         if self.has_horizon != 0 {
             for i in 0..PACKET_SIZE {

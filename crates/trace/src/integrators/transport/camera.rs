@@ -29,7 +29,7 @@ pub struct CameraRayPacket {
 impl TileContext<'_> {
     /// Replaces the queue's content with camera rays for a range of slots, and reports the rays with a
     /// negative filter weight.
-    pub fn camera_rays(
+    pub fn generate_camera_rays(
         &self,
         slots: Range<u32>,
         queue: &mut Vec<PathRay>,
@@ -38,7 +38,7 @@ impl TileContext<'_> {
         queue.clear();
         let mut rows = Vec::new();
         for first in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-            self.camera_packets(first..slots.end, &mut rows);
+            self.generate_camera_packets(first..slots.end, &mut rows);
             for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
@@ -48,7 +48,7 @@ impl TileContext<'_> {
     }
 
     /// Replaces the content of `rows` with camera rays for the first slots, at most [`CAMERA_ROWS`] packets.
-    pub fn camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
+    pub fn generate_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
         self.world.geometry.instruction_set().run(GenerateCameraRays {

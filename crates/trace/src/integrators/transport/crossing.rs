@@ -3,7 +3,7 @@
 use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::Vertex;
+use super::vertex::SurfaceVertex;
 use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, Hit, OffsetPoints};
 
 /// Surfaces and media crossed by a ray at a hit on glass.
@@ -42,7 +42,7 @@ impl TileContext<'_> {
     pub fn find_crossing(
         &self,
         path: &PathRay,
-        vertex: &Vertex<'_>,
+        vertex: &SurfaceVertex<'_>,
         hit: &Hit,
         memory: &mut CrossingMemory,
     ) -> Crossing {

@@ -3,7 +3,7 @@
 use super::cone::SpecularEvent;
 use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
-use super::vertex::{ShadingNormals, Vertex};
+use super::vertex::{ShadingNormals, SurfaceVertex};
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
@@ -21,7 +21,7 @@ pub const PASSED: u32 = 4;
 /// geometric normal is used.
 pub fn reflected_path(
     path: &PathRay,
-    vertex: &Vertex<'_>,
+    vertex: &SurfaceVertex<'_>,
     shading: &ShadingNormals,
     reflectance: Vec3,
 ) -> PathRay {
@@ -45,7 +45,7 @@ pub fn reflected_path(
 /// In the denser medium, light spreads over fewer directions and would gain energy without this factor. In
 /// the opposite direction, radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport
 /// Simulation*, 1997, section 5.2).
-pub fn sheet_transmission(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
+pub fn diffusing_sheet_transmission(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
     let eta = medium_ior(world, far) / medium_ior(world, near);
     (eta * eta).min(1.0)
 }
@@ -62,12 +62,12 @@ pub struct FresnelSplit {
 pub fn fresnel_split(
     world: &World,
     path: &PathRay,
-    vertex: &Vertex<'_>,
+    vertex: &SurfaceVertex<'_>,
     shading: &ShadingNormals,
     far: &InteriorList,
 ) -> FresnelSplit {
     let eta = medium_ior(world, far) / medium_ior(world, &path.interiors);
-    let (reflectance, direction) = refract_at(vertex, shading, path.ray.direction, eta);
+    let (reflectance, direction) = reflectance_and_refraction(vertex, shading, path.ray.direction, eta);
     // Path throughput applies to basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.spawn_ray(direction),
@@ -83,8 +83,8 @@ pub fn fresnel_split(
 /// Computes the reflectance and refracted direction with the shading normal. If this normal faces away from
 /// the ray or would refract the ray to the incident side, the geometric normal is used, because the ray must
 /// be inside its medium.
-fn refract_at(
-    vertex: &Vertex<'_>,
+fn reflectance_and_refraction(
+    vertex: &SurfaceVertex<'_>,
     shading: &ShadingNormals,
     incident: Vec3,
     eta: f32,

@@ -63,10 +63,10 @@ impl InteriorList {
     pub fn exited(self, glass: Interior) -> Option<Self> {
         let same = self.solids().iter().rposition(|&own| own == glass);
         same.or_else(|| self.solids().iter().rposition(|own| own.body == glass.body))
-            .map(|place| self.without(place))
+            .map(|place| self.without_index(place))
     }
 
-    fn without(mut self, place: usize) -> Self {
+    fn without_index(mut self, place: usize) -> Self {
         self.inside[place..self.count as usize].rotate_left(1);
         self.count -= 1;
         self.inside[self.count as usize] = Interior::default();
@@ -123,16 +123,16 @@ impl InteriorLists {
 /// Transmittance of a ray's medium over a distance.
 #[inline]
 pub fn medium_transmittance(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
-    let glass = interiors.glass().and_then(|inside| glass_of(world, inside));
+    let glass = interiors.glass().and_then(|inside| dielectric_of_interior(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
 /// Index of refraction of a ray's medium.
 pub fn medium_ior(world: &World, interiors: &InteriorList) -> f32 {
-    interiors.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
+    interiors.glass().and_then(|inside| dielectric_of_interior(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
-fn glass_of(world: &World, inside: Interior) -> Option<&Dielectric> {
+fn dielectric_of_interior(world: &World, inside: Interior) -> Option<&Dielectric> {
     world.materials[inside.material as usize].bsdf.as_dielectric()
 }
 

@@ -7,7 +7,7 @@ use super::batch::{UNPERTURBED, VertexBatch};
 use super::camera::CameraRayPacket;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::shadow_lift_segment;
+use super::vertex::measure_shadow_lift;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -283,7 +283,7 @@ impl PacketIntersection<'_> {
                 continue;
             }
             // Skip materials that are not plain. The first plain material determines the kind of all BSDFs.
-            let materials = tile.world.packet_materials(id, of_object, &hits.primitive);
+            let materials = tile.world.packet_material_indices(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
             let mut groups = ArrayVec::<(&NonSpecular, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
@@ -333,7 +333,7 @@ impl PacketIntersection<'_> {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
                 let shown = [(of, aov.lobes()), (of & !row.only_specular_before, LobeFilter::ALL)];
                 let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
-                let black = row.bsdf.fill_lanes(rough, has_uv.then_some(&surface.uv), shown, simd);
+                let black = row.bsdf.set_lanes_to_material(rough, has_uv.then_some(&surface.uv), shown, simd);
                 row.used |= of & !black;
             }
         }
@@ -386,7 +386,7 @@ impl TileContext<'_> {
             if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
-            let materials = self.world.packet_materials(id, of_object, &hits.primitive);
+            let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
                 let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
@@ -451,7 +451,7 @@ impl VertexBatch {
         // Compute the lifted points above the facets.
         for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
-            let (is_above, end) = shadow_lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
+            let (is_above, end) = measure_shadow_lift(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
@@ -466,7 +466,7 @@ impl VertexBatch {
                 [0; PACKET_SIZE]
             }
         };
-        self.bsdf.orient(Some(&of), &mut normals, &rays.direction);
+        self.bsdf.set_normals_and_directions(Some(&of), &mut normals, &rays.direction);
         for axis in 0..3 {
             select(&of, &facets[axis], &mut self.horizon[axis]);
             select(&of, &facets[axis], &mut self.facet[axis]);
@@ -505,7 +505,7 @@ impl VertexBatch {
             set_lane(&mut self.from, i, from);
             set_lane(&mut self.normal, i, normal);
         }
-        self.bsdf.orient(None, &mut self.normal, &rays.direction);
+        self.bsdf.set_normals_and_directions(None, &mut self.normal, &rays.direction);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
             self.set_smooth_normals(rays, surface, lifts, simd);

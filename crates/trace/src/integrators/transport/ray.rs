@@ -76,7 +76,7 @@ impl PathState {
 
     /// Returns the state after crossing a surface inside glass. Such a surface does not change the ray, but
     /// blocks light samples.
-    pub fn hidden_from_lights(self) -> Self {
+    pub fn after_crossing_inside_glass(self) -> Self {
         self.after_specular(1.0)
     }
 }

@@ -8,7 +8,7 @@ use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::lane_indices;
-use crate::materials::bsdf::{DielectricSamplePacket, LobeSet};
+use crate::materials::bsdf::{DielectricSamplePacket, SampledLobes};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::sampling::Dimension;
@@ -22,7 +22,7 @@ pub struct Continuation {
     /// Whether Russian roulette applies.
     pub uses_roulette: bool,
     /// Lobes from which directions are sampled.
-    pub lobes: LobeSet,
+    pub lobes: SampledLobes,
 }
 
 impl Continuation {
@@ -32,7 +32,7 @@ impl Continuation {
     const GAIN: f32 = 2.5;
 
     /// Determines how paths continue in these lobes after `depth` bounces.
-    pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
+    pub fn new(tile: &TileContext<'_>, depth: u32, lobes: SampledLobes) -> Self {
         let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
         let max_depth = tile.settings.render.max_depth;
         let shines = || tile.world.lights.has_infinite_lights() || emits();
@@ -181,8 +181,8 @@ impl SampleBsdf<'_> {
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
-            LobeSet::All => bsdf.f(),
-            LobeSet::Narrow => bsdf.narrow,
+            SampledLobes::All => bsdf.f(),
+            SampledLobes::Narrow => bsdf.narrow,
         };
         let mut factors = f;
         let mut alive = 0_u32;
@@ -196,7 +196,7 @@ impl SampleBsdf<'_> {
             alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
         }
         // Drop directions below the horizon.
-        alive &= !row.below_horizon(&wi, simd);
+        alive &= !row.below_horizon_mask(&wi, simd);
         let starts = row.start_triangles(&wi);
         let narrow = row.bsdf.narrow_lobe_mask();
         ScatteredDirections { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }

@@ -4,10 +4,10 @@ use std::array;
 use std::ops::Range;
 
 use crate::control::CancelToken;
-use crate::film::{PixelSubset, Pixels};
+use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::LightSamplingPurpose;
+use crate::lights::LightTransportKind;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
@@ -56,7 +56,7 @@ impl<'a> TileContext<'a> {
             && render.shadows == ShadowMode::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_constant && world.lights.sampler(LightSamplingPurpose::Eye).is_none();
+        let lobes_find_sky = is_constant && world.lights.sampler(LightTransportKind::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
@@ -70,7 +70,7 @@ impl<'a> TileContext<'a> {
 /// The samples in a tile. A slot is a sample's index. Samples are ordered by pixel.
 pub struct SampleBlock {
     /// The pixels of the tile.
-    pub pixels: Pixels,
+    pub pixels: SelectedPixels,
     /// Range of sample indices for each pixel.
     pub samples: Range<u32>,
 }
@@ -96,7 +96,7 @@ impl SampleBlock {
         slots: &[u32; PACKET_SIZE],
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
-        let Pixels { rect, part } = self.pixels;
+        let SelectedPixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
         // Compute pixel indices within the subset.
         let mut index = [0; PACKET_SIZE];
@@ -109,7 +109,7 @@ impl SampleBlock {
         // Map them to indices within the rectangle. This is a separate loop to keep the other loops free of
         // branches.
         if part != PixelSubset::All {
-            index = index.map(|pixel| part.index(pixel, rect));
+            index = index.map(|pixel| part.index_in_rect(pixel, rect));
         }
         for lane in 0..PACKET_SIZE {
             let y = by_width.quotient(index[lane]);

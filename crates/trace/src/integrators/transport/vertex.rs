@@ -15,7 +15,7 @@ use crate::scene::description::ShadowMode;
 use crate::world::{Hit, OffsetPoints};
 
 /// A path vertex on a surface.
-pub struct Vertex<'a> {
+pub struct SurfaceVertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
     /// Material of the surface.
@@ -45,14 +45,14 @@ pub struct Vertex<'a> {
     pub curvature: f32,
 }
 
-impl<'a> Vertex<'a> {
+impl<'a> SurfaceVertex<'a> {
     /// Creates the vertex at a hit.
     pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::with_surface(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
     /// Creates the vertex at a hit, computing only what the material needs.
-    pub fn for_shading(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
+    pub fn with_needed_attributes(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::from_ray_hit(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
@@ -111,13 +111,13 @@ impl<'a> Vertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_uv: tile.world.has_texture_axes(hit.object),
+            has_uv: tile.world.has_usable_texture_axes(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             wo,
             normal: surface.normal * side,
             side,
             surface,
-            start: tile.world.geometry.triangle_number(hit),
+            start: tile.world.geometry.scene_triangle_number(hit),
             sides: None,
         }
     }
@@ -159,7 +159,7 @@ impl<'a> Vertex<'a> {
 
     /// Multiplies a BSDF by the vertex color.
     #[inline(always)]
-    pub fn tint(&self, bsdf: &mut BxdfPoint) {
+    pub fn tint_by_vertex_color(&self, bsdf: &mut BxdfPoint) {
         if let Some(color) = self.color {
             *bsdf = bsdf.tinted(color);
         }
@@ -184,7 +184,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// Shading normal on the front side: interpolated, then perturbed by the normal or bump map.
-    pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
+    pub fn perturbed_front_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
         let Some(normal_perturbation) = &self.material.normal_perturbation else {
             return surface.shading_normal;
@@ -195,7 +195,7 @@ impl<'a> Vertex<'a> {
 
     /// The shading normals on the viewer's side.
     pub fn shading_normals(&self, counters: &mut RayCounters) -> ShadingNormals {
-        let normal = self.front_shading_normal(counters) * self.side;
+        let normal = self.perturbed_front_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
         let shading_normal_cosine = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
         ShadingNormals { normal, smooth_normal, shading_normal_cosine }
@@ -265,7 +265,7 @@ impl<'a> Vertex<'a> {
         }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = tile.settings.render.shadows != ShadowMode::Off;
-        let (is_above, end) = shadow_lift_segment(on_facet, shadow_point, self.normal, error);
+        let (is_above, end) = measure_shadow_lift(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
@@ -278,10 +278,10 @@ impl<'a> Vertex<'a> {
 /// Returns whether the distance from a facet to the lifted point `to` is significant. Also returns the
 /// segment's `t_max`: 1 at the point, plus a margin for the error.
 #[inline(always)]
-pub fn shadow_lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
+pub fn measure_shadow_lift(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
-    (is_above, lift.extended_by(error).t_max)
+    (is_above, lift.extended_by_error(error).t_max)
 }
 
 /// Minimum lift, in units of the point's error. Below it, the point on the facet is used.
@@ -341,7 +341,7 @@ pub struct ShadingVertex<'a> {
     /// Index of the path in the bounce's queue.
     pub place: u32,
     /// The vertex to shade.
-    pub vertex: &'a Vertex<'a>,
+    pub vertex: &'a SurfaceVertex<'a>,
     /// Shading normals of the vertex.
     pub shading: ShadingNormals,
     /// BSDF of the vertex.

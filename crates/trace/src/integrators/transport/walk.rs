@@ -9,7 +9,7 @@ use super::interface::PASSED;
 use super::interiors::{InteriorList, medium_ior, medium_transmittance};
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::Vertex;
+use super::vertex::SurfaceVertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
 use crate::materials::{Bsdf, RoughDielectricPoint, ThinDielectric};
@@ -23,9 +23,9 @@ pub const MAX_PASSED_SURFACES: usize = 64;
 /// The interaction at which a walk ends.
 pub enum Interaction<'v, 'a> {
     /// An opaque surface, and the medium behind it.
-    Opaque(&'v Vertex<'a>, OpaqueHit, &'v InteriorList),
+    Opaque(&'v SurfaceVertex<'a>, OpaqueHit, &'v InteriorList),
     /// A boundary between media, at a hit on glass.
-    Glass(&'v Vertex<'a>, Hit, Interface<'v>),
+    Glass(&'v SurfaceVertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
     Nothing,
     /// The ray has crossed [`MAX_PASSED_SURFACES`] surfaces without a change of medium.
@@ -64,7 +64,7 @@ pub trait PathStepper<'a> {
     fn handle_pane(
         &mut self,
         path: &PathRay,
-        vertex: &Vertex<'a>,
+        vertex: &SurfaceVertex<'a>,
         hit: OpaqueHit,
         pane: &ThinDielectric,
     ) -> NullInteraction;
@@ -136,8 +136,8 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     while hidden < MAX_PASSED_SURFACES {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
-            Some(surface) => Vertex::with_surface(tile, path, &hit, surface),
-            None => Vertex::for_shading(tile, path, &hit),
+            Some(surface) => SurfaceVertex::with_surface(tile, path, &hit, surface),
+            None => SurfaceVertex::with_needed_attributes(tile, path, &hit),
         };
         // Stop if the surface is opaque. Otherwise, cross it as a null interaction.
         if vertex.material.bsdf.as_dielectric().is_none() {
@@ -194,9 +194,9 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             path.interiors = near;
         }
         if let Some(touching) = opaque {
-            let vertex = Vertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
+            let vertex = SurfaceVertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
             if !vertex.material.has_null_interaction()
-                || has_opaque_coincident_surface(stepper, path, &vertex)
+                || is_stopped_by_coincident_surface(stepper, path, &vertex)
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.measure_from_last_vertex(path, touched);
@@ -223,7 +223,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         }
         // Otherwise, cross the surface.
         (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-        path.state = path.state.hidden_from_lights();
+        path.state = path.state.after_crossing_inside_glass();
         path.cone = path.cone.at_distance(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
         let next = tile.world.geometry.closest_hit(&path.ray);
@@ -242,7 +242,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
 fn rough_boundary<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
-    (vertex, hit): (&Vertex<'a>, &Hit),
+    (vertex, hit): (&SurfaceVertex<'a>, &Hit),
     (sides, far): (OffsetPoints, &InteriorList),
 ) -> Option<RoughDielectricPoint> {
     let tile = stepper.tile();
@@ -252,7 +252,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
-        touching.map(|other| Vertex::at_coincident_surface(tile, path, (sides, &other), hit.shape.t));
+        touching.map(|other| SurfaceVertex::at_coincident_surface(tile, path, (sides, &other), hit.shape.t));
     let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
     let alpha = glass.alpha(at, stepper.texture_lookup_counter())?;
     Some(RoughDielectricPoint { near: indices[0], far: indices[1], alpha })
@@ -264,7 +264,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
 fn null_interaction<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
-    vertex: &Vertex<'a>,
+    vertex: &SurfaceVertex<'a>,
     (way, hit): (Segment, Hit),
 ) -> NullInteraction {
     if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
@@ -287,10 +287,10 @@ fn null_interaction<'a, W: PathStepper<'a>>(
 /// glass.
 #[cold]
 #[inline(never)]
-fn has_opaque_coincident_surface<'a, W: PathStepper<'a>>(
+fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
-    vertex: &Vertex<'a>,
+    vertex: &SurfaceVertex<'a>,
 ) -> bool {
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(_) => false,
@@ -302,7 +302,7 @@ fn has_opaque_coincident_surface<'a, W: PathStepper<'a>>(
 
 /// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up
 /// without filtering, as for shadow rays.
-pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
+pub fn opacity_at(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.pdf > 0.0;
     let at = vertex.lookup_point(is_shared);
@@ -313,7 +313,7 @@ pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32
 fn stochastic_opacity_test(
     tile: &TileContext<'_>,
     path: &PathRay,
-    vertex: &Vertex<'_>,
+    vertex: &SurfaceVertex<'_>,
     lookups: &mut u64,
 ) -> bool {
     let chance = opacity_at(path, vertex, lookups);
@@ -321,7 +321,7 @@ fn stochastic_opacity_test(
 }
 
 /// Path after a null interaction.
-fn path_past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
+fn path_past_surface(path: PathRay, vertex: &SurfaceVertex<'_>, part: Vec3) -> PathRay {
     PathRay {
         ray: vertex.spawn_ray(path.ray.direction),
         throughput: path.throughput * part,
@@ -343,7 +343,7 @@ impl TileContext<'_> {
     ) -> Option<(PathRay, Hit)> {
         let (mut path, mut hit) = (*path, *hit);
         for _ in 0..=MAX_NULL_INTERACTIONS {
-            let vertex = Vertex::for_shading(self, &path, &hit);
+            let vertex = SurfaceVertex::with_needed_attributes(self, &path, &hit);
             if stochastic_opacity_test(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }

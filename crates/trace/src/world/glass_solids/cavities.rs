@@ -1,7 +1,7 @@
 //! Cavities: closed meshes with inward-facing fronts inside another solid of the same glass.
 
 use super::caps::placed_triangles;
-use super::parts::GlassId;
+use super::parts::GlassMediumKey;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
@@ -15,7 +15,7 @@ pub(super) struct ClosedSolid {
     /// Enclosed volume. Negative if the front faces inward.
     pub volume: f64,
     /// Type of glass.
-    pub substance: GlassId,
+    pub substance: GlassMediumKey,
 }
 
 /// Direction of the rays used to count surfaces, chosen so that it is unlikely to be parallel to modeled

@@ -250,7 +250,7 @@ impl PartGroups {
     }
 
     /// Volume and area of a solid whose parts are all oriented like the first part.
-    fn volume(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
+    fn volume_and_area(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
             let GlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
@@ -262,7 +262,7 @@ impl PartGroups {
 
     /// Whether the parts of a closed solid enclose no volume.
     fn are_flat(&self, parts: &GlassParts, members: &[u32]) -> bool {
-        let (volume, area) = self.volume(parts, members);
+        let (volume, area) = self.volume_and_area(parts, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
 
@@ -273,7 +273,7 @@ impl PartGroups {
         let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
         let do_agree = members.iter().all(|&part| !self.flips[part as usize]);
         let substance = parts.list[members[0] as usize].substance;
-        let (volume, _) = self.volume(parts, members);
+        let (volume, _) = self.volume_and_area(parts, members);
         (are_meshes && do_agree).then_some(ClosedSolid { objects, volume, substance })
     }
 
@@ -292,7 +292,7 @@ impl PartGroups {
     fn is_first_part_flipped(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
-            let (volume, area) = self.volume(parts, members);
+            let (volume, area) = self.volume_and_area(parts, members);
             return volume < -1e-9 * area * area.sqrt();
         }
         let own = members.iter().map(|&part| (&parts.list[part as usize], self.flips[part as usize]));

@@ -31,12 +31,12 @@ pub(super) struct GlassPart {
     /// Position tolerance of the part's points.
     pub tolerance: f64,
     /// Type of glass.
-    pub substance: GlassId,
+    pub substance: GlassMediumKey,
 }
 
 /// Type of glass, identified by the bit patterns of the index of refraction and transmittance. `None` for a
 /// mesh with several types of glass.
-pub(super) type GlassId = Option<[u64; 4]>;
+pub(super) type GlassMediumKey = Option<[u64; 4]>;
 
 /// A straight edge of a part's boundary, directed so that the surface is on its left as seen from the front.
 #[derive(Clone, Copy, Debug)]
@@ -75,17 +75,17 @@ impl GlassParts {
                 let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
                 parts.add_mesh(number, mesh, loaded, glass, open);
             } else if let Some(sheet) = object.shape.as_open_surface() {
-                parts.add_sheet(number, &sheet);
+                parts.add_open_surface(number, &sheet);
             }
             for part in &mut parts.list[first..] {
-                part.substance = glass_id_of(scene, meshes, object);
+                part.substance = find_glass_medium_key(scene, meshes, object);
             }
         }
         Ok(parts)
     }
 
     /// Adds an open shape.
-    fn add_sheet(&mut self, number: u32, sheet: &OpenSurface) {
+    fn add_open_surface(&mut self, number: u32, sheet: &OpenSurface) {
         match *sheet {
             OpenSurface::Quad(corners) => self.add_polygon(number, &corners),
             OpenSurface::Triangle(corners) => self.add_polygon(number, &corners),
@@ -188,7 +188,7 @@ impl GlassParts {
             return;
         }
         let volume = if mirrors { -volume } else { volume };
-        let part = self.begin_part(object, (area, volume), place.abs_bound(reach).max_element());
+        let part = self.begin_part(object, (area, volume), place.transform_abs_bound(reach).max_element());
         for &[triangle, edge] in open.iter().filter(|open| is_glass(open[0] as usize)) {
             let corner = |i: u32| {
                 let vertex = mesh.triangles[triangle as usize][(i % 3) as usize];
@@ -236,12 +236,12 @@ pub(super) fn object_glass_triangles(
 }
 
 /// The type of glass that an object is made of.
-fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
+fn find_glass_medium_key(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassMediumKey {
     match (object.material, object.shape.mesh()) {
-        (Some(index), _) => scene.materials[index].kind.glass_medium_key(),
+        (Some(index), _) => scene.materials[index].kind.glass_medium_identity(),
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);
-            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_key();
+            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_identity();
             let mut each =
                 meshes[mesh.file].materials.iter().filter_map(file_glass_properties).filter_map(of);
             let first = each.next()?;

@@ -1,7 +1,7 @@
 //! Shared edges: pairs of rim edges that belong to the same glass and have the same endpoints but opposite
 //! directions.
 
-use super::parts::{GlassId, GlassPart, RimEdge};
+use super::parts::{GlassMediumKey, GlassPart, RimEdge};
 use crate::accel::Bvh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -32,16 +32,16 @@ pub(super) struct SharedEdges {
 
 /// A rim edge normalized for matching.
 #[derive(Clone, Copy)]
-struct HalfEdge {
+struct NormalizedRimEdge {
     /// Endpoint ids, lower id first.
     places: [u32; 2],
     /// Whether the edge runs from the higher to the lower id.
     is_back: bool,
-    substance: GlassId,
+    substance: GlassMediumKey,
     rim: RimEdge,
 }
 
-impl HalfEdge {
+impl NormalizedRimEdge {
     fn open_edge(&self) -> OpenEdge {
         let [low, high] = self.places;
         (self.rim, if self.is_back { [high, low] } else { [low, high] })
@@ -73,19 +73,20 @@ impl SharedEdges {
 
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
     fn match_equal_edges(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
-        let half = |(rim, [from, to]): OpenEdge| HalfEdge {
+        let half = |(rim, [from, to]): OpenEdge| NormalizedRimEdge {
             places: [from.min(to), from.max(to)],
             is_back: from > to,
             substance: parts[rim.part as usize].substance,
             rim,
         };
-        let mut halves: Vec<HalfEdge> = rims.into_iter().map(half).collect();
+        let mut halves: Vec<NormalizedRimEdge> = rims.into_iter().map(half).collect();
         halves.retain(|half| half.places[0] != half.places[1]);
         // The sort is stable, so ties are broken by file order.
         halves.sort_by_key(|half| (half.places, half.substance, half.is_back, half.rim.part));
         let mut open = Vec::new();
-        let is_same =
-            |one: &HalfEdge, other: &HalfEdge| (one.places, one.substance) == (other.places, other.substance);
+        let is_same = |one: &NormalizedRimEdge, other: &NormalizedRimEdge| {
+            (one.places, one.substance) == (other.places, other.substance)
+        };
         for same in halves.chunk_by(is_same) {
             let mut is_closed = vec![false; same.len()];
             let mut close = |i: usize, j: usize, disagrees: bool| {
@@ -108,18 +109,19 @@ impl SharedEdges {
 
 /// Returns pairs of edges with glass between them. Two surfaces that are neighbors in angular order around
 /// the common edge are paired if their backs face each other.
-fn pairs_with_glass_between(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
-    let ends =
-        |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
+fn pairs_with_glass_between(same: &[NormalizedRimEdge]) -> impl Iterator<Item = [usize; 2]> {
+    let ends = |half: &NormalizedRimEdge| {
+        if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends }
+    };
     let [from, to] = ends(&same[0]);
     let axis = (to - from).normalize_or_zero();
-    let beside = |half: &HalfEdge| {
+    let beside = |half: &NormalizedRimEdge| {
         let inner = half.rim.inner - from;
         inner - axis * inner.dot(axis)
     };
     let first = beside(&same[0]).normalize_or_zero();
     let second = axis.cross(first);
-    let angle = |half: &HalfEdge| {
+    let angle = |half: &NormalizedRimEdge| {
         let inner = beside(half);
         let angle = libm::atan2(inner.dot(second), inner.dot(first));
         let angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };

@@ -29,7 +29,7 @@ pub(super) fn alpha_weighted_texels(
         DynamicImage::ImageLumaA8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
         DynamicImage::ImageRgba8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
         image => {
-            let options = CutoutOptions {
+            let options = AlphaWeightingOptions {
                 alpha,
                 curve,
                 space,
@@ -54,7 +54,7 @@ fn rgba_texels_from_bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> Te
 }
 
 /// Settings for converting samples to alpha-weighted colors.
-struct CutoutOptions {
+struct AlphaWeightingOptions {
     /// Index of the alpha sample in a pixel.
     alpha: usize,
     curve: ColorCurve,
@@ -70,7 +70,7 @@ enum Linearization {
     Tables([Vec<f32>; 3]),
 }
 
-impl CutoutOptions {
+impl AlphaWeightingOptions {
     fn linearization<T: Sample>(&self) -> Linearization {
         match (self.curve, T::linearization_tables(&self.space)) {
             (ColorCurve::Linear, _) | (ColorCurve::Auto, None) => Linearization::Linear,
@@ -83,7 +83,11 @@ impl CutoutOptions {
 }
 
 /// Converts samples to linear colors multiplied by alpha.
-fn alpha_weighted_floats<T: Sample>(samples: &[T], options: &CutoutOptions, unusable: &mut u64) -> TexelData {
+fn alpha_weighted_floats<T: Sample>(
+    samples: &[T],
+    options: &AlphaWeightingOptions,
+    unusable: &mut u64,
+) -> TexelData {
     let decoding = options.linearization::<T>();
     let texel = |pixel: &[T]| {
         let alpha = sanitize(pixel[options.alpha].to_unit_float()).min(1.0);

@@ -116,7 +116,7 @@ fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
-pub(super) fn alpha_warning(
+pub(super) fn constant_alpha_warning(
     image: &DynamicImage,
     encoding: ImageEncoding,
     metadata: &ImageMetadata,
@@ -170,7 +170,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
     let channels = channel_count(&image);
     let mut unusable = 0;
     if !encoding.color_space(metadata).is_default() {
-        let data = convert_colors(&image, encoding, metadata, &mut unusable);
+        let data = convert_color_space(&image, encoding, metadata, &mut unusable);
         return Texels { width, height, data, unusable };
     }
     let data = match image {
@@ -244,13 +244,13 @@ fn texels_from_floats(
 
 /// Converts colors from a nonstandard color space. Colors outside Rec. 709 are clipped, except for
 /// [`ImageEncoding::Raw`].
-fn convert_colors(
+fn convert_color_space(
     image: &DynamicImage,
     encoding: ImageEncoding,
     metadata: &ImageMetadata,
     unusable: &mut u64,
 ) -> TexelData {
-    fn convert_samples<T: Sample>(
+    fn convert_samples_color_space<T: Sample>(
         samples: &[T],
         channels: usize,
         (space, is_raw): (&ColorSpace, bool),
@@ -270,7 +270,7 @@ fn convert_colors(
     }
     let space = encoding.color_space(metadata);
     let options = (&space, encoding == ImageEncoding::Raw);
-    with_samples!(image, samples => convert_samples(samples, channel_count(image), options, unusable))
+    with_samples!(image, samples => convert_samples_color_space(samples, channel_count(image), options, unusable))
 }
 
 /// Linearizes a pixel, using tables for integers.

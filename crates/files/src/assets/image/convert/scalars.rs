@@ -21,7 +21,7 @@ enum ScalarSource {
 }
 
 /// Selects the samples from which the scalar is computed.
-fn select_samples(
+fn choose_scalar_source(
     image: &DynamicImage,
     (of, is_srgb): (ChannelSelector, bool),
     metadata: &ImageMetadata,
@@ -49,11 +49,11 @@ fn select_samples(
 
 /// Whether to use an opaque image's luminance as its opacity.
 pub(super) fn uses_luminance_mask(image: &DynamicImage, of_any_color: bool) -> bool {
-    of_any_color || has_gray_pixels(image)
+    of_any_color || is_grayscale(image)
 }
 
 /// Whether red, green and blue are equal in all pixels.
-fn has_gray_pixels(image: &DynamicImage) -> bool {
+fn is_grayscale(image: &DynamicImage) -> bool {
     fn all_pixels_gray<T: Sample>(samples: &[T], channels: usize) -> bool {
         samples.chunks_exact(channels).map(rgb).all(|[r, g, b]| r == g && g == b)
     }
@@ -67,7 +67,7 @@ pub(super) fn scalar_texels(
     metadata: &ImageMetadata,
 ) -> Texels {
     let (width, height) = (image.width(), image.height());
-    let (channels, samples) = (channel_count(image), select_samples(image, of, metadata));
+    let (channels, samples) = (channel_count(image), choose_scalar_source(image, of, metadata));
     let mut unusable = 0;
     let data = match (image, samples) {
         (_, ScalarSource::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),

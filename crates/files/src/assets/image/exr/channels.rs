@@ -125,7 +125,7 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     };
     let unnamed = find(false, LayerChannels::color).or_else(|| find(false, LayerChannels::gray));
     let named = || find(true, LayerChannels::color).or_else(|| find(true, LayerChannels::gray));
-    unnamed.or_else(named).or_else(|| sole_channel(headers))
+    unnamed.or_else(named).or_else(|| first_single_channel(headers))
 }
 
 /// Returns a part's layers, keyed by name. A layer name is the part of a channel name before its last dot.
@@ -162,7 +162,7 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
 
 /// Returns the channel of the first single-channel part. `None` if the single-channel parts are components of
 /// a color or vector.
-fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
+fn first_single_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
         let name = header.channels.list[0].name.to_string().to_ascii_uppercase();

@@ -62,7 +62,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let mut metadata = ImageMetadata { alpha: AlphaUsage::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
-                Some(matrix) => metadata.space = ColorSpace::from_rec_709_matrix(matrix),
+                Some(matrix) => metadata.space = ColorSpace::with_matrix_to_rec_709(matrix),
                 None => metadata.warn(DEGENERATE_CHROMATICITIES),
             }
         }
@@ -104,13 +104,13 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_header(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
+    let sampling = |channel: ChannelIndex| channel_header(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -120,9 +120,7 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     }
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
-        Some(channel) => {
-            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
-        }
+        Some(channel) => Err(subsampled_channel_message(&channel_header(headers, channel).name.to_string())),
         None => match channels.luminance_chroma_channels() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
@@ -159,7 +157,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
             let block = chunk.and_then(|chunk| decompressor.decompress(chunk)).map_err(image_error)?;
             image.add(&block, samples);
         }
-        image.add_chroma(samples);
+        image.convert_luminance_chroma(samples);
         Ok(())
     }
 
@@ -230,7 +228,7 @@ impl PartialImage<'_> {
     }
 
     /// Computes colors from luminance and chroma.
-    fn add_chroma(self, samples: &mut [u8]) {
+    fn convert_luminance_chroma(self, samples: &mut [u8]) {
         let (Some([y, ..]), Some(planes)) = (self.channels.luminance_chroma_channels(), self.planes) else {
             return;
         };

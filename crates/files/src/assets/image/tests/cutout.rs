@@ -28,7 +28,7 @@ fn colors_are_alpha_weighted_unless_opaque() {
     assert_eq!(data(&[[1, 2, 3, 255]], ColorCurve::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
     let texels = Texels { width: 2, height: 1, data: data(&cut, ColorCurve::Auto), unusable: 0 };
     assert_eq!([texels.get(0, 0), texels.get(1, 0)], [Vec3::X, Vec3::Y]);
-    assert_eq!(texels.premultiplied(0), Vec4::new(0.2, 0.0, 0.0, 0.2));
+    assert_eq!(texels.premultiplied_texel(0), Vec4::new(0.2, 0.0, 0.0, 0.2));
     assert!((texels.mean() - Vec3::new(1.0 / 6.0, 5.0 / 6.0, 0.0)).length() < 1e-6);
 }
 
@@ -42,7 +42,7 @@ fn premultiplied_colors_are_unmultiplied_once() {
     for curve in [ColorCurve::Auto, ColorCurve::Linear] {
         let texels = loaded(curve);
         assert_eq!([0, 2].map(|x| texels.get(x, 0)), [Vec3::new(1.0, 0.5, 0.0), Vec3::ONE]);
-        assert_eq!(texels.premultiplied(0), Vec4::new(0.5, 0.25, 0.0, 0.5));
+        assert_eq!(texels.premultiplied_texel(0), Vec4::new(0.5, 0.25, 0.0, 0.5));
     }
     assert!((loaded(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
     // Without a cutout, the color is composited over black.
@@ -71,7 +71,7 @@ fn masks_without_alpha_use_the_luminance() {
     }
     let warning = |image: DynamicImage, of| {
         let encoding = ImageEncoding::Number { of, is_srgb: false };
-        convert::alpha_warning(&image, encoding, &ImageMetadata::default())
+        convert::constant_alpha_warning(&image, encoding, &ImageMetadata::default())
     };
     assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));
     assert_eq!(warning(red(), mask(false)), Some(convert::OPAQUE));

@@ -62,7 +62,7 @@ fn all_orientations_decode_to_the_same_image() {
         let pixels: Vec<u8> = order.iter().flat_map(|&number| [number, 0, 0, 136]).collect();
         let image = load_bytes("a.hdr", &file("", size, &pixels), ImageEncoding::Color).expect(size);
         assert_eq!((image.width, image.height), (3, 2), "{size}");
-        let reds: Vec<f32> = (0..6).map(|index| image.linear_value(index).x).collect();
+        let reds: Vec<f32> = (0..6).map(|index| image.linear_color_at_index(index).x).collect();
         assert_eq!(reds, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "{size}");
     }
 }

@@ -100,7 +100,7 @@ fn no_effect_warning(keyword: &str, kind: FileMaterialKind<'_>) -> String {
     format!("`{keyword}` has no effect on {kind}")
 }
 
-fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
+fn line_of_value<T>(at: Option<WithLine<T>>) -> Option<usize> {
     at.map(|at| at.line)
 }
 
@@ -115,7 +115,7 @@ fn warn_about_illumination(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let model = line(found.illumination);
+    let model = line_of_value(found.illumination);
     match converted.illumination_model.unwrap_or(2) {
         0 => add(model, UNSHADED),
         10 => add(model, SHADOW_CATCHER),
@@ -128,9 +128,11 @@ fn warn_about_illumination(
         FileMaterialKind::Glass | FileMaterialKind::Principled(_)
             if converted.ior > FileMaterial::MAX_IOR =>
         {
-            add(line(ior), IOR_CLAMPED);
+            add(line_of_value(ior), IOR_CLAMPED);
         }
-        FileMaterialKind::Principled(_) if ior.is_some() && converted.ior <= 1.0 => add(line(ior), LOW_IOR),
+        FileMaterialKind::Principled(_) if ior.is_some() && converted.ior <= 1.0 => {
+            add(line_of_value(ior), LOW_IOR);
+        }
         FileMaterialKind::Principled(_)
         | FileMaterialKind::Phong
         | FileMaterialKind::Coated
@@ -140,7 +142,7 @@ fn warn_about_illumination(
     if converted.emission != Vec3::ZERO && !converted.emits() {
         let emission = found.color(MtlColor::Emission);
         if emission.is_some() {
-            add(line(emission), &no_effect_warning("Ke", converted.kind()));
+            add(line_of_value(emission), &no_effect_warning("Ke", converted.kind()));
         }
     }
 }
@@ -163,7 +165,7 @@ fn warn_about_opacity(
         let given = opacity.or(transparency).filter(|_| converted.opacity < 1.0);
         given.iter().for_each(|at| add(Some(at.line), OPACITY_MAP));
     } else if is_opaque_despite_tr(found) {
-        add(line(transparency), OPAQUE_TR);
+        add(line_of_value(transparency), OPAQUE_TR);
     }
     if let (Some(opacity), Some(transparency)) = (opacity, transparency) {
         // Some programs write the opacity as `Tr`.
@@ -189,11 +191,11 @@ fn warn_about_reflectance(
     match converted.kind() {
         FileMaterialKind::Phong => warn_about_phong(found, converted, add),
         FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_above_one(kd) => {
-            add(line(diffuse), BRIGHT_DIFFUSE);
+            add(line_of_value(diffuse), BRIGHT_DIFFUSE);
         }
-        FileMaterialKind::Coated if ks > FileMaterial::MAX_COAT => add(line(specular), BRIGHT_COAT),
-        FileMaterialKind::Mirror if is_above_one(ks) => add(line(specular), BRIGHT_MIRROR),
-        FileMaterialKind::Mirror if kd > 0.0 => add(line(diffuse), DIFFUSE_UNDER_MIRROR),
+        FileMaterialKind::Coated if ks > FileMaterial::MAX_COAT => add(line_of_value(specular), BRIGHT_COAT),
+        FileMaterialKind::Mirror if is_above_one(ks) => add(line_of_value(specular), BRIGHT_MIRROR),
+        FileMaterialKind::Mirror if kd > 0.0 => add(line_of_value(diffuse), DIFFUSE_UNDER_MIRROR),
         FileMaterialKind::Principled(_)
         | FileMaterialKind::Coated
         | FileMaterialKind::Mirror
@@ -212,7 +214,7 @@ fn warn_about_phong(
     let is_matte = matches!(converted.illumination_model, Some(0 | 1));
     let has_strength = converted.specular != Vec3::ZERO || specular_map.is_some();
     if !is_matte && has_strength && !converted.has_highlight() {
-        add(line(specular).or(specular_map.map(|map| map.line)), NO_HIGHLIGHT);
+        add(line_of_value(specular).or(specular_map.map(|map| map.line)), NO_HIGHLIGHT);
     }
     let kd = if converted.diffuse_texture.is_some() { Vec3::ZERO } else { converted.diffuse };
     let has_constant_highlight = converted.has_highlight() && converted.specular_texture.is_none();
@@ -221,7 +223,7 @@ fn warn_about_phong(
         false => Vec3::ZERO,
     };
     if is_above_one((kd + ks).max_element()) {
-        add(line(diffuse).or(line(specular)), GAINS_ENERGY);
+        add(line_of_value(diffuse).or(line_of_value(specular)), GAINS_ENERGY);
     }
 }
 

@@ -153,28 +153,30 @@ impl Map {
     fn parse_option_arguments(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
         match option {
             "-s" => {
-                let scale = rest.numbers([1.0; 3]).filter(|[u, v, _]| !is_zero(*u) && !is_zero(*v));
+                let scale = rest.next_numbers([1.0; 3]).filter(|[u, v, _]| !is_zero(*u) && !is_zero(*v));
                 set_if_some(&mut self.repeat, scale.map(|[u, v, _]| [u, v]))
             }
-            "-o" => set_if_some(&mut self.offset, rest.numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
-            "-t" => rest.numbers([0.0; 3]) == Some([0.0; 3]),
-            "-mm" => set_if_some(&mut self.range, rest.numbers([0.0, 1.0])),
+            "-o" => set_if_some(&mut self.offset, rest.next_numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
+            "-t" => rest.next_numbers([0.0; 3]) == Some([0.0; 3]),
+            "-mm" => set_if_some(&mut self.range, rest.next_numbers([0.0, 1.0])),
             "-bm" => {
-                let strength = rest.numbers([1.0]).filter(|[strength]| *strength >= 0.0);
+                let strength = rest.next_numbers([1.0]).filter(|[strength]| *strength >= 0.0);
                 set_if_some(&mut self.strength, strength.map(|[strength]| strength))
             }
             "-clamp" => set_if_some(&mut self.is_clamped, rest.next_switch()),
-            "-imfchan" => set_if_some(&mut self.number, rest.word().and_then(parse_channel).map(Some)),
-            "-boost" | "-texres" => rest.numbers([0.0]) == Some([0.0]),
+            "-imfchan" => {
+                set_if_some(&mut self.number, rest.next_unless_last().and_then(parse_channel).map(Some))
+            }
+            "-boost" | "-texres" => rest.next_numbers([0.0]) == Some([0.0]),
             "-blendu" | "-blendv" => rest.next_switch() == Some(true),
             "-cc" => rest.next_switch() == Some(false),
             "-type" | "-colorspace" => {
-                rest.word();
+                rest.next_unless_last();
                 false
             }
             _ => {
                 while rest.next_is_value() {
-                    rest.word();
+                    rest.next_unless_last();
                 }
                 false
             }
@@ -209,7 +211,7 @@ impl Map {
             is_clamped: self.is_clamped,
             range: (base, gain),
             number: self.number,
-            ..FileTexture::new(first_existing(folder, self.candidate_paths())?, statement)
+            ..FileTexture::new(first_existing_or_first(folder, self.candidate_paths())?, statement)
         })
     }
 }
@@ -294,7 +296,7 @@ impl<'a> MapArguments<'a> {
     }
 
     /// Consumes the next word unless it is the last one.
-    fn word(&mut self) -> Option<&'a str> {
+    fn next_unless_last(&mut self) -> Option<&'a str> {
         let (word, rest) = self.peek()?;
         self.0 = rest;
         Some(word)
@@ -307,12 +309,12 @@ impl<'a> MapArguments<'a> {
 
     /// Consumes up to `N` numbers. Missing numbers keep their defaults. Returns `None` if there are no
     /// numbers, or if one of them is too large or not finite.
-    fn numbers<const N: usize>(&mut self, default: [f64; N]) -> Option<[f64; N]> {
+    fn next_numbers<const N: usize>(&mut self, default: [f64; N]) -> Option<[f64; N]> {
         let mut numbers = default;
         let mut are_usable = false;
         for (index, number) in numbers.iter_mut().enumerate() {
             let Some(value) = self.peek().and_then(|(word, _)| word.parse::<f32>().ok()) else { break };
-            self.word();
+            self.next_unless_last();
             *number = f64::from(value);
             are_usable = (index == 0 || are_usable) && number.abs() <= LARGEST;
         }
@@ -322,7 +324,7 @@ impl<'a> MapArguments<'a> {
     /// Consumes `on` or `off`.
     fn next_switch(&mut self) -> Option<bool> {
         let is_on = parse_switch(self.peek()?.0)?;
-        self.word();
+        self.next_unless_last();
         Some(is_on)
     }
 }
@@ -347,7 +349,7 @@ pub(in crate::assets::mesh) fn utf8_and_latin1_paths(name: &str) -> impl Iterato
 }
 
 /// Returns the first file that exists, or the first file in the list if none exists.
-pub(in crate::assets::mesh) fn first_existing(
+pub(in crate::assets::mesh) fn first_existing_or_first(
     folder: &Path,
     names: impl Iterator<Item = PathBuf>,
 ) -> Option<PathBuf> {

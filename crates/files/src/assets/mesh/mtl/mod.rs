@@ -11,7 +11,7 @@ use super::text::{convert_mac_line_ends, decode_line, strip_byte_order_mark};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{IgnoredStatement, collect_warnings};
-pub(super) use map::{first_existing, utf8_and_latin1_paths, without_trailing_comments};
+pub(super) use map::{first_existing_or_first, utf8_and_latin1_paths, without_trailing_comments};
 pub(super) use material::to_file_material;
 use statements::{MtlColor, MtlNumber, Statement};
 

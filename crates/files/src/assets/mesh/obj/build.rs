@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::super::parsed::ParsedMesh;
 use super::statements::{CornerIndices, NONE, Smoothing, Statements};
-use crate::geometry::mesh::NormalGroup;
+use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{Vec2, Vec3};
 
 /// Consecutive faces with the same material, smoothing group and object.
@@ -66,7 +66,7 @@ impl VertexBuilder<'_> {
             let arity = self.statements.arities[self.face] as usize;
             self.face += 1;
             for corner in &self.statements.corners[self.corner..self.corner + arity] {
-                let vertex = self.vertex(*corner, run.smoothing);
+                let vertex = self.find_or_add_vertex(*corner, run.smoothing);
                 self.parsed.faces.push_corner(vertex);
             }
             self.parsed.faces.end_face(arity);
@@ -77,12 +77,14 @@ impl VertexBuilder<'_> {
         }
     }
 
-    fn vertex(&mut self, corner: CornerIndices, smoothing: Smoothing) -> u32 {
+    fn find_or_add_vertex(&mut self, corner: CornerIndices, smoothing: Smoothing) -> u32 {
         let has_normal = corner[2] != NONE;
         let tag = match smoothing {
-            Smoothing::Flat if !has_normal => (NormalGroup::FLAT, self.face as u32),
-            Smoothing::Group(group) if !has_normal => (group.min(NormalGroup::FLAT - 1), 0),
-            Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unspecified => (NormalGroup::BY_ANGLE, 0),
+            Smoothing::Flat if !has_normal => (VertexNormalGroup::FLAT, self.face as u32),
+            Smoothing::Group(group) if !has_normal => (group.min(VertexNormalGroup::FLAT - 1), 0),
+            Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unspecified => {
+                (VertexNormalGroup::BY_ANGLE, 0)
+            }
         };
         let next = self.parsed.positions.len() as u32;
         let vertex = *self.vertices.entry((corner, tag)).or_insert(next);
@@ -107,10 +109,10 @@ impl VertexBuilder<'_> {
             self.parsed.colors.push(vertices.color_of(position));
         }
         if self.has_smoothing {
-            let is_shared = group != NormalGroup::FLAT && group != NormalGroup::BY_ANGLE;
+            let is_shared = group != VertexNormalGroup::FLAT && group != VertexNormalGroup::BY_ANGLE;
             let key = (corner[0], group);
             let normal = if is_shared { *self.normals.entry(key).or_insert(index) } else { index };
-            self.parsed.normal_groups.push(NormalGroup { normal, group });
+            self.parsed.normal_groups.push(VertexNormalGroup { normal, group });
         }
     }
 }

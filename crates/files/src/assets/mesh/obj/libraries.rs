@@ -9,15 +9,15 @@ use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
 
 /// Loads the libraries referenced by an OBJ file, in order of occurrence.
-pub(super) struct MtlLibraries<'a> {
+pub(super) struct MtlLibraryLoader<'a> {
     pub(super) source: &'a MeshSource<'a>,
     /// Names of the materials used by the OBJ file.
     pub(super) used: &'a BTreeSet<String>,
-    pub(super) found: LibraryContents,
+    pub(super) found: LoadedLibraries,
 }
 
 #[derive(Default)]
-pub(super) struct LibraryContents {
+pub(super) struct LoadedLibraries {
     pub(super) materials: Vec<FileMaterial>,
     /// Used names that were resolved to a material.
     pub(super) resolved: BTreeSet<String>,
@@ -29,7 +29,7 @@ pub(super) struct LibraryContents {
     pub(super) images: Vec<PathBuf>,
 }
 
-impl MtlLibraries<'_> {
+impl MtlLibraryLoader<'_> {
     /// Loads the libraries named in a statement. Maps each used material name that they define to its
     /// material index. Missing files only cause warnings.
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
@@ -103,7 +103,7 @@ pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let names = without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
     names
         .split_whitespace()
-        .filter_map(|name| mtl::first_existing(folder, utf8_and_latin1_paths(name)))
+        .filter_map(|name| mtl::first_existing_or_first(folder, utf8_and_latin1_paths(name)))
         .collect()
 }
 

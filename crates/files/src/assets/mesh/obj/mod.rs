@@ -17,16 +17,16 @@ use super::text::convert_mac_line_ends;
 use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::FileMaterial;
 use build::{FaceRun, build_faces};
-use libraries::{LibraryContents, MtlLibraries};
+use libraries::{LoadedLibraries, MtlLibraryLoader};
 use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
 use statements::{NONE, Smoothing, StateChange, Statements, face_start};
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    parse_lines(&MeshSource { bytes: &convert_mac_line_ends(source.bytes), ..*source })
+    parse_normalized_text(&MeshSource { bytes: &convert_mac_line_ends(source.bytes), ..*source })
 }
 
-fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
+fn parse_normalized_text(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     let mut statements = Statements::read(source)?;
     let materials = ObjMaterials::load(source, &statements.changes)?;
     let runs = split_into_runs(&statements, &materials.used);
@@ -52,7 +52,7 @@ struct ObjMaterials {
     /// Material index of each `usemtl` statement, or [`NONE`].
     used: Vec<u32>,
     warnings: Vec<String>,
-    found: LibraryContents,
+    found: LoadedLibraries,
 }
 
 impl ObjMaterials {
@@ -67,7 +67,7 @@ impl ObjMaterials {
             | StateChange::Smoothing(_) => None,
         };
         let names: BTreeSet<String> = changes.iter().filter_map(|(_, change)| name_of(change)).collect();
-        let mut libraries = MtlLibraries { source, used: &names, found: LibraryContents::default() };
+        let mut libraries = MtlLibraryLoader { source, used: &names, found: LoadedLibraries::default() };
         let mut known = HashMap::new();
         let mut used = Vec::new();
         for (_, change) in changes {

@@ -192,7 +192,7 @@ impl Statements {
             let line = source.line_number(start);
             self.warnings.push(excess_words_warning(line));
         }
-        if let Some(start) = self.vertices.most_transparent_vertex() {
+        if let Some(start) = self.vertices.find_lowest_alpha_offset() {
             self.warnings.push(alpha_ignored_warning(source.line_number(start)));
         }
         if let Some((start, words)) = self.vertices.out_of_range_color_warning() {

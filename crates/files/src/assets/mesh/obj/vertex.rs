@@ -102,7 +102,7 @@ impl Vertices {
 
     /// Byte offset of the vertex with the minimum alpha. `None` if every alpha is at its maximum. Alpha has
     /// the same range as the colors.
-    pub(super) fn most_transparent_vertex(&self) -> Option<usize> {
+    pub(super) fn find_lowest_alpha_offset(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
     }
 

@@ -31,19 +31,19 @@ impl PlyColors {
         if !self.are_bytes() {
             self.range.add(color, at);
         }
-        self.store(color);
+        self.push_untracked(color);
     }
 
     /// Adds white for an item without a color.
     pub(super) fn push_missing(&mut self) {
-        self.store([f64::INFINITY; 3]);
+        self.push_untracked([f64::INFINITY; 3]);
     }
 
     fn are_bytes(&self) -> bool {
         self.scalars == [ScalarType::U8; 3]
     }
 
-    fn store(&mut self, color: [f64; 3]) {
+    fn push_untracked(&mut self, color: [f64; 3]) {
         if self.are_bytes() {
             self.bytes.push(color.map(|part| part as u8));
         } else {
@@ -51,7 +51,7 @@ impl PlyColors {
         }
     }
 
-    pub(super) fn add_alpha(&mut self, alpha: f64, scalar: ScalarType, at: usize) {
+    pub(super) fn track_lowest_alpha(&mut self, alpha: f64, scalar: ScalarType, at: usize) {
         if self.alpha.is_none_or(|(least, ..)| alpha < least) {
             self.alpha = Some((alpha, scalar, at));
         }

@@ -62,7 +62,7 @@ pub(super) fn has_attributes(element: &Element, corners: usize) -> bool {
 }
 
 /// Reads faces with texture coordinates or colors.
-pub(super) fn read(
+pub(super) fn read_with_attributes(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
@@ -74,7 +74,7 @@ pub(super) fn read(
     let mut faces = FaceReader::new(&roles);
     read_items(context, element, numbers, |numbers| {
         let start = numbers.offset();
-        faces.read(&roles, numbers, vertices)?;
+        faces.read_face(&roles, numbers, vertices)?;
         faces.add(parsed, start, numbers.offset());
         Ok(())
     })?;
@@ -140,7 +140,7 @@ impl FaceReader {
         }
     }
 
-    fn read<N: NumberReader>(
+    fn read_face<N: NumberReader>(
         &mut self,
         roles: &[(PropertyType, PropertyRole)],
         numbers: &mut N,
@@ -211,7 +211,7 @@ impl FaceReader {
             let list_alpha = of_corner.and_then(|color| Some((*color.get(3)?, self.list_scalar?)));
             let alpha = list_alpha.or(self.alpha.map(|scalar| (self.values[ALPHA], scalar)));
             if let Some((alpha, scalar)) = alpha {
-                colors.add_alpha(alpha, scalar, end);
+                colors.track_lowest_alpha(alpha, scalar, end);
             }
         }
         parsed.faces.end_face(arity);
@@ -232,7 +232,7 @@ impl FaceReader {
         if parsed.colors.is_empty() {
             let (colors, warnings) = colors.finish();
             parsed.corner_colors = colors;
-            parsed.warnings.extend(context.with_line_numbers(warnings));
+            parsed.warnings.extend(context.add_line_numbers(warnings));
         } else {
             parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }

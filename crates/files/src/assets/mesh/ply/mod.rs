@@ -79,7 +79,7 @@ impl ErrorContext<'_> {
     }
 
     /// Adds line numbers to warnings that have a byte offset.
-    fn with_line_numbers(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
+    fn add_line_numbers(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
         warnings.into_iter().map(|(at, words)| format!("{}{words}", self.line_prefix(at)))
     }
 
@@ -306,7 +306,7 @@ fn read_vertices(
         if let Some(colors) = &mut colors {
             colors.push([red, green, blue], numbers.offset());
             if let Some(scalar) = alpha_scalar {
-                colors.add_alpha(alpha, scalar, numbers.offset());
+                colors.track_lowest_alpha(alpha, scalar, numbers.offset());
             }
         }
         Ok(())
@@ -314,7 +314,7 @@ fn read_vertices(
     if let Some(colors) = colors {
         let (colors, warnings) = colors.finish();
         parsed.colors = colors;
-        parsed.warnings.extend(context.with_line_numbers(warnings));
+        parsed.warnings.extend(context.add_line_numbers(warnings));
     }
     Ok(())
 }
@@ -330,11 +330,11 @@ fn read_faces(
         return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
     };
     if faces::has_attributes(element, corners) {
-        return faces::read(context, element, corners, numbers, vertices, parsed);
+        return faces::read_with_attributes(context, element, corners, numbers, vertices, parsed);
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    read_lists(context, element, corners, numbers, |numbers, item, length| {
+    read_list_property(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
             faces.push_corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
         }
@@ -356,7 +356,7 @@ fn read_strips(
         return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
     };
     let faces = &mut parsed.faces;
-    read_lists(context, element, corners, numbers, |numbers, item, length| {
+    read_list_property(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.integer(item)?;
@@ -395,7 +395,7 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
 
 /// Reads all items of an element. `corners` is a property index. `read` receives the type and length of that
 /// property's list.
-fn read_lists<N: NumberReader>(
+fn read_list_property<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,

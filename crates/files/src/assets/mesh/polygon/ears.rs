@@ -70,13 +70,13 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         while self.remaining > 2 {
             self.clip_queued();
             if self.remaining <= 2
-                || self.clip_first(|clipper, corner| clipper.find_blocker(corner, true).is_none())
+                || self.clip_first_accepted(|clipper, corner| clipper.find_blocker(corner, true).is_none())
             {
                 continue;
             }
             is_simple = false;
             // Clip any convex corner. If no corner is convex, the rest of the polygon has no positive area.
-            if !self.clip_first(|_, _| true) {
+            if !self.clip_first_accepted(|_, _| true) {
                 break;
             }
         }
@@ -101,7 +101,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
     }
 
     /// Clips the first convex corner that `is_ear` accepts.
-    fn clip_first(&mut self, is_ear: impl Fn(&mut Self, u32) -> bool) -> bool {
+    fn clip_first_accepted(&mut self, is_ear: impl Fn(&mut Self, u32) -> bool) -> bool {
         let Some(start) = self.next.iter().position(|next| *next != NONE) else { return false };
         let mut corner = start as u32;
         for _ in 0..self.remaining {

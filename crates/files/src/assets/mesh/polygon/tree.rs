@@ -87,7 +87,7 @@ impl CornerTree {
             *visits += 1;
             let BoxNode { min: low, max: high, remaining } = self.nodes[node];
             let is_apart = low.cmpgt(max).any() || high.cmplt(min).any();
-            if remaining == 0 || is_apart || is_outside(triangle, low, high) {
+            if remaining == 0 || is_apart || is_box_beyond_edge(triangle, low, high) {
                 continue;
             }
             if end - start <= LEAF {
@@ -106,7 +106,7 @@ impl CornerTree {
 }
 
 /// Whether a box is entirely outside one side of a triangle.
-fn is_outside([a, b, c]: [DVec2; 3], low: DVec2, high: DVec2) -> bool {
+fn is_box_beyond_edge([a, b, c]: [DVec2; 3], low: DVec2, high: DVec2) -> bool {
     [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| {
         // Test the corner of the box that is farthest inside.
         let x = if to.y > from.y { low.x } else { high.x };

@@ -41,8 +41,10 @@ impl TreePart {
     /// children.
     pub fn flatten(self) -> KdSubtree {
         let size = self.size();
-        let mut all =
-            KdSubtree { nodes: pages::with_huge_pages(size.nodes), ids: pages::with_huge_pages(size.ids) };
+        let mut all = KdSubtree {
+            nodes: pages::allocate_vec_in_huge_pages(size.nodes),
+            ids: pages::allocate_vec_in_huge_pages(size.ids),
+        };
         let nothing = KdNode::new(NodeKind::Leaf { first: 0, count: 0 });
         rayon::join(
             || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),

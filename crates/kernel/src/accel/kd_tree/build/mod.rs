@@ -125,7 +125,7 @@ impl Cell {
     /// Chooses the splitting plane. Returns `None` if the cell should become a leaf.
     fn choose_split(&self, references: &[TriangleReference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
-        let has_room = 2 * leaf_size(references.len()) <= self.room;
+        let has_room = 2 * room_needed_by_leaf(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
         } else if references.len() <= sweep::SWEPT {
@@ -137,7 +137,7 @@ impl Cell {
 
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
-        let [left, right] = counts.map(leaf_size);
+        let [left, right] = counts.map(room_needed_by_leaf);
         // Divide the room proportionally. If there is enough room for both halves together, each half gets
         // enough.
         let room = self.room * left / (left + right);
@@ -148,7 +148,7 @@ impl Cell {
 }
 
 /// Room needed by a leaf with `count` references.
-fn leaf_size(count: usize) -> u64 {
+fn room_needed_by_leaf(count: usize) -> u64 {
     count as u64 + 1
 }
 

@@ -83,7 +83,7 @@ impl UpperNodes {
         let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.build_wide_node(children, &starts)).collect();
         let total = starts.last().map_or(0, |end| end.node);
-        let mut nodes = pages::with_huge_pages(total as usize);
+        let mut nodes = pages::allocate_vec_in_huge_pages(total as usize);
         let node = |place: u32| match nodes_of_top.get(place as usize) {
             Some(node) => *node,
             None => {

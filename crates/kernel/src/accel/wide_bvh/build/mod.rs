@@ -58,7 +58,7 @@ pub fn build(
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
     };
-    let mut packs = super::simd::pages::with_huge_pages(leaves.len());
+    let mut packs = super::simd::pages::allocate_vec_in_huge_pages(leaves.len());
     leaves.par_iter().map(pack).collect_into_vec(&mut packs);
     Ok(BuiltWideBvh { nodes, packs, bounds })
 }

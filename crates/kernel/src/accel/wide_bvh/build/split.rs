@@ -192,7 +192,7 @@ impl<const N: usize> Histogram<N> {
 
     fn from_references(references: &[TriangleReference], bins: &BinMapping) -> Self {
         let mut own = Self::EMPTY;
-        if !simd::binning::add_to_histogram(references, bins, &mut own) {
+        if !simd::binning::try_add_to_histogram(references, bins, &mut own) {
             own.add_references(references, bins);
         }
         own
@@ -295,7 +295,7 @@ fn partition_along_axis<const AXIS: usize>(
     bin: usize,
     bins: &BinMapping,
 ) -> (usize, [SimdBounds; 2]) {
-    match simd::binning::partition::<AXIS>(references, bin, bins) {
+    match simd::binning::try_partition::<AXIS>(references, bin, bins) {
         Some(done) => done,
         None => partition_by_plane::<AXIS>(references, bin, bins),
     }

@@ -6,7 +6,7 @@ use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::build::split::{BinMapping, Histogram};
 
 /// Adds references to a histogram's bins. Returns false and does nothing if the processor lacks AVX2.
-pub fn add_to_histogram<const N: usize>(
+pub fn try_add_to_histogram<const N: usize>(
     references: &[TriangleReference],
     bins: &BinMapping,
     into: &mut Histogram<N>,
@@ -23,7 +23,7 @@ pub fn add_to_histogram<const N: usize>(
 
 /// Moves the references below a bin to the front. Returns how many there are, and the bounding boxes of the
 /// centroids on both sides. Returns `None` and does nothing if the processor lacks AVX2.
-pub fn partition<const AXIS: usize>(
+pub fn try_partition<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
     bins: &BinMapping,

@@ -74,7 +74,7 @@ impl Simd for Avx2Simd {
     }
 
     #[inline(always)]
-    fn call<L: SimdKernel>(self, work: L) -> L::Output {
+    fn call_out_of_line<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
         unsafe { run_avx2(work) }
     }
@@ -111,7 +111,7 @@ impl Simd for Avx512Simd {
     }
 
     #[inline(always)]
-    fn call<L: SimdKernel>(self, work: L) -> L::Output {
+    fn call_out_of_line<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
         unsafe { run_avx512(work) }
     }
@@ -140,7 +140,7 @@ fn avx512_movemask(mask: &Mask) -> u32 {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn min_max_of_halves(low: __m256, high: __m256) -> [f32; 2] {
+fn horizontal_min_max(low: __m256, high: __m256) -> [f32; 2] {
     let (least, greatest) = (_mm256_min_ps(high, low), _mm256_max_ps(high, low));
     let halves = |row: __m256| (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row));
     let ((low, high), (below, above)) = (halves(least), halves(greatest));
@@ -165,7 +165,7 @@ fn avx2_min_max(row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: reads eight numbers; no alignment is required.
         _mm256_blendv_ps(other, unsafe { _mm256_loadu_ps(half.as_ptr()) }, mask)
     });
-    min_max_of_halves(low, high)
+    horizontal_min_max(low, high)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -175,7 +175,7 @@ fn avx512_min_max(row: &F32x16, of: u32) -> [f32; 2] {
     let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };
-    min_max_of_halves(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
+    horizontal_min_max(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -115,7 +115,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
 
 /// [`WideBvh::closest_hit_packet`] for a nonempty tree. Returns whether the packet was traced.
 #[allow(unsafe_code)]
-pub fn closest_hit_packet(
+pub fn try_closest_hit_packet(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -124,10 +124,10 @@ pub fn closest_hit_packet(
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::closest_hit_avx2(tree, rays, ends, hits) },
+        InstructionSet::Avx2 => unsafe { packet::try_closest_hit_avx2(tree, rays, ends, hits) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::closest_hit_avx512(tree, rays, ends, hits) },
+        InstructionSet::Avx512 => unsafe { packet::try_closest_hit_avx512(tree, rays, ends, hits) },
         _ => false,
     }
 }
@@ -135,14 +135,19 @@ pub fn closest_hit_packet(
 /// [`WideBvh::any_hit_packet`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
 /// packet was not traced.
 #[allow(unsafe_code)]
-pub fn any_hit_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
+pub fn try_any_hit_packet(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &F32x16,
+    except: &[Option<u32>],
+) -> Option<u32> {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::any_hit_avx2(tree, rays, ends, except) },
+        InstructionSet::Avx2 => unsafe { packet::try_any_hit_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::any_hit_avx512(tree, rays, ends, except) },
+        InstructionSet::Avx512 => unsafe { packet::try_any_hit_avx512(tree, rays, ends, except) },
         _ => None,
     }
 }

@@ -4,7 +4,7 @@
 const LARGE: usize = 1 << 21;
 
 /// An empty vector with capacity for `count` items, in huge pages if the vector is large.
-pub fn with_huge_pages<T>(count: usize) -> Vec<T> {
+pub fn allocate_vec_in_huge_pages<T>(count: usize) -> Vec<T> {
     let items = Vec::with_capacity(count);
     let bytes = count * size_of::<T>();
     if bytes >= LARGE {

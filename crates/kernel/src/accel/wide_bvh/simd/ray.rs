@@ -107,8 +107,8 @@ fn max_of_three(v: __m128) -> __m128 {
 /// Broadcasts each of the first three lanes to eight lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn broadcast_to_eight(v: __m128) -> [SimdF32x8; 3] {
-    let [x, y, z] = broadcast_to_four(v);
+fn broadcast_xyz_to_eight(v: __m128) -> [SimdF32x8; 3] {
+    let [x, y, z] = broadcast_xyz_to_four(v);
     [
         SimdF32x8(_mm256_broadcastss_ps(x.0)),
         SimdF32x8(_mm256_broadcastss_ps(y.0)),
@@ -119,7 +119,7 @@ fn broadcast_to_eight(v: __m128) -> [SimdF32x8; 3] {
 /// Broadcasts each of the first three lanes to four lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn broadcast_to_four(v: __m128) -> [SimdF32x4; 3] {
+fn broadcast_xyz_to_four(v: __m128) -> [SimdF32x4; 3] {
     [
         SimdF32x4(_mm_permute_ps::<0x00>(v)),
         SimdF32x4(_mm_permute_ps::<0x55>(v)),
@@ -161,18 +161,22 @@ impl SimdRay {
         let places = unsafe { _mm_loadu_si128(axes.as_ptr().cast()) };
         let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
         let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
-        let [shear_x, shear_y, _] = broadcast_to_four(shear);
+        let [shear_x, shear_y, _] = broadcast_xyz_to_four(shear);
         // Ignore the planes of an axis if the arithmetic overflows.
         let (endless, minus_endless) = (_mm_set1_ps(f32::INFINITY), _mm_set1_ps(f32::NEG_INFINITY));
         let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
         let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
         Self {
-            from_near: broadcast_to_eight(_mm_blendv_ps(from_near, endless, infinite_lanes(from_near))),
-            from_far: broadcast_to_eight(_mm_blendv_ps(from_far, minus_endless, infinite_lanes(from_far))),
-            to_near: broadcast_to_eight(inverse),
-            to_far: broadcast_to_eight(padded),
+            from_near: broadcast_xyz_to_eight(_mm_blendv_ps(from_near, endless, infinite_lanes(from_near))),
+            from_far: broadcast_xyz_to_eight(_mm_blendv_ps(
+                from_far,
+                minus_endless,
+                infinite_lanes(from_far),
+            )),
+            to_near: broadcast_xyz_to_eight(inverse),
+            to_far: broadcast_xyz_to_eight(padded),
             near: [downs & 1, 2 + (downs >> 1 & 1), 4 + (downs >> 2 & 1)],
-            origin: broadcast_to_four(_mm_permutevar_ps(origin, places)),
+            origin: broadcast_xyz_to_four(_mm_permutevar_ps(origin, places)),
             shear: [shear_x, shear_y, SimdF32x4(scale)],
             axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
             start: ray.start,

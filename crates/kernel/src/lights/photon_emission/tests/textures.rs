@@ -101,7 +101,7 @@ fn mesh_emission_matches_light_sampling() {
             radiance: COLOR,
             texture: None,
             object: OBJECT,
-            part: LightCoverage::Listed,
+            part: EmittingPart::Listed,
             bounds,
         };
         let area_of =

@@ -1,7 +1,7 @@
 //! The lobe of a conductor.
 
 use super::{ConductorPoint, FresnelPoint, reflectance};
-use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{HalfVector, SmithTerms, frame_with_tangent, sample_reflection};
@@ -116,7 +116,15 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &ConductorViewTerms, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(
+        &self,
+        view: &ConductorViewTerms,
+        _: SampledLobes,
+        _: Vec3,
+        wi: Vec3,
+        shape: f32,
+        _: BxdfFlags,
+    ) -> f32 {
         let [eye, light] = self.smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
@@ -125,7 +133,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     fn sample(
         &self,
         view: &ConductorViewTerms,
-        _: LobeSet,
+        _: SampledLobes,
         _: Vec3,
         _: f32,
         u: [f32; 2],

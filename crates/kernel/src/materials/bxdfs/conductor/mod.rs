@@ -58,7 +58,7 @@ pub struct ConductorPoint {
 impl ConductorFresnel {
     /// The reflectance at a single point.
     #[inline]
-    pub fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> FresnelPoint {
+    pub fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> FresnelPoint {
         match self {
             Self::Schlick(color) => FresnelPoint::from_schlick(lookup.color(color)),
             Self::Index { eta, k } => FresnelPoint::from_complex_ior(lookup.color(eta), lookup.color(k)),
@@ -104,18 +104,18 @@ impl BxdfMaterial for Conductor {
     type Point = ConductorPoint;
 
     #[inline]
-    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> ConductorPoint {
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> ConductorPoint {
         let roughness = lookup.number(&self.roughness);
-        let anisotropy = lookup.signed(&self.anisotropy).clamp(-1.0, 1.0);
+        let anisotropy = lookup.number_neutral_at_zero(&self.anisotropy).clamp(-1.0, 1.0);
         ConductorPoint {
-            fresnel: self.fresnel.point(lookup),
+            fresnel: self.fresnel.look_up_parameters(lookup),
             alphas: microfacet::alphas_from_roughness(roughness, anisotropy),
         }
     }
 
     #[inline]
     fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        self.fresnel.point(lookup).reflectance(1.0)
+        self.fresnel.look_up_parameters(lookup).reflectance(1.0)
     }
 
     #[inline]

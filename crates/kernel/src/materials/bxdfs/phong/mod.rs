@@ -43,7 +43,7 @@ impl BxdfMaterial for Phong {
     type Point = PhongBsdf;
 
     #[inline(always)]
-    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PhongBsdf {
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PhongBsdf {
         let diffuse = lookup.color(&self.diffuse);
         PhongBsdf {
             diffuse,
@@ -63,7 +63,7 @@ impl BxdfMaterial for Phong {
     }
 
     #[inline]
-    fn packet_color(&self) -> Option<&ColorParameter> {
+    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
         Some(&self.diffuse)
     }
 }

@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{PlasticPoint, base_layer_f};
-use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
 use crate::materials::fresnel::dielectric_from_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
@@ -144,7 +144,7 @@ impl Bxdf for PlasticBxdf {
     fn pdf(
         &self,
         view: &PlasticViewTerms,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         wi: Vec3,
         _: f32,
@@ -160,8 +160,8 @@ impl Bxdf for PlasticBxdf {
         let cosine = normal.dot(wi);
         let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
         match lobes {
-            LobeSet::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
-            LobeSet::Narrow => coat,
+            SampledLobes::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
+            SampledLobes::Narrow => coat,
         }
     }
 
@@ -169,7 +169,7 @@ impl Bxdf for PlasticBxdf {
     fn sample(
         &self,
         view: &PlasticViewTerms,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -181,8 +181,8 @@ impl Bxdf for PlasticBxdf {
         }
         let coat = sample_reflection(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
         let is_coat = match lobes {
-            LobeSet::All => choice < view.coat_share,
-            LobeSet::Narrow => self.alpha > 0.0,
+            SampledLobes::All => choice < view.coat_share,
+            SampledLobes::Narrow => self.alpha > 0.0,
         };
         select_vec3(is_coat, coat, diffuse)
     }

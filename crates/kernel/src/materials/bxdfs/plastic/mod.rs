@@ -88,7 +88,7 @@ impl BxdfMaterial for Plastic {
     type Point = PlasticPoint;
 
     #[inline(always)]
-    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PlasticPoint {
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PlasticPoint {
         let diffuse = lookup.color(&self.diffuse).min(Vec3::ONE);
         let specular = lookup.color(&self.specular).min(Vec3::ONE);
         let roughness = lookup.number(&self.roughness);
@@ -113,7 +113,7 @@ impl BxdfMaterial for Plastic {
     }
 
     #[inline]
-    fn packet_color(&self) -> Option<&ColorParameter> {
+    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
         Some(&self.diffuse)
     }
 }

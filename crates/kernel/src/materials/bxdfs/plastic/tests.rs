@@ -1,7 +1,7 @@
 //! Tests of plastic. Compares values with formulas and samples with pdfs, and runs the white furnace test.
 
 use super::*;
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::SampledLobes;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
     spherical_direction,
@@ -15,7 +15,7 @@ fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
 }
 
 fn point(plastic: &Plastic) -> PlasticPoint {
-    plastic.point(&mut WhiteLookup)
+    plastic.look_up_parameters(&mut WhiteLookup)
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
@@ -56,10 +56,10 @@ fn samples_follow_the_pdf() {
             [alpha; 2],
             spherical_direction(cosine, 0.7),
         );
-        subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
+        subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), SampledLobes::Narrow);
         // For narrow lobes, the map's cells are too large for the diffuse lobe.
         if alpha >= 0.2 {
-            subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobeSet::All);
+            subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), SampledLobes::All);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, PrincipledPoint};
-use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
@@ -247,7 +247,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &PrincipledViewTerms,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         wi: Vec3,
         _: f32,
@@ -262,12 +262,12 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             specular_share * specular + coat_share * coat
         };
         match lobes {
-            LobeSet::All if THROUGH => narrow,
-            LobeSet::All => {
+            SampledLobes::All if THROUGH => narrow,
+            SampledLobes::All => {
                 let diffuse_share = 1.0 - specular_share - coat_share - transmission_share;
                 narrow + diffuse_share * nonnegative(normal.dot(wi)) * FRAC_1_PI
             }
-            LobeSet::Narrow => {
+            SampledLobes::Narrow => {
                 narrow / (specular_share + coat_share + transmission_share).max(f32::MIN_POSITIVE)
             }
         }
@@ -277,7 +277,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn sample(
         &self,
         view: &PrincipledViewTerms,
-        lobes: LobeSet,
+        lobes: SampledLobes,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -285,19 +285,19 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     ) -> Vec3 {
         let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
         let choice = match lobes {
-            LobeSet::All => choice,
-            LobeSet::Narrow => choice * (specular_share + coat_share + transmission_share),
+            SampledLobes::All => choice,
+            SampledLobes::Narrow => choice * (specular_share + coat_share + transmission_share),
         };
         // The lobes are in this order: coat, specular, diffuse, transmission.
         let last = match lobes {
-            LobeSet::All => 1.0 - transmission_share,
-            LobeSet::Narrow => specular_share + coat_share,
+            SampledLobes::All => 1.0 - transmission_share,
+            SampledLobes::Narrow => specular_share + coat_share,
         };
         let is_through = (transmission_share > 0.0) & (choice >= last);
         let alpha = if (choice < coat_share) & !THROUGH { self.coat_alpha } else { self.alpha };
         let is_wide = match lobes {
-            LobeSet::All => choice >= coat_share + specular_share,
-            LobeSet::Narrow => false,
+            SampledLobes::All => choice >= coat_share + specular_share,
+            SampledLobes::Narrow => false,
         };
         let is_wide = is_wide & !THROUGH;
         let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);

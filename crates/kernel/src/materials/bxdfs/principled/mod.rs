@@ -200,7 +200,7 @@ impl BxdfMaterial for Principled {
     type Point = PrincipledPoint;
 
     #[inline]
-    fn point<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PrincipledPoint {
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PrincipledPoint {
         let inputs = &self.inputs;
         let mut unit = |number: &'m ScalarParameter| lookup.number(number).clamp(0.0, 1.0);
         let (metallic, roughness) = (unit(&inputs.metallic), unit(&inputs.roughness));

@@ -1,7 +1,7 @@
 //! The lobes of rough glass.
 
 use super::RoughDielectricPoint;
-use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
 use crate::materials::fresnel::{dielectric_from_either_side, transmittance};
 use crate::materials::microfacet::{HalfVector, SmithTerms, reflect_at, refract_at, sample_visible_normal};
@@ -164,7 +164,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &DielectricViewTerms,
-        _: LobeSet,
+        _: SampledLobes,
         _: Vec3,
         wi: Vec3,
         shape: f32,
@@ -178,7 +178,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn sample(
         &self,
         view: &DielectricViewTerms,
-        _: LobeSet,
+        _: SampledLobes,
         _: Vec3,
         choice: f32,
         u: [f32; 2],

@@ -15,7 +15,7 @@ use crate::geometry::watertight::ShearedRay;
 
 /// Implements [`WideBvh::any_hit_packet`]. Returns `None` if the rays are not coherent.
 #[inline(always)]
-pub fn any_hit<V: SimdVector>(
+pub fn try_any_hit<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -28,7 +28,7 @@ pub fn any_hit<V: SimdVector>(
     let frustum = Frustum::new(&packet, like8);
     let mut t_max = like.load_slice(&rows.ends);
     let pad = like.splat_like(SLAB_PAD);
-    let mut end = t_max.max_lane() * SLAB_PAD;
+    let mut end = t_max.max_element() * SLAB_PAD;
     let all = rows.traced;
     let mut found = 0_u32;
     let mut stack: Stack<u32> = Stack::new();
@@ -77,7 +77,7 @@ pub fn any_hit<V: SimdVector>(
                 }
                 if before != found {
                     t_max = like.splat_like(-1.0).select(V::mask_from_bits(found, t_max), t_max);
-                    end = t_max.max_lane() * SLAB_PAD;
+                    end = t_max.max_element() * SLAB_PAD;
                 }
             }
         }

@@ -15,7 +15,7 @@ use crate::geometry::{Ray, ShapeHit};
 
 /// Implements [`WideBvh::closest_hit_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
-pub fn closest_hit<V: SimdVector>(
+pub fn try_closest_hit<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -29,7 +29,7 @@ pub fn closest_hit<V: SimdVector>(
     let t_max = like.load_slice(&rows.ends);
     let pad = like.splat_like(SLAB_PAD);
     let mut best = NearestHits::new(t_max);
-    let mut end = t_max.max_lane() * SLAB_PAD;
+    let mut end = t_max.max_element() * SLAB_PAD;
     let mut stack: Stack<u64> = Stack::new();
     stack.push(sort_key(0.0, 0));
     while let Some(key) = stack.pop() {
@@ -53,7 +53,7 @@ pub fn closest_hit<V: SimdVector>(
                     }
                 }
                 if any != 0 {
-                    end = best.t.max_lane() * SLAB_PAD;
+                    end = best.t.max_element() * SLAB_PAD;
                 }
             }
         }

@@ -28,7 +28,7 @@ impl Frustum {
             near_origin[axis] = like.splat_like(ends[1 - negative] + margin);
             far_origin[axis] = like.splat_like(ends[negative] - margin);
             let row = packet.inverse[axis];
-            inverse[axis] = [like.splat_like(row.min_lane()), like.splat_like(row.max_lane())];
+            inverse[axis] = [like.splat_like(row.min_element()), like.splat_like(row.max_element())];
         }
         Self { near_origin, far_origin, inverse, near: packet.near }
     }

@@ -14,28 +14,33 @@ use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::geometry::{Ray, ShapeHit};
 
-use any::any_hit;
-use closest::closest_hit;
+use any::try_any_hit;
+use closest::try_closest_hit;
 
-/// [`closest_hit()`] with AVX2.
+/// [`try_closest_hit()`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn closest_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn try_closest_hit_avx2(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &F32x16,
+    hits: &mut [Option<ShapeHit>],
+) -> bool {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
-    closest_hit(tree, rays, ends, hits, like, like8)
+    try_closest_hit(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any_hit()`] with AVX2.
+/// [`try_any_hit()`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
+pub fn try_any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
-    any_hit(tree, rays, ends, except, like, like8)
+    try_any_hit(tree, rays, ends, except, like, like8)
 }
 
-/// [`closest_hit()`] with AVX-512.
+/// [`try_closest_hit()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn closest_hit_avx512(
+pub fn try_closest_hit_avx512(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -43,13 +48,18 @@ pub fn closest_hit_avx512(
 ) -> bool {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
-    closest_hit(tree, rays, ends, hits, like, like8)
+    try_closest_hit(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any_hit()`] with AVX-512.
+/// [`try_any_hit()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn any_hit_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
+pub fn try_any_hit_avx512(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &F32x16,
+    except: &[Option<u32>],
+) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
-    any_hit(tree, rays, ends, except, like, like8)
+    try_any_hit(tree, rays, ends, except, like, like8)
 }

@@ -51,7 +51,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
         for (axis, origin) in origin.iter_mut().enumerate() {
             *origin = like.load_slice(&rows.origin[axis]);
-            own.origins[axis] = [origin.min_lane(), origin.max_lane()];
+            own.origins[axis] = [origin.min_element(), origin.max_element()];
         }
         let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
         own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));

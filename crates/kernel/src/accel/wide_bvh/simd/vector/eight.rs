@@ -116,17 +116,17 @@ impl SimdVector for SimdF32x8 {
     }
 
     #[inline(always)]
-    fn max_lane(self) -> f32 {
+    fn max_element(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        SimdF32x4(low).max(SimdF32x4(high)).max_lane()
+        SimdF32x4(low).max(SimdF32x4(high)).max_element()
     }
 
     #[inline(always)]
-    fn min_lane(self) -> f32 {
+    fn min_element(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        SimdF32x4(low).min(SimdF32x4(high)).min_lane()
+        SimdF32x4(low).min(SimdF32x4(high)).min_element()
     }
 }
 

@@ -115,14 +115,14 @@ impl SimdVector for SimdF32x4 {
     }
 
     #[inline(always)]
-    fn max_lane(self) -> f32 {
+    fn max_element(self) -> f32 {
         let mut lanes = [0.0_f32; 4];
         self.store(&mut lanes);
         lanes[0].max(lanes[1]).max(lanes[2].max(lanes[3]))
     }
 
     #[inline(always)]
-    fn min_lane(self) -> f32 {
+    fn min_element(self) -> f32 {
         let mut lanes = [0.0_f32; 4];
         self.store(&mut lanes);
         lanes[0].min(lanes[1]).min(lanes[2].min(lanes[3]))

@@ -79,9 +79,9 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Converts bits to a mask. `like` proves that the processor has the instructions.
     fn mask_from_bits(bits: u32, like: Self) -> Self::Mask;
     /// Maximum of all lanes.
-    fn max_lane(self) -> f32;
+    fn max_element(self) -> f32;
     /// Minimum of all lanes.
-    fn min_lane(self) -> f32;
+    fn min_element(self) -> f32;
 }
 
 /// Implements addition, subtraction, and multiplication for a vector type.

@@ -132,12 +132,12 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn max_lane(self) -> f32 {
-        self.0.max(self.1).max_lane()
+    fn max_element(self) -> f32 {
+        self.0.max(self.1).max_element()
     }
 
     #[inline(always)]
-    fn min_lane(self) -> f32 {
-        self.0.min(self.1).min_lane()
+    fn min_element(self) -> f32 {
+        self.0.min(self.1).min_element()
     }
 }

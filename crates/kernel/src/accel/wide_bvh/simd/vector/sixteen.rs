@@ -127,13 +127,13 @@ impl SimdVector for SimdF32x16 {
     }
 
     #[inline(always)]
-    fn max_lane(self) -> f32 {
+    fn max_element(self) -> f32 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_max_ps(self.0) }
     }
 
     #[inline(always)]
-    fn min_lane(self) -> f32 {
+    fn min_element(self) -> f32 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_min_ps(self.0) }
     }
