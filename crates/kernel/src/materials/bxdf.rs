@@ -117,7 +117,7 @@ pub trait Bxdf: Soa + Default {
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`BxdfMaterial::packet_color`](super::bsdf::BxdfMaterial::packet_color_parameter)
+    /// Replaces the color that [`BxdfMaterial::packet_color_parameter`](super::bsdf::BxdfMaterial::packet_color_parameter)
     /// returns. Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}

@@ -1,7 +1,7 @@
-//! Sources of parameter values. A material lists its parameters once, in [`BxdfMaterial::point`], for
+//! Sources of parameter values. A material lists its parameters once, in [`BxdfMaterial::look_up_parameters`], for
 //! texture lookups, for renders with white textures, and for finding the textures that it uses.
 //!
-//! [`BxdfMaterial::point`]: super::bsdf::BxdfMaterial::look_up_parameters
+//! [`BxdfMaterial::look_up_parameters`]: super::bsdf::BxdfMaterial::look_up_parameters
 
 use std::sync::Arc;
 

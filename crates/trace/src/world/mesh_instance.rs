@@ -60,7 +60,7 @@ impl MeshInstance {
         }
     }
 
-    /// Scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::scene_triangle_number).
+    /// Scene-wide number of a triangle; see [`Geometry::scene_triangle_number`](super::Geometry::scene_triangle_number).
     #[inline(always)]
     pub(super) fn scene_triangle_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
