@@ -12,6 +12,7 @@ use super::protocol::{
 };
 use super::watch::content::FileRead;
 use crate::film::Picture;
+use crate::output::WriteWarning;
 use crate::scene::diagnostic::Diagnostic;
 
 /// Sends the events of one request. Ignores a disconnected front end.
@@ -76,8 +77,8 @@ impl Sink {
         self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
-    pub(super) fn metadata_lost(&self, message: String) {
-        self.send(Event::NotKept { generation: self.generation, message });
+    pub(super) fn write_warning(&self, warning: WriteWarning) {
+        self.send(Event::WriteWarning { generation: self.generation, warning });
     }
 
     pub(super) fn checkpoint(&self, news: CheckpointUpdate) {
