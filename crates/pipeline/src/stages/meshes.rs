@@ -96,7 +96,9 @@ pub(crate) fn meshes(
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
+                return Err(Stop::work(error));
+            }
             Err(error) => {
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);

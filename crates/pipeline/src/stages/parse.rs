@@ -57,7 +57,7 @@ fn model_scene(
 ) -> Result<(scene::LoadedScene, ModelText), Stop> {
     let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
-        AssetError::OutOfMemory { .. } => Stop::work(error),
+        AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => Stop::work(error),
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.read(&path, token) {

@@ -220,7 +220,9 @@ pub(crate) fn textures(
                 cache.texels.insert(image.name, key, (decoded, bytes));
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
+                return Err(Stop::work(error));
+            }
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
