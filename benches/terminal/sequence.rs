@@ -63,7 +63,7 @@ pub(crate) fn render(
             | Event::Settings { .. }
             | Event::Written { .. }
             | Event::WriteFailed { .. }
-            | Event::NotKept { .. }
+            | Event::WriteWarning { .. }
             | Event::Checkpoint { .. }
             | Event::OwnImage { .. }
             | Event::WritePostponed { .. }

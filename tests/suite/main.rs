@@ -31,6 +31,7 @@ mod once;
 mod options;
 mod output;
 mod parts;
+mod rewritten_parts;
 mod same_bits;
 mod schema;
 mod shell;

@@ -5,7 +5,7 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
 use std::process::{Command as Process, Stdio};
 
-use super::test_dir::{PROGRAM, TestDir};
+use super::test_dir::{PROGRAM, SCENE, TestDir};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -94,4 +94,71 @@ fn info_reads_parts_with_one_descriptor() {
     process.args(["-c", "ulimit -n 4 && exec \"$0\" info 1.part", PROGRAM]).current_dir(dir.0.path());
     let output = process.output().expect("it runs");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Runs a command with a limit on open files. Returns the exit code and stderr.
+fn with_descriptors(dir: &TestDir, limit: u32, line: &str) -> (Option<i32>, String) {
+    let mut process = Process::new("bash");
+    process.args(["-c", &format!("ulimit -n {limit} && exec \"$0\" {line}"), PROGRAM]);
+    process.current_dir(dir.0.path()).stdin(Stdio::null());
+    let output = process.output().expect("it runs");
+    (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"))
+}
+
+/// A scene with 100 meshes and 100 textures, which are read in parallel.
+fn write_scene_with_many_files(dir: &TestDir) {
+    let mut text = SCENE.to_owned();
+    for i in 0..100 {
+        dir.write(&format!("{i}.obj"), format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf 1 2 3\n"));
+        dir.write(&format!("{i}.ppm"), format!("P3 1 1 255 {i} 0 0\n"));
+        let material = format!(
+            "[textures.t{i}]\nfile = \"{i}.ppm\"\n[materials.m{i}]\ndiffuse = {{ texture = \"t{i}\" }}\n"
+        );
+        text += &format!("{material}[[mesh]]\nfile = \"{i}.obj\"\nmaterial = \"m{i}\"\n");
+    }
+    dir.write("many.toml", text);
+}
+
+/// With any limit on open files, a command succeeds, or it fails with one error that names the limit.
+#[test]
+fn too_few_descriptors_are_one_message() {
+    let dir = TestDir::new();
+    write_scene_with_many_files(&dir);
+    for part in [1, 2] {
+        dir.expect(&format!("ball.toml --once --progress none --shard {part}/2 -o {part}.part"), 0);
+    }
+    for line in [
+        "ball.toml --once --progress none -o new.png",
+        "many.toml --once --progress none --threads 8 -o new.png",
+        "merge new.png 1.part 2.part --progress none",
+    ] {
+        for limit in 4.. {
+            let (code, said) = with_descriptors(&dir, limit, line);
+            if code == Some(0) {
+                assert!(limit > 4 && dir.path("new.png").exists(), "{line} with {limit}");
+                break;
+            }
+            // The exit code for an unreadable scene file is 2.
+            assert!(matches!(code, Some(1 | 2)), "{line} with {limit}: {code:?} {said}");
+            let errors = said.matches("error: ").count();
+            assert!(errors == 1 && said.lines().count() <= 6, "{line} with {limit}: {said}");
+            assert!(said.contains("ulimit -n"), "{line} with {limit}: {said}");
+            assert!(!dir.path("new.png").exists(), "{line} with {limit}");
+        }
+        fs::remove_file(dir.path("new.png")).expect("written with enough descriptors");
+    }
+}
+
+#[test]
+fn merging_too_many_parts_is_one_message() {
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --progress none --shard 1/2 -o 1.part", 0);
+    let parts = "1.part ".repeat(200);
+    for options in ["", "--watch", "--partial"] {
+        let line = format!("merge new.png {parts} --progress none {options}");
+        let (code, said) = with_descriptors(&dir, 64, &line);
+        assert_eq!((code, said.lines().count()), (Some(1), 1), "{options}: {said}");
+        assert!(said.starts_with("error: ") && said.contains("200") && said.contains("ulimit -n"), "{said}");
+        assert!(!dir.path("new.png").exists(), "{options}");
+    }
 }

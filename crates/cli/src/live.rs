@@ -260,7 +260,7 @@ impl SharedWriteLog {
             | Event::Asset { .. }
             | Event::Settings { .. }
             | Event::Warnings { .. }
-            | Event::NotKept { .. }
+            | Event::WriteWarning { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }

@@ -11,6 +11,7 @@ use crate::lower::RenderRequest;
 use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
     CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteMode,
+    WriteWarning,
 };
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
@@ -209,8 +210,8 @@ fn handle_events(
             return console.print_error(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
             report_checkpoint(news, &mut call_warnings, reporter, console);
-        } else if let Event::NotKept { message, .. } = &event {
-            call_warnings.push(create_argument_warning(message, "use -o FILE to keep the old file"));
+        } else if let Event::WriteWarning { warning, .. } = &event {
+            call_warnings.push(written_file_warning(warning));
         } else if let Event::Done { warnings, .. } = &mut event {
             warnings.append(&mut call_warnings);
             warnings.retain(|_| is_first);
@@ -257,7 +258,7 @@ fn handle_events(
             | Event::Settings { .. }
             | Event::Progress { .. }
             | Event::Preview { .. }
-            | Event::NotKept { .. }
+            | Event::WriteWarning { .. }
             | Event::Refused { .. }
             | Event::OwnImage { .. }
             | Event::WritePostponed { .. }
@@ -319,6 +320,18 @@ fn report_checkpoint(
         }
         CheckpointUpdate::SetAside { path } => {
             say(format!("Saved the checkpoint of another render as {}", path.display()));
+        }
+    }
+}
+
+/// Creates a warning about a file that has been written.
+fn written_file_warning(problem: &WriteWarning) -> Diagnostic {
+    match problem {
+        WriteWarning::AttributesLost { .. } => {
+            create_argument_warning(&problem.to_string(), "use -o FILE to keep the old file")
+        }
+        WriteWarning::NotSynchronized { .. } => {
+            create_argument_warning(&problem.to_string(), "check the disk, then run `sync`")
         }
     }
 }
@@ -412,6 +425,18 @@ fn describe_written_image(path: &Path, report: &Report, turn: Option<TurntableFr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_lost_attributes_suggest_another_file() {
+        let path = PathBuf::from("a.png");
+        let lost = WriteWarning::AttributesLost { path: path.clone(), lost: vec!["its owner".to_owned()] };
+        let unsynchronized = WriteWarning::NotSynchronized { path, why: "input/output error".to_owned() };
+        for (problem, has_option) in [(lost, true), (unsynchronized, false)] {
+            let Diagnostic { severity, message, help, .. } = written_file_warning(&problem);
+            assert_eq!((severity, message), (Severity::Warning, problem.to_string()));
+            assert_eq!(help.is_some_and(|help| help.contains("-o FILE")), has_option, "{problem}");
+        }
+    }
 
     #[test]
     fn deadline_starts_at_the_first_query() {

@@ -22,6 +22,7 @@ pub use super::report::{
 use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Srgb8Image;
+pub use crate::output::WriteWarning;
 pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
@@ -206,12 +207,12 @@ pub enum Event {
         /// The file and the reason.
         message: String,
     },
-    /// A file was replaced, but some of its metadata was lost.
-    NotKept {
+    /// A file was written, but with a problem.
+    WriteWarning {
         /// Request number.
         generation: u64,
-        /// The file and the lost metadata.
-        message: String,
+        /// The file and the problem.
+        warning: WriteWarning,
     },
     /// No files are written because at least one of them must not be overwritten: it is an input, is listed
     /// twice, or was not written by glimt. Rendering continues.

@@ -12,6 +12,7 @@ use super::protocol::{
 };
 use super::watch::content::FileRead;
 use crate::film::Srgb8Image;
+use crate::output::WriteWarning;
 use crate::scene::diagnostic::Diagnostic;
 
 /// Sends the events of one request. Ignores a disconnected front end.
@@ -76,8 +77,8 @@ impl EventSink {
         self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
-    pub(super) fn send_metadata_lost(&self, message: String) {
-        self.send(Event::NotKept { generation: self.generation, message });
+    pub(super) fn send_write_warning(&self, warning: WriteWarning) {
+        self.send(Event::WriteWarning { generation: self.generation, warning });
     }
 
     pub(super) fn send_checkpoint_update(&self, news: CheckpointUpdate) {

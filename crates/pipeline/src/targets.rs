@@ -87,8 +87,8 @@ fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
     found
 }
 
-/// Writes one of the plan's files and reports any metadata lost from the replaced file. Checks for conflicts
-/// again at the last moment.
+/// Writes one of the plan's files and reports problems such as attributes that could not be kept. Checks for
+/// conflicts again at the last moment.
 ///
 /// # Errors
 /// The file cannot be written, or must not be overwritten ([`OutputError::Refused`]).
@@ -119,7 +119,7 @@ pub(super) fn write_guarded<'a, T>(
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep,
-        losses: AttributeLossPolicy::Report(&|what| sink.send_metadata_lost(what)),
+        losses: AttributeLossPolicy::Report(&|warning| sink.send_write_warning(warning)),
     })
 }
 

@@ -11,9 +11,8 @@ use super::nearest::nearest_name;
 use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_non_scene, has_scene_extension};
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
-use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
-use crate::system::folder;
+use crate::system::{RAISE_FILE_LIMIT, describe_error, folder, is_out_of_files};
 
 /// Error message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
@@ -188,7 +187,8 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
         let message = if is_model { MODEL_NOT_FOUND } else { SCENE_NOT_FOUND };
         return (message.to_owned(), help);
     }
-    (format!("cannot read the scene file: {}", describe_error(error)), None)
+    let help = is_out_of_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
+    (format!("cannot read the scene file: {}", describe_error(error)), help)
 }
 
 /// Maximum number of files to examine per folder.

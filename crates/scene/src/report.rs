@@ -209,15 +209,38 @@ fn floor_char_boundary(source: &str, offset: usize) -> usize {
     offset
 }
 
-/// Byte offsets of the start of each line.
+/// Byte offsets of the start of each line, and character counts for finding columns in long lines.
 pub(crate) struct LineIndex {
     starts: Vec<usize>,
+    /// Number of characters before each multiple of [`STEP`] bytes.
+    characters: Vec<usize>,
+}
+
+/// Number of bytes between two character counts.
+const STEP: usize = 1024;
+
+/// Number of characters that start in these bytes.
+fn count_characters(bytes: &[u8]) -> usize {
+    #[cfg(test)]
+    tests::BYTES_READ.set(tests::BYTES_READ.get() + bytes.len());
+    let is_start = |byte: &&u8| **byte & 0b1100_0000 != 0b1000_0000;
+    bytes.iter().filter(is_start).count()
 }
 
 impl LineIndex {
     pub(super) fn new(source: &str) -> Self {
         let after = source.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
-        Self { starts: std::iter::once(0).chain(after).collect() }
+        let mut counts = vec![0];
+        for step in source.as_bytes().chunks(STEP) {
+            counts.push(counts[counts.len() - 1] + count_characters(step));
+        }
+        Self { starts: std::iter::once(0).chain(after).collect(), characters: counts }
+    }
+
+    /// The number of characters before a byte offset.
+    fn characters_before(&self, source: &str, offset: usize) -> usize {
+        let step = offset / STEP;
+        self.characters[step] + count_characters(&source.as_bytes()[step * STEP..offset])
     }
 
     /// The 1-based line number of a byte offset.
@@ -229,9 +252,10 @@ impl LineIndex {
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char_boundary(source, offset);
         let line = self.line_number(offset);
-        let before = &source[self.starts[line - 1]..offset];
-        let before = before.strip_prefix('\u{feff}').unwrap_or(before);
-        (line, before.chars().count() + 1)
+        let start = self.starts[line - 1];
+        let before = self.characters_before(source, offset) - self.characters_before(source, start);
+        let has_mark = source[start..offset].starts_with('\u{feff}');
+        (line, before + 1 - usize::from(has_mark))
     }
 
     /// Returns the byte range of the 0-based line `line`, without its line ending or a byte order mark.

@@ -6,6 +6,7 @@ mod camera_steps;
 mod edits;
 mod endings;
 mod frame;
+mod help_width;
 mod history;
 mod inline_output;
 mod input;

@@ -141,6 +141,16 @@ impl Folder {
         Terminal::open(command, &[], self.0.path(), size(200, 24), None)
     }
 
+    /// A program in a terminal of the specified size, with additional environment variables.
+    pub fn sized_terminal(
+        &self,
+        command: &[&str],
+        variables: &[(&str, &str)],
+        (columns, rows): (u16, u16),
+    ) -> Terminal {
+        Terminal::open(command, variables, self.0.path(), size(columns, rows), None)
+    }
+
     pub fn program(&self) -> &'static str {
         PROGRAM
     }
@@ -172,8 +182,9 @@ impl Terminal {
         let mut builder = CommandBuilder::new(command[0]);
         builder.args(&command[1..]);
         builder.cwd(folder);
-        for name in
-            ["NO_COLOR", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"].into_iter().chain(OF_TERMINALS)
+        for name in ["NO_COLOR", "COLUMNS", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"]
+            .into_iter()
+            .chain(OF_TERMINALS)
         {
             builder.env_remove(name);
         }

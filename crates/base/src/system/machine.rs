@@ -1,7 +1,9 @@
 //! Machine and process identities, for files in folders shared by several machines.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
 use std::sync::OnceLock;
 
 use nix::errno::Errno;
@@ -38,10 +40,14 @@ fn machine_hash() -> u64 {
         let host = gethostname().unwrap_or_default();
         let boot = fs::read("/proc/sys/kernel/random/boot_id").unwrap_or_default();
         let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-        let mut hasher = DefaultHasher::new();
-        (host, boot, namespace).hash(&mut hasher);
-        hasher.finish()
+        hash_machine(&host, &boot, &namespace)
     })
+}
+
+fn hash_machine(host: &OsStr, boot: &[u8], namespace: &Path) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    (host, boot, namespace).hash(&mut hasher);
+    hasher.finish()
 }
 
 #[cfg(test)]
@@ -49,6 +55,20 @@ mod tests {
     use std::process::Command;
 
     use super::*;
+
+    #[test]
+    fn machines_differ_in_host_boot_or_namespace() {
+        let hash = |host: &str, boot: &str, namespace: &str| {
+            hash_machine(OsStr::new(host), boot.as_bytes(), Path::new(namespace))
+        };
+        let machine = hash("render1", "a0b1", "pid:[1]");
+        assert_eq!(hash("render1", "a0b1", "pid:[1]"), machine, "it does not depend on the process");
+        for (host, boot, namespace) in
+            [("render2", "a0b1", "pid:[1]"), ("render1", "a0b2", "pid:[1]"), ("render1", "a0b1", "pid:[2]")]
+        {
+            assert_ne!(hash(host, boot, namespace), machine, "{host} {boot} {namespace}");
+        }
+    }
 
     #[test]
     fn only_local_processes_are_known_to_have_ended() {

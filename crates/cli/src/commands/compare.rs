@@ -17,7 +17,7 @@ use crate::film::RadianceImage;
 use crate::output::part::is_part;
 use crate::output::write::{self, WritePolicy};
 use crate::output::{
-    self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, is_same_file,
+    self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, WriteWarning, is_same_file,
 };
 use crate::system::threads::core_pool;
 use crate::tui::wrap_text;
@@ -51,8 +51,8 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
-        let lost = written.map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
-        lost.iter().for_each(|what| console.print_message(&format!("warning: {what}")));
+        let warnings = written.map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
+        warnings.iter().for_each(|warning| console.print_message(&format!("warning: {warning}")));
         console.print_message(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
     Ok(compare_to_thresholds(&summary, console))
@@ -114,13 +114,13 @@ impl<'a> ErrorImage<'a> {
         }
     }
 
-    /// Writes the image. Returns a warning if properties of the replaced file could not be preserved.
+    /// Writes the image. Returns warnings about the written file.
     fn write(
         &self,
         args: &CompareArgs,
         pair: &Pair,
         measured: &PairMeasurements,
-    ) -> Result<Option<String>, OutputError> {
+    ) -> Result<Vec<WriteWarning>, OutputError> {
         let image: RadianceImage = if self.is_float() {
             compare::absolute_difference(pair)
         } else {
@@ -133,11 +133,11 @@ impl<'a> ErrorImage<'a> {
         let bytes = output::encode(&image, &options, self.format, &token)?;
         let may_replace = |real: &Path| check_not_input(self.path, real, args);
         let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
-        let lost = RefCell::new(None);
-        let losses = AttributeLossPolicy::Report(&|what| drop(lost.replace(Some(what))));
+        let warnings = RefCell::new(Vec::new());
+        let losses = AttributeLossPolicy::Report(&|warning| warnings.borrow_mut().push(warning));
         let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         write::atomic_with_policy(self.path, &bytes, &guard, &token)?;
-        Ok(lost.into_inner())
+        Ok(warnings.into_inner())
     }
 }
 

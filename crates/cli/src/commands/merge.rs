@@ -315,7 +315,7 @@ impl MergeCommand<'_> {
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
-        let tell = |what: String| self.console.print_message(&format!("warning: {what}"));
+        let tell = |warning| self.console.print_message(&format!("warning: {warning}"));
         let guard = WritePolicy {
             is_kept: &is_kept,
             may_replace: &may_replace,

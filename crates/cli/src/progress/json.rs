@@ -98,7 +98,7 @@ fn event_to_json(event: &Event) -> Option<Value> {
         | Event::Settings { .. }
         | Event::Preview { .. }
         // Reported at the end with the other diagnostics.
-        | Event::NotKept { .. }
+        | Event::WriteWarning { .. }
         | Event::Refused { .. }
         | Event::OwnImage { .. }
         | Event::WritePostponed { .. }

@@ -8,10 +8,12 @@ pub mod mesh;
 pub mod orbiter;
 mod read;
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
+use crate::system::{RAISE_FILE_LIMIT, describe_error, is_out_of_files};
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 
@@ -44,6 +46,12 @@ pub enum AssetError {
         /// Size of the failed allocation.
         bytes: usize,
     },
+    /// Too many files are open in the process or the system. Other files would have the same problem.
+    #[error("cannot read {}: too many open files; {RAISE_FILE_LIMIT}", path.display())]
+    TooManyOpenFiles {
+        /// The file.
+        path: PathBuf,
+    },
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
@@ -52,6 +60,14 @@ pub enum AssetError {
 impl AssetError {
     pub(crate) fn unreadable(path: &Path, reason: impl Into<String>) -> Self {
         Self::Unreadable { path: path.to_owned(), reason: reason.into() }
+    }
+
+    /// Creates the error for a file that the system cannot read.
+    pub(crate) fn from_io(path: &Path, error: &io::Error) -> Self {
+        match is_out_of_files(error) {
+            true => Self::TooManyOpenFiles { path: path.to_owned() },
+            false => Self::unreadable(path, describe_error(error)),
+        }
     }
 
     pub(crate) fn malformed(path: &Path, line: Option<usize>, reason: impl Into<String>) -> Self {

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use super::{AssetError, FileHash};
 use crate::control::{CancelToken, Cancelled, Progress};
-pub(crate) use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 use crate::system::memory::try_reserve_exact;
 
@@ -48,7 +47,7 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
 /// Opens a regular file with at most `limit` bytes. Returns the file and its length. Rejects pipes, devices
 /// and folders without opening them, because opening a pipe may block.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
+    let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let refused = |kind: FileKind| AssetError::unreadable(path, not_regular_file_message(kind));
     let (mut file, found) = file::open_regular_file(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
@@ -137,7 +136,7 @@ fn read_if_start_accepted(
     accept: impl Fn(&[u8]) -> Result<(), AssetError>,
 ) -> Result<Vec<u8>, AssetError> {
     let (mut file, length) = open(path, limit)?;
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
+    let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let mut start = Vec::new();
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
@@ -152,7 +151,7 @@ pub(crate) fn read_rest(
     (length, limit): (u64, u64),
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
+    let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let mut file = file.take(limit);
     let length = length as usize;
     let mut bytes = Vec::new();
@@ -172,6 +171,7 @@ mod tests {
     use super::*;
     use crate::assets::rejection;
     use crate::control::ignore_progress;
+    use crate::system::describe_error;
     use std::fs;
     use std::sync::Mutex;
 

@@ -1,10 +1,11 @@
 //! Copies attributes to a replacement file: owner, group, access list, extended attributes and permissions.
 
 use std::ffi::{OsStr, OsString};
+use std::fmt::{self, Display, Formatter};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use xattr::FileExt;
 
@@ -24,11 +25,46 @@ const NON_GROUP_BITS: u32 = 0o707;
 /// Policy for attributes that would be lost by replacing a file.
 #[derive(Clone, Copy)]
 pub enum AttributeLossPolicy<'a> {
-    /// Replace the file and report the losses in a sentence. The new file never grants additional
-    /// permissions.
-    Report(&'a dyn Fn(String)),
+    /// Replace the file and report the losses. The new file never grants additional permissions.
+    Report(&'a dyn Fn(WriteWarning)),
     /// Do not replace the file.
     Refuse,
+}
+
+/// A problem with a file that has been written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WriteWarning {
+    /// Attributes of the replaced file could not be kept.
+    AttributesLost {
+        /// Path of the file.
+        path: PathBuf,
+        /// The attributes.
+        lost: Vec<String>,
+    },
+    /// The folder could not be synchronized.
+    NotSynchronized {
+        /// Path of the file.
+        path: PathBuf,
+        /// Description of the system error.
+        why: String,
+    },
+}
+
+impl Display for WriteWarning {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AttributesLost { path, lost } => {
+                write!(f, "{}: {} could not be kept", path.display(), lost.join(" and "))
+            }
+            Self::NotSynchronized { path, why } => {
+                let path = path.display();
+                write!(
+                    f,
+                    "{path}: written, but a power failure may undo this: cannot synchronize its folder: {why}"
+                )
+            }
+        }
+    }
 }
 
 /// Attributes of the file to replace.

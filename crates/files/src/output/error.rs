@@ -3,10 +3,8 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use nix::libc;
-
 use super::{AnimationFormat, Format};
-use crate::system::describe_error;
+use crate::system::{RAISE_FILE_LIMIT, describe_error, is_out_of_files};
 
 /// Reason why an image could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -105,9 +103,7 @@ fn write_error_advice(error: &io::Error) -> &'static str {
         }
         ErrorKind::InvalidFilename => "choose a shorter name",
         ErrorKind::BrokenPipe => "the reader has exited; write to a file",
-        _ if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
-            "raise the limit on open files (ulimit -n)"
-        }
+        _ if is_out_of_files(error) => RAISE_FILE_LIMIT,
         _ => "choose another location",
     }
 }

@@ -34,7 +34,7 @@ pub mod write;
 
 use std::path::Path;
 
-pub use attributes::AttributeLossPolicy;
+pub use attributes::{AttributeLossPolicy, WriteWarning};
 pub use develop::DevelopSettings;
 pub use error::OutputError;
 pub use exr::read_mean_luminance_error;

@@ -1,6 +1,7 @@
 use std::io::Cursor;
 
 use super::temporary::tests::dead_name;
+use super::write::Durability;
 use super::*;
 use crate::film::tone::{Tonemap, tone_map_to_8_bits, tone_map_to_16_bits};
 use crate::math::Vec3;
@@ -350,6 +351,41 @@ fn each_folder_is_searched_once() {
 }
 
 #[test]
+fn unsynchronized_files_are_reported_as_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.png");
+    let (warnings, synced) = (std::cell::RefCell::new(Vec::new()), std::cell::Cell::new(0));
+    let report = |warning| warnings.borrow_mut().push(warning);
+    let guard = write::WritePolicy { losses: AttributeLossPolicy::Report(&report), ..NOTHING_KEPT };
+    let content = |file: &mut dyn std::io::Write| file.write_all(b"new");
+    let failing_sync = |directory: &Path| {
+        synced.set(synced.get() + 1);
+        assert_eq!(directory, folder.path());
+        assert_eq!(std::fs::read(&path).expect("renamed before"), b"new");
+        Err(nix::errno::Errno::EIO.into())
+    };
+    for (durability, expected, count) in [
+        (Durability::Process, None, 0),
+        (Durability::Power, None, 1),
+        (Durability::Power, Some(&b"old"[..]), 2),
+    ] {
+        std::fs::write(&path, "old").expect("written");
+        let order = (&CancelToken::new(), durability, expected);
+        write::write_atomically_or_in_place(&path, &content, &guard, order, &failing_sync).expect("written");
+        assert_eq!((synced.get(), warnings.borrow().len()), (count, count), "{durability:?} {expected:?}");
+        assert_eq!(std::fs::read(&path).expect("read"), b"new");
+    }
+    for warning in warnings.into_inner() {
+        assert!(
+            matches!(&warning, WriteWarning::NotSynchronized { path: of, .. } if *of == path),
+            "{warning}"
+        );
+        let words = warning.to_string();
+        assert!(words.contains("a.png: written") && words.contains("power failure"), "{words}");
+    }
+}
+
+#[test]
 fn guards_check_the_link_target_after_writing() {
     let folder = tempfile::tempdir().expect("a folder");
     let (link, real) = (folder.path().join("link.png"), folder.path().join("real.png"));
@@ -412,7 +448,8 @@ fn replacing_a_file_grants_no_permissions() {
     assert!(reports.lock().expect("no panic").is_empty());
     write(false).expect("written");
     let lost = ["its owner", "its group"].map(str::to_owned);
-    assert_eq!(*reports.lock().expect("no panic"), [write::lost_attributes_report(&path, &lost)]);
+    let warning = WriteWarning::AttributesLost { path: path.clone(), lost: lost.into() };
+    assert_eq!(*reports.lock().expect("no panic"), [warning]);
     let found = std::fs::metadata(&path).expect("a file");
     assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
 }

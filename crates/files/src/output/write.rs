@@ -17,7 +17,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use super::attributes::{FileAttributes, UncopiedAttributes};
 use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, TemporaryFile};
-use super::{AttributeLossPolicy, FileIdentity, OutputError, cancellable, held};
+use super::{AttributeLossPolicy, FileIdentity, OutputError, WriteWarning, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
@@ -113,7 +113,14 @@ pub fn atomic_if_unchanged(
 ) -> Result<(), OutputError> {
     let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
         &|file| cancellable::write_all(file, bytes, token);
-    write_atomically_or_in_place(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
+    write_atomically_or_in_place(
+        path,
+        content,
+        guard,
+        (token, Durability::Power, Some(expected)),
+        &sync_directory,
+    )
+    .map(drop)
 }
 
 /// Events that a renamed file is guaranteed to survive.
@@ -137,15 +144,17 @@ pub fn atomic_generated(
     guard: &WritePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
-    write_atomically_or_in_place(path, content, guard, (token, durability, None))
+    write_atomically_or_in_place(path, content, guard, (token, durability, None), &sync_directory)
 }
 
-/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content.
-fn write_atomically_or_in_place(
+/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content. `sync` synchronizes
+/// a directory.
+pub(super) fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &WritePolicy<'_>,
     (token, durability, expected): (&CancelToken, Durability, Option<&[u8]>),
+    sync: &dyn Fn(&Path) -> io::Result<()>,
 ) -> Result<Option<File>, OutputError> {
     ignore_file_size_signal();
     let named = |error| OutputError::file(path, error);
@@ -177,18 +186,15 @@ fn write_atomically_or_in_place(
             };
             let synced = match durability {
                 Durability::Process => Ok(()),
-                Durability::Power => sync_directory(target.directory()),
+                Durability::Power => sync(target.directory()),
             };
             if let (Err(error), AttributeLossPolicy::Report(report)) = (synced, &guard.losses) {
                 // The file has been renamed. Only a power failure could undo this.
-                report(format!(
-                    "{}: written, but its folder could not be synchronized: {}",
-                    path.display(),
-                    describe_error(&error)
-                ));
+                let why = describe_error(&error);
+                report(WriteWarning::NotSynchronized { path: path.to_owned(), why });
             }
             if let (AttributeLossPolicy::Report(report), false) = (guard.losses, lost.is_empty()) {
-                report(lost_attributes_report(path, lost));
+                report(WriteWarning::AttributesLost { path: path.to_owned(), lost: lost.to_vec() });
             }
             Ok(Some(file))
         }
@@ -200,11 +206,6 @@ fn write_atomically_or_in_place(
             Ok(None)
         }
     }
-}
-
-/// Report about attributes that could not be kept.
-pub(super) fn lost_attributes_report(path: &Path, lost: &[String]) -> String {
-    format!("{}: {} could not be kept", path.display(), lost.join(" and "))
 }
 
 /// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`atomic`] calls this function.

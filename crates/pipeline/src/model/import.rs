@@ -68,7 +68,9 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
         Ok(ImportedScene { text, files, notes })
     };
     pool.install(read).map_err(|error: AssetError| match error {
-        AssetError::OutOfMemory { .. } => ImportError::Work(error.to_string()),
+        AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
+            ImportError::Work(error.to_string())
+        }
         AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Cancelled(_) => {
             ImportError::File(error.to_string())
         }

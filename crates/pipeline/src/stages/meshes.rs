@@ -96,7 +96,9 @@ pub(crate) fn load_meshes(
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(StopReason::work_failure(error)),
+            Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
+                return Err(StopReason::work_failure(error));
+            }
             Err(error) => {
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);

@@ -57,7 +57,9 @@ fn generate_model_scene(
 ) -> Result<(scene::LoadedScene, GeneratedScene), StopReason> {
     let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => StopReason::Cancelled,
-        AssetError::OutOfMemory { .. } => StopReason::work_failure(error),
+        AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
+            StopReason::work_failure(error)
+        }
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.read_content_id(&path, token) {

@@ -220,7 +220,9 @@ pub(crate) fn load_textures(
                 cache.texels.insert(image.name, key, (decoded, bytes));
             }
             Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
-            Err(error @ AssetError::OutOfMemory { .. }) => return Err(StopReason::work_failure(error)),
+            Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
+                return Err(StopReason::work_failure(error));
+            }
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
                 for one in &image.asked_by {

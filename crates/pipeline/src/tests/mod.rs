@@ -7,6 +7,7 @@ mod own;
 mod photons;
 mod previews;
 mod reuse;
+mod sweeps;
 mod switching;
 mod targets;
 

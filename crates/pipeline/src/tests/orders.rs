@@ -97,6 +97,41 @@ fn worker_survives_a_panic() {
     assert!(bench.done().0.image.complete);
 }
 
+/// A panic payload that panics when it is dropped. The worker drops it outside of a request.
+struct PanicsOnDrop;
+
+impl Drop for PanicsOnDrop {
+    fn drop(&mut self) {
+        panic!("outside of a request");
+    }
+}
+
+static HAS_PANICKED: AtomicBool = AtomicBool::new(false);
+
+fn panics_on_drop(
+    photons: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    pixels: SelectedPixels,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    if !HAS_PANICKED.swap(true, Ordering::SeqCst) {
+        std::panic::panic_any(PanicsOnDrop);
+    }
+    KERNEL(photons, world, settings, pixels, samples, token)
+}
+
+#[test]
+fn panics_outside_of_requests_are_reported() {
+    let mut bench = Bench::with(SCENE, panics_on_drop);
+    assert!(matches!(bench.failed(), Failure::Work(_)), "the request itself fails first");
+    let Event::Failed { generation, failure: Failure::Work(message) } = bench.next() else {
+        panic!("expected the worker thread to fail")
+    };
+    assert!(generation == bench.generation && message.contains("worker thread"), "{message}");
+}
+
 static TILES: AtomicUsize = AtomicUsize::new(0);
 
 fn breaks_first(

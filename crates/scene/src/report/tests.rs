@@ -1,3 +1,4 @@
+use std::cell::Cell;
 use std::path::PathBuf;
 
 use super::super::diagnostic::SourceSpan;
@@ -136,6 +137,42 @@ fn labels_are_never_cut() {
             .iter()
             .all(|line| { line.iter().map(|piece| piece.text.chars().count()).sum::<usize>() <= 60 })
     );
+}
+
+thread_local! {
+    /// Number of bytes in which characters were counted.
+    pub(super) static BYTES_READ: Cell<usize> = const { Cell::new(0) };
+}
+
+#[test]
+fn locating_many_places_reads_the_text_once() {
+    const COUNT: usize = 40_000;
+    for is_one_line in [false, true] {
+        let item = if is_one_line { "é = 1 " } else { "é = 1\n" };
+        let text: Arc<str> = item.repeat(COUNT).into();
+        BYTES_READ.set(0);
+        let mut locator = LineColumnLocator::default();
+        // Mistakes are not always in the order of the text.
+        for index in (0..COUNT).rev() {
+            let expected = if is_one_line { (1, 6 * index + 3) } else { (index + 1, 3) };
+            assert_eq!(locator.locate(&text, index * item.len() + "é ".len()), expected);
+            let most = text.len() + 2 * STEP * (COUNT - index);
+            assert!(BYTES_READ.get() <= most, "{} bytes for {index}", BYTES_READ.get());
+        }
+    }
+}
+
+#[test]
+fn columns_in_long_lines_count_characters() {
+    let text: Arc<str> = format!("\u{feff}{}\n{}", "aé€🙂".repeat(700), "é".repeat(2 * STEP)).into();
+    let mut locator = LineColumnLocator::default();
+    for (offset, _) in text.char_indices() {
+        let start = text[..offset].rfind('\n').map_or(0, |at| at + 1);
+        let before = text[start..offset].trim_start_matches('\u{feff}').chars().count();
+        let line = text[..offset].matches('\n').count() + 1;
+        assert_eq!(locator.locate(&text, offset), (line, before + 1), "{offset}");
+    }
+    assert_eq!(locator.locate(&text, text.len()), (2, 2 * STEP + 1));
 }
 
 #[test]

@@ -109,8 +109,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             state.saving.write_failed =
                 Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });
         }
-        Event::NotKept { message, .. } => {
-            show_until_key(state, format!("warning: {}", escape_invisible_chars(&message)));
+        Event::WriteWarning { warning, .. } => {
+            show_until_key(state, format!("warning: {}", escape_invisible_chars(&warning.to_string())));
         }
         Event::Checkpoint { news, .. } => match news {
             CheckpointUpdate::Failed { message } => {
@@ -193,7 +193,7 @@ fn event_generation(event: &Event) -> u64 {
         | Event::Written { generation, .. }
         | Event::OwnImage { generation, .. }
         | Event::WriteFailed { generation, .. }
-        | Event::NotKept { generation, .. }
+        | Event::WriteWarning { generation, .. }
         | Event::Refused { generation, .. }
         | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }

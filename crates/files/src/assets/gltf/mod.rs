@@ -275,7 +275,9 @@ impl GltfFile {
             error @ (AssetError::Malformed { .. } | AssetError::Unreadable { .. }) => {
                 self.malformed_error(GltfError::new(error.to_string()).add_location(place))
             }
-            other @ (AssetError::OutOfMemory { .. } | AssetError::Cancelled(_)) => other,
+            other @ (AssetError::OutOfMemory { .. }
+            | AssetError::TooManyOpenFiles { .. }
+            | AssetError::Cancelled(_)) => other,
         }
     }
 

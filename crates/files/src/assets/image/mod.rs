@@ -25,11 +25,12 @@ use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::catch_panic::catch_panic;
 use super::read::{self, Monitor};
-use super::{AssetError, FileHash, read::describe_error};
+use super::{AssetError, FileHash};
 use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
 use crate::materials::mipmaps::ImageHalver;
 use crate::materials::texels::Texels;
 use crate::materials::{ChannelSelector, Mipmaps};
+use crate::system::describe_error;
 use counting_reader::CountingReader;
 use decode_thread::ProgressReporter;
 use decoder::{
@@ -367,7 +368,7 @@ impl ImageSource {
             // Avoid reading a large file that will be rejected.
             size(path, encoding, limits, token)?;
         }
-        let unreadable = |error: io::Error| AssetError::unreadable(path, describe_error(&error));
+        let unreadable = |error: io::Error| AssetError::from_io(path, &error);
         let without_text = match length > CHECKED_FIRST {
             true => png::read_without_text_chunks(&file, token),
             false => Ok(None),

@@ -11,6 +11,8 @@ mod off;
 pub(crate) mod parsed;
 pub mod ply;
 mod polygon;
+#[cfg(test)]
+mod polygon_tests;
 mod stl;
 mod text;
 

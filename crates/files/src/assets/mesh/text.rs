@@ -52,7 +52,7 @@ impl Lines {
     pub(super) fn open(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let (file, _) = read::open(path, limit)?;
         let mut reader = BufReader::with_capacity(Self::BUFFER, file);
-        let unreadable = |error| AssetError::unreadable(path, read::describe_error(&error));
+        let unreadable = |error| AssetError::from_io(path, &error);
         let start = reader.fill_buf().map_err(unreadable)?;
         let end = if matches!(convert_mac_line_ends(start), Cow::Owned(_)) { b'\r' } else { b'\n' };
         let mark = start.len() - strip_byte_order_mark(start).len();

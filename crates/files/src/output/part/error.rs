@@ -3,10 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
-use nix::errno::Errno;
-
-use crate::system::describe_error;
 use crate::system::file::FileKind;
+use crate::system::{describe_error, is_out_of_files};
 
 /// Part index and part count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,7 +118,7 @@ impl PartError {
     /// Whether too many files are open in the process or the system. Opening more files would also fail.
     pub fn is_too_many_open_files(&self) -> bool {
         let Self::Unreadable { source, .. } = self else { return false };
-        matches!(source.raw_os_error().map(Errno::from_raw), Some(Errno::EMFILE | Errno::ENFILE))
+        is_out_of_files(source)
     }
 }
 

@@ -42,4 +42,4 @@ fn newell_normal(points: &[DVec3]) -> DVec3 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
