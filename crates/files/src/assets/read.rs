@@ -144,7 +144,7 @@ fn read_if_start_accepted(
     read_rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file that has about `length` read_bytes. Reports progress like [`read_bytes`].
+/// Reads the rest of an open file that has about `length` bytes. Reports progress like [`read_bytes`].
 pub(crate) fn read_rest(
     path: &Path,
     file: File,
