@@ -56,7 +56,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         return exit;
     }
     if arguments.len() <= 1 {
-        return run_without_arguments();
+        return print_getting_started();
     }
     let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,
@@ -110,7 +110,7 @@ glimt renders a scene file in the terminal and updates it on every save.
 Run `glimt -h` for all commands and options.";
 
 /// Handles an invocation without arguments.
-fn run_without_arguments() -> Exit {
+fn print_getting_started() -> Exit {
     Console::new(crate::tui::ColorChoice::Auto).print_message_lines(GETTING_STARTED);
     Exit::WRONG
 }

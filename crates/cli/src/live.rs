@@ -101,9 +101,9 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         let _ = forwarder.join();
     }
     if let Ok(ended) = &outcome {
-        let lost = contents.outputs.changed_externally(&contents);
-        let is_older = ended.is_current && writes.is_image_outdated(&contents);
-        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &shell_command_line()))
+        let lost = contents.outputs.list_external_changes(&contents);
+        let is_older = ended.is_current && writes.is_image_older_than_inputs(&contents);
+        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &quoted_own_command_line()))
             .iter()
             .for_each(|line| console.print_message(line));
     }
@@ -151,7 +151,7 @@ fn exit_summary_lines(
 }
 
 /// Returns this command line, quoted for a shell.
-fn shell_command_line() -> String {
+fn quoted_own_command_line() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
         Err(_) => word.clone(),
@@ -283,7 +283,7 @@ impl SharedWriteLog {
 
     /// Whether the scene's own image is older than the files on disk, for example because the user saved the
     /// scene and quit at once.
-    fn is_image_outdated(&self, contents: &FileHashCache) -> bool {
+    fn is_image_older_than_inputs(&self, contents: &FileHashCache) -> bool {
         let files = self.lock_log().image_files.take();
         let now = |path: &Path| contents.read_content_id(path, &CancelToken::new());
         files.is_none_or(|files| files.iter().any(|file| now(&file.path) != Ok(file.content)))
@@ -436,13 +436,13 @@ mod tests {
         let own = |state| writes.record_event(&Event::OwnImage { generation: 1, state });
         writes.record_event(&read());
         own(SavedSceneImageState::Written);
-        assert!(!writes.is_image_outdated(&contents));
+        assert!(!writes.is_image_older_than_inputs(&contents));
         own(SavedSceneImageState::Written);
         std::fs::write(&path, "22").expect("written");
-        assert!(writes.is_image_outdated(&contents));
+        assert!(writes.is_image_older_than_inputs(&contents));
         // A request has read the new scene, but has not rendered its image.
         own(SavedSceneImageState::NotBegun);
-        assert!(writes.is_image_outdated(&contents));
+        assert!(writes.is_image_older_than_inputs(&contents));
         let ended = TuiOutcome {
             status: ExitStatus::QUIT,
             is_write_unanswered: false,

@@ -32,7 +32,7 @@ const TICK: Duration = Duration::from_millis(50);
 /// Runs `--once`.
 pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
-    priority::lower_priority(order.nice);
+    priority::lower_inherited_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
@@ -57,7 +57,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         let now = Instant::now();
         // Without checkpoints, the image being written would be lost.
         let is_lost = is_writing && !has_checkpoints;
-        if ended.signal_number().is_some() && !is_lost && deadline.claim_write_timeout(now, is_writing) {
+        if ended.signal_number().is_some() && !is_lost && deadline.check_write_timeout_once(now, is_writing) {
             worker.send(Command::Cancel);
         }
         ended.signal_number().is_some() && deadline.is_over(now)
@@ -66,7 +66,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Use one reporter per image to clear the progress of the previous frame.
     let reporter = || progress::create_reporter(order.progress, order.overrides.time_seconds, console);
     let mut image_reporter = reporter();
-    for overrides in overrides_per_frame(&order.overrides) {
+    for overrides in overrides_per_turntable_frame(&order.overrides) {
         let turn = overrides.turn;
         if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
             console.print_message(&format!("frame {} of {of}", number + 1));
@@ -105,7 +105,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
 }
 
 /// Returns the render requests: a single request, or one per turntable frame.
-fn overrides_per_frame(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+fn overrides_per_turntable_frame(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
         let turn = overrides.turn.map(|turn| TurntableFrame { number, ..turn });
@@ -153,7 +153,7 @@ impl ExitDeadline {
 
     /// Returns true the first time it is called after writing has taken too long. If an image was being
     /// written, extends the deadline so that a checkpoint can be written.
-    fn claim_write_timeout(&mut self, now: Instant, is_image: bool) -> bool {
+    fn check_write_timeout_once(&mut self, now: Instant, is_image: bool) -> bool {
         let end = *self.end.get_or_insert(now + EXIT_TIMEOUT);
         if self.is_write_stopped || now + EXIT_TIMEOUT < end + WRITE_TIMEOUT {
             return false;
@@ -202,7 +202,7 @@ fn handle_events(
             call_warnings.extend(ineffective_option_warnings(&order.overrides, settings));
         } else if let Event::Stage { stage, .. } = &event
             && !is_first
-            && rereads_changed_file(stage)
+            && has_stage_reread_changed_file(stage)
         {
             worker.send(Command::Cancel);
             reporter.clear_output();
@@ -244,7 +244,7 @@ fn handle_events(
             Event::Failed { failure, .. } => {
                 reporter.clear_output();
                 if reporter.reports_diagnostics() {
-                    return exit_code(&failure);
+                    return exit_code_for_failure(&failure);
                 }
                 unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
                 return report_failure(&failure, console);
@@ -274,7 +274,7 @@ fn handle_events(
 }
 
 /// Whether a stage read a file that has changed since the previous frame.
-fn rereads_changed_file(stage: &StageReport) -> bool {
+fn has_stage_reread_changed_file(stage: &StageReport) -> bool {
     matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
@@ -397,10 +397,10 @@ fn report_failure(failure: &Failure, console: &Console) -> Exit {
         Failure::Scene(diagnostics) => console.print_diagnostics(diagnostics),
         Failure::Work(message) => console.print_message(&format!("error: {message}")),
     }
-    exit_code(failure)
+    exit_code_for_failure(failure)
 }
 
-fn exit_code(failure: &Failure) -> Exit {
+fn exit_code_for_failure(failure: &Failure) -> Exit {
     match failure {
         Failure::Scene(_) => Exit::WRONG,
         Failure::Work(_) => Exit::FAILED,
@@ -455,7 +455,7 @@ mod tests {
         let signal = Instant::now();
         for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
             let mut deadline = ExitDeadline::default();
-            let mut stops = |after| deadline.claim_write_timeout(signal + after, is_image);
+            let mut stops = |after| deadline.check_write_timeout_once(signal + after, is_image);
             assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
             assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");
             assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));

@@ -4,8 +4,8 @@ mod bars;
 mod json;
 mod plain;
 
-pub(super) use self::bars::bar_style;
-pub(super) use self::json::{failure_to_json, print_json_line as json_line};
+pub(super) use self::bars::bar_style_from_template;
+pub(super) use self::json::{failure_to_json, print_json_line_to_stderr as json_line};
 use crate::args::ProgressMode;
 use crate::console::Console;
 use crate::pipeline::protocol::{Event, RenderProgress};

@@ -62,7 +62,7 @@ pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failur
         engine.load_all_assets(path, &overrides.sets, &silent_sink(), &token)?;
     let plan =
         resolve_plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
-    Ok(MemoryEstimate::for_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
+    Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
 }
 
 fn silent_sink() -> EventSink {

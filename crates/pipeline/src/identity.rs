@@ -93,11 +93,11 @@ impl ImageDependencies<'_> {
         let meshes: Vec<Fingerprint> = scene
             .mesh_files
             .iter()
-            .map(|file| file_content_key(&self.describe_file_content(&file.value), file.part))
+            .map(|file| file_content_and_part_key(&self.describe_file_content(&file.value), file.part))
             .collect();
         let of = keys::fingerprint_context(&scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&keys::surfaces_key(&scene, &of, &[]), &eye.camera, &of);
-        keys::film_key(world, &self.plan.settings, self.plan.crop)
+        keys::film_sums_key(world, &self.plan.settings, self.plan.crop)
     }
 
     /// Returns the scene with each path replaced by a description of the file's content.
@@ -122,11 +122,11 @@ impl ImageDependencies<'_> {
     }
 }
 
-fn file_content_key(content: &str, part: Option<u32>) -> Fingerprint {
+fn file_content_and_part_key(content: &str, part: Option<u32>) -> Fingerprint {
     let mut key = FingerprintHasher::new("content");
     key.add_str(content);
     if let Some(part) = part {
-        key.add_index(part as usize);
+        key.add_usize(part as usize);
     }
     key.finish()
 }

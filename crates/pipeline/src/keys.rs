@@ -133,7 +133,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
         match object.material.map(|index| &scene.materials[index]) {
             Some(material) if !material.emits() => {}
             Some(material) => {
-                key.add_index(number)
+                key.add_usize(number)
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
@@ -143,7 +143,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
             }
             // Materials from the mesh file may emit.
             None => {
-                key.add_index(number).add(&object.shape, of).add_str("own");
+                key.add_usize(number).add(&object.shape, of).add_str("own");
             }
         }
     }
@@ -182,8 +182,8 @@ pub(crate) fn surfaces_key(
     key.add_fingerprint(&shapes_key(scene, of)).add_fingerprint(&light_descriptions_key(scene, of));
     for object in &scene.objects {
         match object.material {
-            Some(index) => key.add_index(1).add(&scene.materials[index], of),
-            None => key.add_index(0),
+            Some(index) => key.add_usize(1).add(&scene.materials[index], of),
+            None => key.add_usize(0),
         };
         key.add_bool(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
     }
@@ -194,7 +194,11 @@ pub(crate) fn surfaces_key(
 }
 
 /// Returns the key for everything that affects a film's sums, except the sample count.
-pub(crate) fn film_key(world: Fingerprint, settings: &RenderSettings, crop: Option<Rect>) -> Fingerprint {
+pub(crate) fn film_sums_key(
+    world: Fingerprint,
+    settings: &RenderSettings,
+    crop: Option<Rect>,
+) -> Fingerprint {
     let mut key = FingerprintHasher::new("render");
     key.add_fingerprint(&world).add(settings, &FingerprintContext::default());
     if let Some(rect) = crop {
@@ -208,7 +212,7 @@ pub(crate) fn film_key(world: Fingerprint, settings: &RenderSettings, crop: Opti
 
 /// Returns the key for the image developed from a film. With a time limit, noise varies between films, so the
 /// key includes `film_number`.
-pub(crate) fn image_key(film: Fingerprint, plan: &RenderPlan, film_number: u64) -> Fingerprint {
+pub(crate) fn developed_image_key(film: Fingerprint, plan: &RenderPlan, film_number: u64) -> Fingerprint {
     let RenderOptions { samples, error, .. } = plan.settings.render;
     let mut key = FingerprintHasher::new("image");
     key.add_fingerprint(&film).add_u64(samples.into()).add_f32(error);
@@ -308,7 +312,8 @@ mod tests {
         let scene = loaded_of(BALL).scene;
         let plan = crate::plan::resolve_plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
-        let of = |settings: &RenderSettings| film_key(FingerprintHasher::new("w").finish(), settings, None);
+        let of =
+            |settings: &RenderSettings| film_sums_key(FingerprintHasher::new("w").finish(), settings, None);
         let render_settings = settings.render;
         // No `..` here: adding a field must cause a compile error until it is tested below.
         let RenderSettings { render: _, dof, view, photons } = settings;
@@ -389,7 +394,7 @@ mod tests {
         assert_eq!(of(&with(RenderOptions { clamp: 1.0, ..render_settings })), of(&settings));
         let mut keys: Vec<Fingerprint> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
-        keys.push(film_key(FingerprintHasher::new("w").finish(), &settings, Some(crop)));
+        keys.push(film_sums_key(FingerprintHasher::new("w").finish(), &settings, Some(crop)));
         for (i, key) in keys.iter().enumerate() {
             assert!(!keys[..i].contains(key), "key {i} is not unique");
         }

@@ -74,7 +74,12 @@ impl MemoryEstimate {
     }
 
     /// Estimates the memory for the image and everything the scene references.
-    pub(super) fn for_scene(plan: &RenderPlan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
+    pub(super) fn for_image_and_scene(
+        plan: &RenderPlan,
+        scene: &Scene,
+        meshes: &Meshes,
+        texture_bytes: u64,
+    ) -> Self {
         let Self(mut items) = Self::for_image(plan);
         let triangle = match scene.render.accel {
             Accel::Bvh => 110,
@@ -115,11 +120,11 @@ impl MemoryEstimate {
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
     pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, StopReason> {
-        self.check_against(plan, memory_limit)
+        self.bytes_left_within_given_limit(plan, memory_limit)
     }
 
     /// Like [`Self::check`], but takes the system's limit as a parameter.
-    fn check_against(
+    fn bytes_left_within_given_limit(
         &self,
         plan: &RenderPlan,
         limit: impl FnOnce() -> Option<MemoryLimit>,
@@ -263,7 +268,7 @@ mod tests {
         let limit = || Some(MemoryLimit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
-            MemoryEstimate::for_image(&plan).check_against(&plan, limit)
+            MemoryEstimate::for_image(&plan).bytes_left_within_given_limit(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
             Err(StopReason::Failed(Failure::Work(said))) => said,

@@ -135,12 +135,12 @@ pub(super) fn resolve_plan(
         up: overrides.up,
         named_by,
         default_names,
-        report: report_path(overrides),
+        report: requested_report_path(overrides),
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,
         checkpoints: overrides.checkpoints,
         memory: overrides.memory,
-        scene: with_accel(scene, render.accel),
+        scene: scene_with_accel(scene, render.accel),
     })
 }
 
@@ -165,7 +165,7 @@ fn photon_settings(requested: &PhotonOptions, (width, height): (u32, u32)) -> Ph
 
 /// Returns the scene with acceleration structure `accel`. Copies the scene only if necessary, because it may
 /// be large.
-fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
+fn scene_with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
         Arc::make_mut(&mut scene).render.accel = accel;
@@ -200,7 +200,7 @@ fn output_paths(
 }
 
 /// Returns the report's path. For a turntable, it includes the frame number.
-fn report_path(overrides: &Overrides) -> Option<PathBuf> {
+fn requested_report_path(overrides: &Overrides) -> Option<PathBuf> {
     let path = overrides.report.as_ref()?;
     let numbered = overrides.turn.and_then(|turn| turntable::frame_path(path, turn));
     Some(numbered.unwrap_or_else(|| path.clone()))

@@ -17,7 +17,7 @@ pub use super::answers::{
     CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickResult, PickedObject, SceneFileEdit,
 };
 pub use super::report::{
-    ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, SampleCounts, WorkCounters,
+    ImageReport, LightsReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
 use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
 use super::watch::content::FileRead;

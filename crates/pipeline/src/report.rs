@@ -3,7 +3,7 @@
 pub(super) mod finish;
 mod marks;
 
-pub(super) use self::marks::ReportSignature;
+pub(super) use self::marks::ReportRecognitionFields;
 use super::protocol::StageReport;
 use super::settings::EffectiveSettings;
 use crate::film::SampleCountStats;
@@ -82,7 +82,7 @@ pub struct LightsReport {
     /// Number of lights. A mesh counts once per emissive material.
     pub count: u64,
     /// Which lights are sampled at each vertex.
-    pub sampled: LightSelectionMode,
+    pub sampled: SampledLightSet,
     /// Number of lights sampled from the light tree at each vertex: 32 × `shadow_samples` for `whitted`, or 4
     /// × `shadow_samples` for `path`. 0 without a tree.
     pub picks: u64,
@@ -123,7 +123,7 @@ pub struct PhotonsReport {
 /// Which lights are sampled at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum LightSelectionMode {
+pub enum SampledLightSet {
     /// All lights.
     All,
     /// A subset, sampled according to expected contribution.

@@ -195,7 +195,7 @@ pub struct EffectiveSettings {
     /// Number of render threads.
     pub threads: usize,
     /// Output files of the image.
-    #[serde(serialize_with = "lossy_paths")]
+    #[serde(serialize_with = "serialize_paths_lossily")]
     pub outputs: Vec<PathBuf>,
 }
 
@@ -223,6 +223,9 @@ impl EffectiveSettings {
 }
 
 /// Serializes paths lossily, so that a report can be written even if a path is not valid UTF-8.
-fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+fn serialize_paths_lossily<S: serde::Serializer>(
+    paths: &[PathBuf],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }

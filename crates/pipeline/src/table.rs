@@ -3,7 +3,7 @@
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::EventSink;
 use super::stages::{StageResult, StopReason};
-use super::stopwatch::Stopwatch;
+use super::stopwatch::PauseExcludingStopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
@@ -27,7 +27,7 @@ impl StageRunner<'_> {
         name: Stage,
         work: impl FnOnce() -> Result<StageResult<T>, StopReason>,
     ) -> Result<T, StopReason> {
-        let watch = Stopwatch::start(self.token);
+        let watch = PauseExcludingStopwatch::start(self.token);
         let before = process_cpu_seconds();
         let report = |status, why| {
             let processor_seconds = process_cpu_seconds() - before;

@@ -8,7 +8,7 @@ use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
 use super::plan::{OutputNameSource, RenderPlan};
 use super::protected::{OverwriteProtection, mismatched_source_scene};
 use super::render::checkpointer::checkpoint_path;
-use super::report::ReportSignature;
+use super::report::ReportRecognitionFields;
 use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{SweptFolders, WritePolicy};
@@ -211,7 +211,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = may_replace_json(at, "a report", ReportSignature::have_all_stages);
+            let replaced = may_replace_json(at, "a report", ReportRecognitionFields::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {

@@ -84,7 +84,7 @@ impl Tracer<'_> {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(super) fn run<K: Send>(
+    pub(super) fn run_all_jobs_in_parallel<K: Send>(
         &self,
         jobs: &[TileJob],
         keep: impl Fn(&TileJob, TileSamples) -> K + Sync,
@@ -151,7 +151,7 @@ impl Drop for StopOnPanic<'_> {
 /// Returns the number of samples per pixel after the next pass. It is 1, 2, 4, … at first, so that an image
 /// appears early, and then increases in steps that keep the time per tile short. `pixels` is the image size.
 /// A pass ends at every power of two, because noise is evaluated there.
-pub(super) fn next_pass_samples(done: u32, total: u32, pixels: usize) -> u32 {
+pub(super) fn samples_after_next_pass(done: u32, total: u32, pixels: usize) -> u32 {
     let longest = max_pass_samples(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
     done.saturating_add(done.clamp(1, longest)).min(power).min(total)
@@ -164,13 +164,13 @@ fn max_pass_samples(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`next_pass_samples`].
+/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`samples_after_next_pass`].
 /// Each job has at most `at_once` samples.
-pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
+pub(super) fn estimate_remaining_job_count(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = max_pass_samples(pixels);
     let (mut reached, mut jobs) = (done, 0);
     while reached < longest.min(total) {
-        let end = next_pass_samples(reached, total, pixels);
+        let end = samples_after_next_pass(reached, total, pixels);
         jobs += (end - reached).div_ceil(at_once);
         reached = end;
     }
@@ -193,17 +193,20 @@ mod tests {
         ] {
             let (mut reached, mut jobs) = (done, 0);
             while reached < total {
-                let end = next_pass_samples(reached, total, pixels);
+                let end = samples_after_next_pass(reached, total, pixels);
                 jobs += (end - reached).div_ceil(at_once);
                 reached = end;
             }
             assert_eq!(
-                remaining_jobs(done, total, pixels, at_once),
+                estimate_remaining_job_count(done, total, pixels, at_once),
                 jobs,
                 "{done} {total} {pixels} {at_once}"
             );
         }
-        assert_eq!(remaining_jobs(0, u32::MAX, 5000, u32::MAX), 6 + (u32::MAX - 32).div_ceil(32));
+        assert_eq!(
+            estimate_remaining_job_count(0, u32::MAX, 5000, u32::MAX),
+            6 + (u32::MAX - 32).div_ceil(32)
+        );
     }
 
     #[test]
@@ -213,7 +216,7 @@ mod tests {
             while let Some(&last) = ends.last()
                 && last < total
             {
-                ends.push(next_pass_samples(last, total, pixels));
+                ends.push(samples_after_next_pass(last, total, pixels));
             }
             ends
         };
@@ -221,7 +224,7 @@ mod tests {
         assert_eq!(passes(100, 5000), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
         // An image half the size of a tile has twice as many samples per pass.
         assert_eq!(passes(200, 512), [0, 1, 2, 4, 8, 16, 32, 64, 128, 192, 200]);
-        assert_eq!(next_pass_samples(100, 1000, 5000), 128);
-        assert_eq!(next_pass_samples(u32::MAX - 1, u32::MAX, 0), u32::MAX);
+        assert_eq!(samples_after_next_pass(100, 1000, 5000), 128);
+        assert_eq!(samples_after_next_pass(u32::MAX - 1, u32::MAX, 0), u32::MAX);
     }
 }

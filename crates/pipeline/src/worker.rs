@@ -26,11 +26,11 @@ use crate::system::threads::spawn;
 /// # Errors
 /// The system cannot start a thread.
 pub fn start(nice: u8) -> std::io::Result<Handle> {
-    start_with(EngineConfig { nice, ..EngineConfig::default() })
+    start_with_config(EngineConfig { nice, ..EngineConfig::default() })
 }
 
 /// Starts a worker with this configuration.
-pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
+pub(super) fn start_with_config(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = CommandSender { mailbox: Arc::default(), events: sender };
     let previews = PreviewSlot::default();
@@ -159,7 +159,7 @@ impl CommandSender {
     pub fn send(&self, command: Command) {
         let mut mailbox = self.lock();
         match command {
-            Command::Render(request) => self.replace_pending(&mut mailbox, request),
+            Command::Render(request) => self.replace_older_pending_request(&mut mailbox, request),
             Command::Write => {
                 mailbox.write = true;
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
@@ -198,7 +198,7 @@ impl CommandSender {
     }
 
     /// Replaces the pending request unless the pending one is newer. Requests may arrive in any order.
-    fn replace_pending(&self, mailbox: &mut Mailbox, request: Box<Request>) {
+    fn replace_older_pending_request(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
             return self.report_cancelled(Some(request));
         }

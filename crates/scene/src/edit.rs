@@ -108,15 +108,15 @@ impl CameraEdits<'_> {
     }
 
     /// Whether a key is the first on its line, possibly in the form `camera.key`.
-    fn starts_line(&self, key: &KeyValue<'_>) -> bool {
+    fn is_first_key_on_line(&self, key: &KeyValue<'_>) -> bool {
         let indent = self.indent(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
     /// Returns the separator between this entry and the next one.
     fn separator_after(&self, key: &KeyValue<'_>) -> String {
-        if self.starts_line(key) {
-            format!("{}{}", self.line_end(key), self.indent(key))
+        if self.is_first_key_on_line(key) {
+            format!("{}{}", self.line_ending_after(key), self.indent(key))
         } else {
             ", ".to_owned()
         }
@@ -124,7 +124,7 @@ impl CameraEdits<'_> {
 
     /// Returns the line ending after this entry. If the entry is on an unterminated last line, returns the
     /// line ending of the previous line.
-    fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
+    fn line_ending_after(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
         if line.ends_with('\r') { "\r\n" } else { "\n" }
@@ -138,8 +138,11 @@ impl CameraEdits<'_> {
             let end = last.value.span().end;
             // Insert after the line's comment.
             let line = self.text[end..].find('\n').map_or(self.text.len(), |at| end + at);
-            let at =
-                if self.starts_line(&last) { self.text[..line].trim_end_matches('\r').len() } else { end };
+            let at = if self.is_first_key_on_line(&last) {
+                self.text[..line].trim_end_matches('\r').len()
+            } else {
+                end
+            };
             let added = self.added.iter().map(|one| format!("{between}{one}")).collect();
             self.replaced.push((at..at, added));
         }

@@ -11,7 +11,7 @@ pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 
 /// Minimum and maximum corners of a mesh file's bounding box. `None` for a mesh without vertices.
-pub type MeshBounds = Option<[DVec3; 2]>;
+pub type MeshBoundingBox = Option<[DVec3; 2]>;
 
 /// Minimum ratio of the scene's extent in front of a light to the extent behind the light. Below this ratio,
 /// the light counts as facing away. The ratio is small because a light may be meant to illuminate only the
@@ -22,7 +22,7 @@ const MIN_FRONT_RATIO: f64 = 0.02;
 /// calls `bounds` if the scene has one-sided quad lights.
 pub(super) fn lights_facing_away(
     scene: &Scene,
-    bounds: impl FnOnce() -> Vec<MeshBounds>,
+    bounds: impl FnOnce() -> Vec<MeshBoundingBox>,
 ) -> Vec<Range<usize>> {
     let emits = |object: &Object| {
         let material = object.material.map(|index| &scene.materials[index]);
@@ -68,7 +68,7 @@ fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 }
 
 /// Returns an upper bound on the projection of a shape's points onto a unit direction.
-fn max_shape_projection(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
+fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
     shape.max_projection_onto(direction).unwrap_or_else(|| {
         let of = |mesh: &MeshReference| {
             Some(bounding_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))

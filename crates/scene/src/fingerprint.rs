@@ -67,7 +67,7 @@ impl FingerprintHasher {
     }
 
     /// Adds the bytes of a path.
-    pub fn add_path(&mut self, path: &std::path::Path) -> &mut Self {
+    pub fn add_path_bytes(&mut self, path: &std::path::Path) -> &mut Self {
         self.add_bytes(path.as_os_str().as_encoded_bytes())
     }
 
@@ -100,7 +100,7 @@ impl FingerprintHasher {
     }
 
     /// Adds an index, a count or an enum discriminant.
-    pub fn add_index(&mut self, value: usize) -> &mut Self {
+    pub fn add_usize(&mut self, value: usize) -> &mut Self {
         self.add_u64(value as u64)
     }
 

@@ -24,7 +24,7 @@ pub fn key_parts(key: &str) -> Vec<&str> {
 }
 
 /// Splits a text at the first space outside quotes, into a dotted key and the text after it.
-pub fn split_leading_key(text: &str) -> Option<(&str, &str)> {
+pub fn split_at_unquoted_space(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
@@ -70,8 +70,8 @@ mod tests {
         assert_eq!(key_parts(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
         assert_eq!(key_parts("light.1.direction"), ["light", "1", "direction"]);
         assert_eq!(key_parts("camera"), ["camera"]);
-        assert_eq!(split_leading_key(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
-        assert_eq!(split_leading_key("camera"), None);
+        assert_eq!(split_at_unquoted_space(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
+        assert_eq!(split_at_unquoted_space("camera"), None);
     }
 
     #[test]

@@ -33,8 +33,8 @@ use std::sync::Arc;
 pub use changes::{MOST_COMPARED_BYTES, list_changes};
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
-pub use facing::MeshBounds;
-pub use key_path::{key_parts, shortened_key, split_leading_key};
+pub use facing::MeshBoundingBox;
+pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
 pub use other_content::detect_non_scene;
 pub use read::find_renamed_scene;
 pub use source::{SceneText, quote_toml_string};
@@ -114,7 +114,7 @@ impl LoadedScene {
 
     /// In scenes with mesh files, returns warnings about lights that shine away from everything. Only calls
     /// `bounds` if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
-    pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
+    pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBoundingBox>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
         }

@@ -53,13 +53,13 @@ pub fn outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
         let found = document.root().get(info.name);
-        found.map_or_else(Vec::new, |found| outline_tables(info, &found))
+        found.map_or_else(Vec::new, |found| outline_tables_of_definition(info, &found))
     };
     all_tables().iter().flat_map(of).collect()
 }
 
 /// Returns the tables that `info` defines.
-fn outline_tables(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
+fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
         TableSyntax::Single => table_entries(found.value)
             .map(|all| outline_table(info, None, 1, found.value, &all))
@@ -80,7 +80,7 @@ fn outline_tables(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<Outline
                 .enumerate()
                 .filter_map(|(index, value)| {
                     let all = table_entries(value)?;
-                    let name = all.get("name").and_then(|name| string_value(name.value));
+                    let name = all.get("name").and_then(|name| spanned_string_value(name.value));
                     Some(outline_table(info, name, index + 1, value, &all))
                 })
                 .collect()
@@ -95,7 +95,7 @@ fn outline_table(
     value: Value<'_>,
     all: &Entries<'_>,
 ) -> OutlineTable {
-    let kind = all.get("type").map(|kind| string_value(kind.value));
+    let kind = all.get("type").map(|kind| spanned_string_value(kind.value));
     let kind = match &kind {
         Some(Some(kind)) => info.find_type(Some(&kind.text)),
         Some(None) => None,
@@ -108,14 +108,14 @@ fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
     let key = |one: KeyValue<'_>| OutlineKey {
         name: SpannedName { text: one.key.to_owned(), span: one.span },
         value: one.value.span(),
-        text: string_value(one.value).map(|text| text.text),
+        text: spanned_string_value(one.value).map(|text| text.text),
         inner: table_entries(one.value).map_or_else(Vec::new, |inner| outline_keys(&inner)),
     };
     all.iter().map(key).collect()
 }
 
 /// The value, if it is a string.
-fn string_value(value: Value<'_>) -> Option<SpannedName> {
+fn spanned_string_value(value: Value<'_>) -> Option<SpannedName> {
     match value.decode() {
         TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
         TomlValue::Integer { .. }

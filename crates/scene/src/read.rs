@@ -70,19 +70,19 @@ fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
-        format_mesh_file_entry(&escape_invisible_chars(&name))
+        format_mesh_file_key(&escape_invisible_chars(&name))
     );
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
 /// Formats the key `file` in `[[mesh]]` for help texts.
-fn format_mesh_file_entry(name: &str) -> String {
+fn format_mesh_file_key(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
 
 /// Whether a readable file has a mesh extension and does not contain a scene.
 pub(super) fn is_model(path: &Path) -> bool {
-    has_mesh_extension(path) && lacks_camera(path)
+    has_mesh_extension(path) && is_file_without_camera_header(path)
 }
 
 /// Extensions of unsupported model formats.
@@ -94,11 +94,11 @@ const UNSUPPORTED_MODELS: [&str; 22] = [
 /// Whether a readable file has an unsupported model format's extension and does not contain a scene.
 fn is_unsupported_model(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera(path)
+    UNSUPPORTED_MODELS.contains(&ending.as_str()) && is_file_without_camera_header(path)
 }
 
 /// Whether a file has no `[camera]` header near its start. False for unreadable files.
-fn lacks_camera(path: &Path) -> bool {
+fn is_file_without_camera_header(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
         let (file, _) = file::open_regular_file(path).ok()?.ok()?;
@@ -322,7 +322,7 @@ mod tests {
             std::fs::write(&path, content).expect("written");
             let Diagnostic { message, help, .. } = message(&path);
             assert_eq!(message, MESH_NOT_SCENE);
-            assert!(help.expect("a help text").contains(&format_mesh_file_entry(name)));
+            assert!(help.expect("a help text").contains(&format_mesh_file_key(name)));
         }
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");

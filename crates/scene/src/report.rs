@@ -34,7 +34,7 @@ pub fn render_report(diagnostics: &[Diagnostic], width: usize, style: ReportStyl
         ReportStyle::Plain => Renderer::plain(),
         ReportStyle::Ansi => Renderer::styled(),
     };
-    render_report_with(diagnostics, width, &renderer)
+    render_report_with_renderer(diagnostics, width, &renderer)
 }
 
 /// Counts the diagnostics, as in `2 errors, 1 warning`.
@@ -71,7 +71,7 @@ pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
 }
 
-fn render_report_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
+fn render_report_with_renderer(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
     if diagnostics.is_empty() {
         return String::new();
     }

@@ -83,7 +83,7 @@ impl SceneText {
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_in_set_arg(&self, span: &Range<usize>) -> bool {
+    pub(super) fn is_span_in_set_arg(&self, span: &Range<usize>) -> bool {
         span.start >= self.file
     }
 

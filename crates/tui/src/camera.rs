@@ -2,7 +2,7 @@
 //! camera can be written to a scene file exactly.
 
 use crate::math::DVec3;
-use crate::math::decimal::{decimal_step, round_to_step};
+use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
@@ -46,7 +46,7 @@ pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
 fn with_eye_offset(pose: &Pose, arm: DVec3) -> Pose {
-    let step = decimal_step(arm.length());
+    let step = coordinate_step_at_distance(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| round_to_step(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
 }

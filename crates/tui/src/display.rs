@@ -240,8 +240,10 @@ impl Display {
     fn finish_target(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
-            self.report =
-                Some(PreviewSendReport { bytes: self.sent, round_trip: self.connection.round_trip() });
+            self.report = Some(PreviewSendReport {
+                bytes: self.sent,
+                round_trip: self.connection.min_round_trip_time(),
+            });
             self.is_reported = false;
         }
     }
@@ -313,8 +315,8 @@ impl Display {
     /// Returns the report on the last preview once, and again when the first round-trip time is known.
     pub(super) fn take_send_report(&mut self) -> Option<PreviewSendReport> {
         let report = self.report.as_mut()?;
-        if report.round_trip.is_none() && self.connection.round_trip().is_some() {
-            report.round_trip = self.connection.round_trip();
+        if report.round_trip.is_none() && self.connection.min_round_trip_time().is_some() {
+            report.round_trip = self.connection.min_round_trip_time();
             self.is_reported = false;
         }
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
@@ -325,7 +327,7 @@ impl Display {
     pub(super) fn reply_wait_before_exit(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
         const MAX: Duration = Duration::from_secs(1);
-        let round_trip = self.connection.round_trip().unwrap_or_default();
+        let round_trip = self.connection.min_round_trip_time().unwrap_or_default();
         self.connection.awaits_reply().then(|| (round_trip * 3 / 2).clamp(MIN, MAX))
     }
 }

@@ -255,7 +255,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
         settings: effective_settings(),
         lights: protocol::LightsReport {
             count: 1,
-            sampled: protocol::LightSelectionMode::All,
+            sampled: protocol::SampledLightSet::All,
             picks: 0,
             tree_nodes: 0,
             memory_bytes: 0,

@@ -144,7 +144,7 @@ impl RenderHistory {
                 }
                 // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
-                let origin = if is_same { past.origin.merged_with_later(origin) } else { origin };
+                let origin = if is_same { past.origin.or_later_if_camera_saved(origin) } else { origin };
                 self.replace_entry_image(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
@@ -192,7 +192,7 @@ impl RenderHistory {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.merged_with_later(past.origin.clone());
+        let origin = earlier.origin.or_later_if_camera_saved(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -232,7 +232,7 @@ impl RenderHistory {
     }
 
     /// Whether the newest entry belongs to this request.
-    pub(super) fn is_newest(&self, generation: u64) -> bool {
+    pub(super) fn is_newest_from_request(&self, generation: u64) -> bool {
         self.past.back().is_some_and(|newest| newest.shown.generation == generation)
     }
 
@@ -570,7 +570,7 @@ mod tests {
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
             history.record(shown, Instant::now(), origin);
-            assert!(history.is_newest(generation) && history.is_newest_unfinished());
+            assert!(history.is_newest_from_request(generation) && history.is_newest_unfinished());
             run.into_iter().for_each(|run| history.finish_newest(run));
         }
         assert_eq!([0, 1, 2].map(|at| history.render_number(at)), [Some(1), None, Some(2)]);

@@ -30,7 +30,7 @@ fn interactive_session() {
     let slot = Arc::clone(&previews);
     thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
     let watched = scene.clone();
-    thread::spawn(move || watch_scene(&watched, &watcher));
+    thread::spawn(move || forward_scene_changes(&watched, &watcher));
     let outcome = run(Options {
         scene,
         overrides: Overrides::default(),
@@ -55,7 +55,7 @@ fn interactive_session() {
     }
 }
 
-fn watch_scene(scene: &PathBuf, news: &Sender<WatchEvent>) {
+fn forward_scene_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));

@@ -52,7 +52,7 @@ pub fn camera_saved(file: &str) -> String {
 }
 
 /// Shown when `c` wrote the camera into the scene file but the command line overrides it.
-pub fn camera_overridden(file: &str) -> String {
+pub fn saved_camera_overridden(file: &str) -> String {
     format!("camera saved to {file}, but --set overrides it in this run")
 }
 
@@ -67,7 +67,7 @@ pub fn model_scene_written(file: &str) -> String {
 }
 
 /// Shown when `u` undid the last `c`.
-pub fn camera_undone(file: &str) -> String {
+pub fn camera_save_undone(file: &str) -> String {
     format!("undone: {file} restored")
 }
 
@@ -101,7 +101,7 @@ pub fn unnumbered_render(state: &str) -> String {
 pub const OLDER: &str = "older";
 
 /// Position of the displayed render among the finished renders.
-pub fn render_number_label(number: u64, count: u64) -> String {
+pub fn render_number_of_count(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
@@ -194,7 +194,7 @@ pub const WRITE_POSTPONED: &str = "the image will be written once every pixel ha
 pub const RESUMING: &str = "resuming from";
 
 /// Shown when the integrator supports only soft shadows.
-pub fn only_soft_shadows(integrator: &str, other: &str) -> String {
+pub fn hard_shadows_unsupported(integrator: &str, other: &str) -> String {
     format!("{integrator} always has soft shadows (i: {other})")
 }
 
@@ -212,7 +212,7 @@ pub fn view_chosen(name: &str) -> String {
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
 /// Shown when a checkpoint from another render was renamed.
-pub fn checkpoint_kept(file: &str) -> String {
+pub fn other_render_checkpoint_kept(file: &str) -> String {
     format!("kept another render's checkpoint as {file}")
 }
 
@@ -238,7 +238,7 @@ pub const NOT_SAVED_WITH_CONFLICT: &str = "not saved";
 /// Part of messages about changes made with keys. Omitted when `w` cannot write the image.
 pub const WRITE_HINT: &str = "w: save image · ";
 /// Shown when `w` wrote the displayed image before its render finished.
-pub fn unfinished_image(file: &str) -> String {
+pub fn written_image_unfinished(file: &str) -> String {
     format!("{file} is unfinished · w: write it again")
 }
 
@@ -277,7 +277,7 @@ pub fn scene_image_outdated(file: &str) -> String {
 pub const LAST_GOOD_SCENE: &str = "rendering the last good scene";
 
 /// A hint that saving the scene file starts a render.
-pub fn save_to_render(file: &str, is_again: bool) -> String {
+pub fn save_to_render_hint(file: &str, is_again: bool) -> String {
     format!("save {file} to render{}", if is_again { " again" } else { "" })
 }
 

@@ -17,7 +17,7 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// How escape sequences for images reach the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ImageRoute {
+pub(super) enum MultiplexerPassthrough {
     /// Directly, without a multiplexer.
     Direct,
     /// Through tmux, which passes on wrapped escape sequences if `allow-passthrough` is on.
@@ -30,7 +30,7 @@ pub(super) enum ImageRoute {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ImageProtocolRequest {
     pub(super) protocol: ImageProtocol,
-    pub(super) route: ImageRoute,
+    pub(super) route: MultiplexerPassthrough,
     /// Whether environment variables identify a terminal that supports the protocol.
     pub(super) is_known: bool,
 }
@@ -44,9 +44,9 @@ impl ImageProtocolRequest {
         let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
         let route = match () {
-            () if is_set("TMUX") => ImageRoute::Tmux,
-            () if is_plain || is_set("STY") || term.starts_with("screen") => ImageRoute::Closed,
-            () => ImageRoute::Direct,
+            () if is_set("TMUX") => MultiplexerPassthrough::Tmux,
+            () if is_plain || is_set("STY") || term.starts_with("screen") => MultiplexerPassthrough::Closed,
+            () => MultiplexerPassthrough::Direct,
         };
         let terminal = TerminalId::from_environment(variable);
         let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
@@ -56,26 +56,29 @@ impl ImageProtocolRequest {
     /// Returns the query for the protocol. Empty if other queries cover it or it cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
-            (ImageProtocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
-            (ImageProtocol::Kitty, ImageRoute::Tmux) => tmux_passthrough(KITTY_QUERY),
-            (ImageProtocol::Iterm, ImageRoute::Tmux) => tmux_passthrough(NAME_QUERY),
-            (ImageProtocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
+            (ImageProtocol::Kitty, MultiplexerPassthrough::Direct) => KITTY_QUERY.to_vec(),
+            (ImageProtocol::Kitty, MultiplexerPassthrough::Tmux) => tmux_passthrough(KITTY_QUERY),
+            (ImageProtocol::Iterm, MultiplexerPassthrough::Tmux) => tmux_passthrough(NAME_QUERY),
+            (ImageProtocol::Iterm, MultiplexerPassthrough::Direct) => NAME_QUERY.to_vec(),
             // Device attributes are always queried, and tmux draws Sixel images itself.
-            (ImageProtocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
+            (ImageProtocol::Sixel, _) | (_, MultiplexerPassthrough::Closed) => Vec::new(),
         }
     }
 
     /// Time at which a missing reply is reported to the user.
     pub(super) fn reply_deadline(self, now: Instant) -> Instant {
-        if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
+        if self.route == MultiplexerPassthrough::Closed { now } else { now + REPLY_TIMEOUT }
     }
 
     /// Whether the device attributes arrive after all other replies. This is not the case inside tmux, which
     /// answers that query itself before passing on others.
     pub(super) fn is_decided_by_attributes(self) -> bool {
         match (self.protocol, self.route) {
-            (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct) => true,
-            (ImageProtocol::Kitty | ImageProtocol::Iterm, ImageRoute::Tmux | ImageRoute::Closed) => false,
+            (ImageProtocol::Sixel, _) | (_, MultiplexerPassthrough::Direct) => true,
+            (
+                ImageProtocol::Kitty | ImageProtocol::Iterm,
+                MultiplexerPassthrough::Tmux | MultiplexerPassthrough::Closed,
+            ) => false,
         }
     }
 
@@ -88,10 +91,11 @@ impl ImageProtocolRequest {
         };
         let instead = "half blocks are shown instead";
         match (self.protocol, self.route) {
-            (ImageProtocol::Kitty | ImageProtocol::Iterm, ImageRoute::Tmux) => format!(
+            (ImageProtocol::Kitty | ImageProtocol::Iterm, MultiplexerPassthrough::Tmux) => format!(
                 "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux is running in {terminals}"
             ),
-            (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
+            (ImageProtocol::Sixel, _)
+            | (_, MultiplexerPassthrough::Direct | MultiplexerPassthrough::Closed) => {
                 format!("this terminal does not support {name} images: {instead}; use {terminals}")
             }
         }
@@ -112,14 +116,14 @@ mod tests {
     fn environment_determines_the_query() {
         let xterm = ("TERM", "xterm-256color");
         let direct = request(ImageProtocol::Kitty, &[xterm], false);
-        assert_eq!((direct.route, direct.query()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
+        assert_eq!((direct.route, direct.query()), (MultiplexerPassthrough::Direct, KITTY_QUERY.to_vec()));
         let tmux =
             request(ImageProtocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
-        assert_eq!(tmux.route, ImageRoute::Tmux);
+        assert_eq!(tmux.route, MultiplexerPassthrough::Tmux);
         assert!(tmux.query().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
         let screen = request(ImageProtocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
-        assert_eq!((screen.route, screen.query()), (ImageRoute::Closed, Vec::new()));
-        assert_eq!(request(ImageProtocol::Iterm, &[xterm], true).route, ImageRoute::Closed);
+        assert_eq!((screen.route, screen.query()), (MultiplexerPassthrough::Closed, Vec::new()));
+        assert_eq!(request(ImageProtocol::Iterm, &[xterm], true).route, MultiplexerPassthrough::Closed);
         assert!(request(ImageProtocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         assert!(!request(ImageProtocol::Iterm, &[xterm], false).is_known);
         assert!(!request(ImageProtocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);

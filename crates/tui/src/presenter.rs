@@ -76,7 +76,8 @@ impl Presenter {
         state: &State,
         now: Instant,
     ) -> Option<Event> {
-        let is_same_request = generation == self.drawn.generation && !self.is_preview_incompatible(state);
+        let is_same_request =
+            generation == self.drawn.generation && !self.is_newest_preview_unlike_drawn(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
@@ -85,7 +86,7 @@ impl Presenter {
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn is_preview_incompatible(&self, state: &State) -> bool {
+    fn is_newest_preview_unlike_drawn(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
@@ -250,7 +251,8 @@ fn samples_per_pixel(state: &State) -> f64 {
 
 /// Whether the newest preview is final.
 fn is_final_preview(state: &State) -> bool {
-    state.work.paused || !state.work.is_running() && view::status_line::last_good_progress(state).is_none()
+    state.work.paused
+        || !state.work.is_request_running() && view::status_line::last_good_progress(state).is_none()
 }
 
 /// Time at which the state next needs a frame or a tick.

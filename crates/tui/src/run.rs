@@ -45,7 +45,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
     if capabilities.focus {
-        terminal::keep_focus_reports_enabled();
+        terminal::enable_focus_reports_on_setup();
     }
     let screen = TerminalSession::open()?;
     let link = TerminalEnvironment {
@@ -170,7 +170,7 @@ impl EventLoop {
     /// Leaves the screen and waits briefly for pending replies, which the shell would otherwise read as typed
     /// text.
     fn leave_screen(&mut self) {
-        self.screen.leave_screen();
+        self.screen.leave_screen_in_raw_mode();
         let deadline =
             self.presenter.display.reply_wait_before_exit().map(|patience| Instant::now() + patience);
         while let Some(deadline) =

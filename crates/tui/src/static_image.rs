@@ -42,13 +42,13 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
     let (size, aspect) =
-        if is_terminal { window_size(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
+        if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
     let buffers = lay_out_images(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
 /// Returns the window size and cell aspect ratio, with defaults for terminals that report a size of 0.
-fn window_size(window: &WindowSize) -> ((u16, u16), f32) {
+fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))

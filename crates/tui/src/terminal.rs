@@ -99,7 +99,7 @@ impl TerminalSession {
 
     /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] is called or the session
     /// ends, so that late replies are not echoed.
-    pub(super) fn leave_screen(&mut self) {
+    pub(super) fn leave_screen_in_raw_mode(&mut self) {
         leave_screen();
     }
 
@@ -125,7 +125,7 @@ impl TerminalSession {
 
     /// Enables focus reports.
     pub(super) fn request_focus_reports(&mut self) {
-        keep_focus_reports_enabled();
+        enable_focus_reports_on_setup();
         writer::queue_slice(FOCUS_ON.as_bytes().to_vec());
     }
 
@@ -264,7 +264,7 @@ pub(super) fn mark_images_used() {
 }
 
 /// Enables focus reports each time the terminal is set up.
-pub(super) fn keep_focus_reports_enabled() {
+pub(super) fn enable_focus_reports_on_setup() {
     FOCUS.store(true, Ordering::Release);
 }
 

@@ -63,7 +63,7 @@ impl TitleAndProgress {
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
             return None;
         }
-        let progress = state.work.progress.as_ref().filter(|_| state.work.is_running());
+        let progress = state.work.progress.as_ref().filter(|_| state.work.is_request_running());
         let step = if is_slow { COARSE } else { 1 };
         let percent = progress.map(|progress| view::text::floor_percent(progress.fraction) / step * step);
         Some(Self {

@@ -1,7 +1,7 @@
 //! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands at the
 //! origin and faces +z.
 
-use super::parts::{ball, beveled_box, join, round_bar, solid_of_revolution, translate};
+use super::parts::{ball, beveled_box, join, round_bar_along_path, solid_of_revolution, translate};
 use super::surface::Surface;
 use super::vector::{Vector, sin_cos_turns};
 
@@ -120,13 +120,13 @@ fn book_pages() -> Surface {
 
 /// A 0.44 by 0.92 by 0.46 wooden chair.
 fn chair() -> Surface {
-    let post = |x: f64| round_bar(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
-    let rung = |from: Vector, to: Vector| round_bar(&[from, to], 0.01, 6);
+    let post = |x: f64| round_bar_along_path(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
+    let rung = |from: Vector, to: Vector| round_bar_along_path(&[from, to], 0.01, 6);
     let slat = |y: f64, z: f64| beveled_box([-0.2, y, z - 0.01], [0.2, y + 0.07, z + 0.01], 0.004);
     join([
         beveled_box([-0.22, 0.44, -0.22], [0.22, 0.475, 0.23], 0.01),
-        round_bar(&[[-0.19, 0.0, 0.19], [-0.19, 0.45, 0.19]], 0.018, 8),
-        round_bar(&[[0.19, 0.0, 0.19], [0.19, 0.45, 0.19]], 0.018, 8),
+        round_bar_along_path(&[[-0.19, 0.0, 0.19], [-0.19, 0.45, 0.19]], 0.018, 8),
+        round_bar_along_path(&[[0.19, 0.0, 0.19], [0.19, 0.45, 0.19]], 0.018, 8),
         post(-0.19),
         post(0.19),
         rung([-0.19, 0.2, 0.19], [-0.19, 0.2, -0.22]),
@@ -313,7 +313,7 @@ fn door() -> Surface {
         panel(0.5, 1.05, 0.85),
         knob(0.08),
         knob(-0.04),
-        round_bar(&[[0.83, 1.02, -0.04], [0.83, 1.02, 0.08]], 0.01, 8),
+        round_bar_along_path(&[[0.83, 1.02, -0.04], [0.83, 1.02, 0.08]], 0.01, 8),
     ])
 }
 

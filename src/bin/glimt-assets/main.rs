@@ -63,7 +63,7 @@ fn stored_assets() -> Vec<AssetFile> {
         ("gem.off", shapes::dodecahedron().to_off("A dodecahedron: twelve pentagons")),
         ("room.obj", room::obj()),
         ("room.mtl", room::mtl()),
-        ("room_orbiter.txt", room::orbiter_camera_file()),
+        ("room_orbiter.txt", room::camera_in_orbiter_format()),
         (
             "shrub.obj",
             foliage::shrub().to_obj("A shrub of leaves, squares with texture coordinates and normals"),

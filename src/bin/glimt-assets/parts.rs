@@ -109,7 +109,7 @@ pub(crate) fn solid_of_revolution(outline: &[[f64; 2]], sides: u32) -> Surface {
 }
 
 /// A round bar that follows a path, closed at both ends.
-pub(crate) fn round_bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
+pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> Surface {
     let mut surface = Surface::default();
     let last = path.len() - 1;
     let tangent = |at: usize| unit(subtract(path[(at + 1).min(last)], path[at.saturating_sub(1)]));

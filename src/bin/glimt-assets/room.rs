@@ -122,6 +122,6 @@ Ke 9.0 8.4 7.4
 }
 
 /// A camera that looks through the open front from slightly above and to the left.
-pub(crate) fn orbiter_camera_file() -> Vec<u8> {
+pub(crate) fn camera_in_orbiter_format() -> Vec<u8> {
     "c 0.0 0.95 0.0\np 0.05 0.02\nr 5.0 11.0\ns 4.6 2.0\nf 38.0 640.0 480.0\n".as_bytes().to_vec()
 }

@@ -29,7 +29,7 @@ pub(crate) fn rope() -> Surface {
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
         let middle = |s: f64| {
-            let (center, normal, binormal) = curve_frame(s, trefoil_point);
+            let (center, normal, binormal) = point_and_normals_on_curve(s, trefoil_point);
             let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
@@ -53,7 +53,7 @@ pub(crate) fn knot() -> Surface {
 /// A hollow vase, a surface of revolution about y, 1.6 high.
 pub(crate) fn vase() -> Surface {
     Surface::grid(64, 64, [4.0, 4.0], |s, t| {
-        let [radius, height] = vase_profile(t);
+        let [radius, height] = vase_profile_point(t);
         let (sin, cos) = sin_cos_turns(s);
         [radius * cos, height, radius * sin]
     })
@@ -61,7 +61,7 @@ pub(crate) fn vase() -> Surface {
 
 /// Radius and height along the vase's profile, a Catmull–Rom spline from the center of the foot over the lip
 /// to the center of the interior.
-fn vase_profile(t: f64) -> [f64; 2] {
+fn vase_profile_point(t: f64) -> [f64; 2] {
     const KNOTS: [[f64; 2]; 16] = [
         [0.0, 0.0],
         [0.2, 0.0],
@@ -102,12 +102,12 @@ pub(crate) fn dodecahedron() -> Surface {
         unit(add(a, add(b, c)))
     };
     let positions = triangles.iter().map(center).collect();
-    let faces = (0..corners.len() as u32).map(|corner| triangle_fan_around(corner, &triangles)).collect();
+    let faces = (0..corners.len() as u32).map(|corner| triangles_around_corner(corner, &triangles)).collect();
     Surface { positions, faces, ..Surface::default() }
 }
 
 /// The triangles around a corner, in order. The last edge of each triangle is the first edge of the next.
-fn triangle_fan_around(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
+fn triangles_around_corner(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut next = HashMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         if let Some(place) = triangle.iter().position(|&other| other == corner) {
@@ -167,7 +167,7 @@ fn trefoil_point(s: f64) -> Vector {
 
 /// A point on a closed curve, and two directions perpendicular to the curve that are periodic along it. The
 /// first points away from the circle that the knot winds around.
-fn curve_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
+fn point_and_normals_on_curve(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
     let (sin, cos) = sin_cos_turns(2.0 * s);
@@ -178,7 +178,7 @@ fn curve_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector
 
 /// A point on a tube of radius `radius` around a closed curve.
 fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
-    let (center, normal, binormal) = curve_frame(s, curve);
+    let (center, normal, binormal) = point_and_normals_on_curve(s, curve);
     let (sin, cos) = sin_cos_turns(t);
     add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
 }

@@ -1,7 +1,9 @@
 //! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin
 //! and placed by the scene. Flights and rails are at their final positions.
 
-use super::parts::{ball, beveled_box, hexahedron, join, round_bar, solid_of_revolution, translate};
+use super::parts::{
+    ball, beveled_box, hexahedron, join, round_bar_along_path, solid_of_revolution, translate,
+};
 use super::surface::Surface;
 use super::vector::{Vector, add, sin_cos_turns};
 
@@ -132,7 +134,7 @@ fn newel() -> Surface {
 /// The handrail along the open side of a flight, above the nosings and slightly inside.
 fn rail(from: Vector, to: Vector) -> Surface {
     let above = if from[0] == to[0] { [-0.05, 1.0, 0.0] } else { [0.0, 1.0, -0.05] };
-    round_bar(&[add(from, above), add(to, above)], 0.032, 12)
+    round_bar_along_path(&[add(from, above), add(to, above)], 0.032, 12)
 }
 
 /// A flame-shaped bulb, 0.1 high.
@@ -186,7 +188,7 @@ fn table_lamp_foot() -> Surface {
 
 /// A chandelier: a ring of five arms under a rod, without bulbs.
 fn chandelier() -> Surface {
-    let rod = round_bar(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
+    let rod = round_bar_along_path(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
     let hub = solid_of_revolution(
         &[[0.0, -0.08], [0.03, -0.06], [0.05, 0.0], [0.03, 0.06], [0.012, 0.1], [0.0, 0.1]],
         16,
@@ -203,7 +205,7 @@ fn chandelier() -> Surface {
         let holder =
             [[0.0, 0.05], [0.02, 0.05], [0.05, 0.07], [0.05, 0.075], [0.02, 0.08], [0.02, 0.12], [0.0, 0.12]];
         join([
-            round_bar(&path, 0.01, 6),
+            round_bar_along_path(&path, 0.01, 6),
             translate(solid_of_revolution(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin]),
         ])
     };

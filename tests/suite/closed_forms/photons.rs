@@ -49,8 +49,9 @@ fn stored_photons_carry_emitted_power() {
         let (world, token) = (build.world(), CancelToken::new());
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
-        let (_, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
-            .expect("the token is not cancelled");
+        let (_, pass) =
+            PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+                .expect("the token is not cancelled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -70,8 +71,9 @@ fn no_photons_without_mirrors_or_glass() {
     let build = room(|| matte(0.5)).point_light(v(0.2, -0.1, 0.3), 1.0, Falloff::Square).photons(100, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (photons, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
-        .expect("the token is not cancelled");
+    let (photons, pass) =
+        PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+            .expect("the token is not cancelled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.photon_count()), (0, 0));
 }
@@ -286,8 +288,9 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (photons, _) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("the token is not cancelled");
+            let (photons, _) =
+                PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+                    .expect("the token is not cancelled");
             photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not cancelled")
         })
     };
@@ -312,8 +315,9 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
-            let (photons, _) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("the token is not cancelled");
+            let (photons, _) =
+                PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+                    .expect("the token is not cancelled");
             let maps = photons
                 .trace_passes(&world, &settings, samples.clone(), &token)
                 .expect("the token is not cancelled");
@@ -342,7 +346,8 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
         .photons(1000, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (_, pass) = PhotonMapper::new(&world, &settings, of_photons, &ignore_progress, &token)
-        .expect("the token is not cancelled");
+    let (_, pass) =
+        PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+            .expect("the token is not cancelled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

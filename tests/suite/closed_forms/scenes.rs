@@ -290,7 +290,13 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.without_ineffective_settings().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
-        let photons = integrators::PhotonMapper::new(world, settings, of_photons, &ignore_progress, &token);
+        let photons = integrators::PhotonMapper::new_with_first_pass(
+            world,
+            settings,
+            of_photons,
+            &ignore_progress,
+            &token,
+        );
         let (photons, _) = photons.expect("not cancelled");
         photons.trace_passes(world, settings, 0..samples, &token).expect("not cancelled")
     })

@@ -82,10 +82,10 @@ fn history_shows_images_and_their_changes() {
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
     terminal.wait("the red image", |screen| colors_from(screen, 0)[0] > 500);
-    terminal.wait_for(&messages::render_number_label(1, 3));
+    terminal.wait_for(&messages::render_number_of_count(1, 3));
     terminal.wait("its mark", |screen| beside(screen, PANEL.into()).contains("▸1"));
     terminal.press("N");
-    terminal.wait_for(&messages::render_number_label(2, 3));
+    terminal.wait_for(&messages::render_number_of_count(2, 3));
     terminal.wait("its change", |screen| {
         words(screen).contains("materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
     });
@@ -191,7 +191,7 @@ fn undo_reverts_only_the_saved_camera() {
     terminal.wait("the saved camera", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
-    terminal.wait_for(&messages::camera_undone("scene.toml"));
+    terminal.wait_for(&messages::camera_save_undone("scene.toml"));
     assert_eq!(text(), SCENE);
     terminal
         .wait("the image on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));

@@ -261,7 +261,7 @@ fn earlier_renders_can_be_browsed() {
     terminal.wait_for_color("green");
     terminal.press("n");
     terminal.wait_for_color("red");
-    terminal.wait_for(&messages::render_number_label(1, 2));
+    terminal.wait_for(&messages::render_number_of_count(1, 2));
     terminal.press("n");
     terminal.wait_for(messages::OLDEST_RENDER);
     terminal.press("N");

@@ -52,9 +52,9 @@ fn history_ends_at_oldest_and_newest() {
         terminal.wait_for_render(render);
     }
     for (key, color, place) in [
-        ("n", "green", messages::render_number_label(2, 3)),
-        ("n", "red", messages::render_number_label(1, 3)),
-        ("N", "green", messages::render_number_label(2, 3)),
+        ("n", "green", messages::render_number_of_count(2, 3)),
+        ("n", "red", messages::render_number_of_count(1, 3)),
+        ("N", "green", messages::render_number_of_count(2, 3)),
         ("N", "blue", messages::NEWEST_RENDER.to_owned()),
     ] {
         terminal.press(key);

@@ -60,7 +60,7 @@ fn keys_ignored_by_path_are_explained() {
     terminal.wait_for_render(2);
     terminal.wait_for("s –");
     terminal.press("s");
-    terminal.wait_for(&messages::only_soft_shadows("path", "whitted"));
+    terminal.wait_for(&messages::hard_shadows_unsupported("path", "whitted"));
     terminal.press("p");
     terminal.wait_for(&messages::photons_unsupported("whitted"));
     terminal.wait_for_render(2);

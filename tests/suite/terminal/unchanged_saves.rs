@@ -33,7 +33,7 @@ fn comparison_ignores_a_typo() {
     terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
     terminal.press("b");
     terminal.wait_for_color("red");
-    terminal.wait_for(&messages::render_number_label(1, 2));
+    terminal.wait_for(&messages::render_number_of_count(1, 2));
     terminal.wait_for(&format!("{}, materials.board.diffuse", messages::BEFORE_EDIT));
     terminal.press("b");
     terminal.wait_for_color("blue");
@@ -60,7 +60,7 @@ fn comment_and_typo_add_no_history_entry() {
     typo(&folder, &terminal, &commented, "radus");
     terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
     terminal.press("n");
-    terminal.wait_for(&messages::render_number_label(1, 2));
+    terminal.wait_for(&messages::render_number_of_count(1, 2));
     terminal.wait("two images", |screen| {
         let words = words(screen);
         words.contains(&format!("▸1 {}", messages::OPENED))
@@ -87,7 +87,7 @@ fn typo_while_rendering_adds_one_entry() {
     }
     terminal.wait("an unfinished image", is_there);
     terminal.press("n");
-    terminal.wait_for(&messages::render_number_label(1, 2));
+    terminal.wait_for(&messages::render_number_of_count(1, 2));
     terminal.wait("two images", |screen| {
         let words = words(screen);
         // An unfinished render does not count as stopped.

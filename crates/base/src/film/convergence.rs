@@ -219,7 +219,7 @@ impl SquaredMeanChanges {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of all
     /// cells, or `None` if unknown. Ignores cells with fewer samples.
-    pub(super) fn variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
+    pub(super) fn measured_variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
             let pair = self.step_pair(level, (cell, half), false)?;
@@ -292,7 +292,7 @@ impl Convergence {
     /// tile.
     fn variance_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
         steps
-            .variance_reduction(level, halves)
+            .measured_variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
@@ -327,9 +327,10 @@ impl Convergence {
         let fall = Self::variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = expected_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
-        let by_two = pixel_variance(step, count, rate);
-        let variance = match Self::variance_by_quadrupling(steps, level, (cell, half), is_relative) {
-            Some(four) => (by_two * pixel_variance(four, count, 2.0)).sqrt(),
+        let by_two = variance_from_squared_step(step, count, rate);
+        let variance = match Self::estimate_variance_from_quadrupling(steps, level, (cell, half), is_relative)
+        {
+            Some(four) => (by_two * variance_from_squared_step(four, count, 2.0)).sqrt(),
             None => by_two,
         };
         Some((variance, rate))
@@ -337,7 +338,7 @@ impl Convergence {
 
     /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
     /// predicted from the reduction per quadrupling of the sample count. `None` for fewer than 16 samples.
-    fn variance_by_quadrupling(
+    fn estimate_variance_from_quadrupling(
         steps: &SquaredMeanChanges,
         level: usize,
         at: (usize, usize),
@@ -360,7 +361,7 @@ fn expected_variance_reduction(fall: f64, trust: f64) -> f64 {
 
 /// Variance of the mean of `count` ≥ 2 samples, computed from the squared step at the last power of two and
 /// the rate at which the variance falls.
-pub(super) fn pixel_variance(step: f64, count: u32, rate: f64) -> f64 {
+pub(super) fn variance_from_squared_step(step: f64, count: u32, rate: f64) -> f64 {
     // Between powers of two, the variance falls as for independent samples.
     let part = f64::from(1_u32 << count.ilog2()) / f64::from(count);
     step / (rate - 1.0) * part

@@ -48,7 +48,7 @@ impl NoiseSums {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
-    fn add(&mut self, noise: &CellHalfNoise, pixels: f64) {
+    fn add_cell_half(&mut self, noise: &CellHalfNoise, pixels: f64) {
         self.variance += pixels * noise.variance;
         self.left += pixels * noise.variance * libm::exp2(-noise.power);
         self.mean += pixels * noise.mean;
@@ -95,9 +95,9 @@ impl Film {
             }
             let halves = (CELLS * tile..CELLS * (tile + 1)).flat_map(|cell| [(cell, 0), (cell, 1)]);
             for (cell, half) in halves {
-                let pixels = self.half_pixel_count(cell, half) as f64;
+                let pixels = self.cell_half_pixel_count(cell, half) as f64;
                 if pixels > 0.0 {
-                    sums.add(&self.cell_half_noise(cell, half)?, pixels);
+                    sums.add_cell_half(&self.cell_half_noise(cell, half)?, pixels);
                 }
             }
             Some(sums)
@@ -123,7 +123,7 @@ impl Film {
     pub fn cell_half_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
         let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
-        for pixel in self.cell_half_pixels(number, half) {
+        for pixel in self.half_cell_pixel_indices(number, half) {
             sum += luminance(tile.mean(pixel)?);
             samples = samples.min(tile.count(pixel));
             pixels += 1;
@@ -142,7 +142,7 @@ impl Film {
     /// completed that doubling. `None` if there are not enough steps.
     pub fn tile_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.lock_tile(tile);
-        tile.steps.variance_reduction(tile.steps.level_count(), &[0, 1])
+        tile.steps.measured_variance_reduction(tile.steps.level_count(), &[0, 1])
     }
 
     /// Expected relative standard deviation of a tile's variance, measured in one half of each cell: 1 if a
@@ -157,10 +157,10 @@ impl Film {
     pub fn tile_half_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
-            let count = self.half_pixel_count(cell, half) as f64;
+            let count = self.cell_half_pixel_count(cell, half) as f64;
             if count > 0.0 {
                 let noise = self.cell_half_noise(cell, half)?;
-                sums.add(&noise, count);
+                sums.add_cell_half(&noise, count);
                 samples = samples.min(noise.samples);
                 pixels += count;
             }
@@ -176,7 +176,7 @@ impl Film {
     /// the pixels' sample count, or if the half has no pixels.
     pub fn cell_half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
-        let pixels = self.half_pixel_count(number, half);
+        let pixels = self.cell_half_pixel_count(number, half);
         let (sum, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), count, true)?;
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
@@ -187,16 +187,16 @@ impl Film {
     }
 
     /// Number of pixels in one half of a cell.
-    pub fn half_pixel_count(&self, cell: usize, half: usize) -> usize {
+    pub fn cell_half_pixel_count(&self, cell: usize, half: usize) -> usize {
         self.cell_rect(cell).map_or(0, |rect| PixelSubset::Half(half).count(rect.area()))
     }
 
     /// Tile-relative indices of the pixels in a half-cell.
-    fn cell_half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
+    fn half_cell_pixel_indices(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = PixelSubset::Half(half);
         tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
-            let place = move |number| SelectedPixels { rect, part }.position(number);
+            let place = move |number| SelectedPixels { rect, part }.image_position(number);
             let index = move |(x, y): (u32, u32)| ((y - tile.y) * tile.width + x - tile.x) as usize;
             (0..part.count(rect.area()) as u32).map(move |number| index(place(number)))
         })

@@ -26,7 +26,7 @@ impl SelectedPixels {
 
     /// Image column and row of the selected pixel `number`.
     #[inline]
-    pub fn position(&self, number: u32) -> (u32, u32) {
+    pub fn image_position(&self, number: u32) -> (u32, u32) {
         let index = self.part.index_in_rect(number, self.rect);
         (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)
     }
@@ -89,7 +89,7 @@ mod tests {
             for half in 0..2 {
                 let pixels = SelectedPixels { rect, part: PixelSubset::Half(half) };
                 for number in 0..pixels.count() as u32 {
-                    let (x, y) = pixels.position(number);
+                    let (x, y) = pixels.image_position(number);
                     let index = (y - 8) * width + x - 3;
                     assert_eq!(PixelSubset::half_containing(index, rect), half, "({x}, {y}) in {rect:?}");
                     seen[index as usize] += 1;

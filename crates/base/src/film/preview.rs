@@ -81,7 +81,7 @@ impl Previewer {
 
     /// Whether every tile of the film has been processed at least once. If so, [`Previewer::build_image`] has no
     /// gaps but may be slightly outdated.
-    pub fn covers_all_tiles(&self) -> bool {
+    pub fn has_processed_all_tiles(&self) -> bool {
         self.is_whole
     }
 
@@ -174,18 +174,22 @@ impl TileContribution {
         [columns, rows]: [AxisResampler; 2],
     ) {
         let Some(rect) = film.tile_rect(tile) else { return };
-        let first = |axis: AxisResampler, index| axis.overlaps(index).next().map_or(0, |(new, _)| new);
-        let last = |axis: AxisResampler, index| axis.overlaps(index).last().map_or(0, |(new, _)| new);
+        let first = |axis: AxisResampler, index| {
+            axis.overlapping_target_pixels(index).next().map_or(0, |(new, _)| new)
+        };
+        let last = |axis: AxisResampler, index| {
+            axis.overlapping_target_pixels(index).last().map_or(0, |(new, _)| new)
+        };
         (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));
         self.width = last(columns, rect.x + rect.width - 1) - self.x + 1;
         let height = last(rows, rect.y + rect.height - 1) - self.y + 1;
         let mut sums: Vec<WeightedColorF64> = vec![(DVec3::ZERO, 0.0); self.width as usize * height as usize];
         let across: Vec<Vec<_>> =
-            (rect.x..rect.x + rect.width).map(|x| columns.overlaps(x).collect()).collect();
+            (rect.x..rect.x + rect.width).map(|x| columns.overlapping_target_pixels(x).collect()).collect();
         let tile = film.lock_tile(tile);
         self.revision = tile.revision;
         for y in 0..rect.height {
-            let down = rows.overlaps(rect.y + y);
+            let down = rows.overlapping_target_pixels(rect.y + y);
             for (x, across) in across.iter().enumerate() {
                 let index = y as usize * rect.width as usize + x;
                 let place = (index, rect.width as usize);
@@ -361,10 +365,10 @@ mod tests {
         let past = Instant::now();
         let slices = film.tile_count().div_ceil(TILES_AT_ONCE);
         for slice in 1..=slices {
-            assert!(!previewer.covers_all_tiles());
+            assert!(!previewer.has_processed_all_tiles());
             assert!(!previewer.update(&film, Some(past)), "slice {slice}");
         }
-        assert!(previewer.covers_all_tiles());
+        assert!(previewer.has_processed_all_tiles());
         assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
         // Changes to tiles before the current position are processed in the next pass.
         previewer.update(&film, Some(past));
@@ -381,7 +385,7 @@ mod tests {
         for _ in 0..slices {
             previewer.update(&film, Some(past));
         }
-        assert!(previewer.covers_all_tiles());
+        assert!(previewer.has_processed_all_tiles());
         assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
         assert!(previewer.update(&film, None));
     }

@@ -20,7 +20,7 @@ impl AxisResampler {
 
     /// New pixels that overlap the old pixel `index`, each with the amount of overlap. Lengths are in units
     /// of 1/(from·to) of the axis, so every overlap is an exact integer.
-    pub(super) fn overlaps(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
+    pub(super) fn overlapping_target_pixels(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
         let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
         (start / self.from..end.div_ceil(self.from)).map(move |new| {
             let overlap = end.min((new + 1) * self.from) - start.max(new * self.from);
@@ -43,9 +43,9 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
     let rows = AxisResampler::new(image.height, height).inverse();
     let pixel = |i: usize| {
         let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
-        for (y, row_weight) in rows.overlaps((i / width as usize) as u32) {
+        for (y, row_weight) in rows.overlapping_target_pixels((i / width as usize) as u32) {
             let row = &image.pixels[y as usize * image.width as usize..][..image.width as usize];
-            for (x, column_weight) in columns.overlaps((i % width as usize) as u32) {
+            for (x, column_weight) in columns.overlapping_target_pixels((i % width as usize) as u32) {
                 sum += row[x as usize].as_dvec3() * (row_weight * column_weight);
                 weights += row_weight * column_weight;
             }
@@ -86,7 +86,7 @@ mod tests {
             let axis = AxisResampler::new(from, to);
             let mut filled = vec![0.0; to as usize];
             for old in 0..from {
-                let parts: Vec<_> = axis.overlaps(old).collect();
+                let parts: Vec<_> = axis.overlapping_target_pixels(old).collect();
                 prop_assert_eq!(parts.iter().map(|part| part.1).sum::<f64>(), f64::from(to));
                 for (new, weight) in parts {
                     prop_assert!(weight > 0.0);

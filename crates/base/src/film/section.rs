@@ -6,7 +6,7 @@ use crate::math::Vec3;
 impl Film {
     /// Copies a rectangle of pixels without scaling. Pixels without samples show `base` (a full image of any
     /// size), or black if there is no base.
-    pub fn cropped_image(
+    pub fn image_in_rect(
         &self,
         quantity: Quantity,
         rect: Rect,
@@ -14,7 +14,7 @@ impl Film {
     ) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
-            self.fill_from_base(base, rect, &mut image);
+            self.fill_rect_from_base(base, rect, &mut image);
         }
         for index in 0..self.tile_count() {
             let Some(place) = self.tile_rect(index) else { continue };
@@ -34,7 +34,7 @@ impl Film {
         image
     }
 
-    fn fill_from_base(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
+    fn fill_rect_from_base(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
         let at = |pixel: u32, from: u32, to: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
         for y in rect.y..rect.y + rect.height {
             let row = at(y, self.height(), base.height) as usize * base.width as usize;
@@ -68,7 +68,7 @@ mod tests {
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };
         let rect = Rect { x: 20, y: 11, width: 60, height: 50 };
-        let section = film.cropped_image(Quantity::Radiance, rect, Some(&base));
+        let section = film.image_in_rect(Quantity::Radiance, rect, Some(&base));
         for (i, pixel) in (0..).zip(&section.pixels) {
             let (x, y) = (rect.x + i % rect.width, rect.y + i / rect.width);
             let below = if x < 50 { Vec3::X } else { Vec3::Y };

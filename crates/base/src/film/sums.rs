@@ -16,7 +16,7 @@ pub enum FilmError {
     /// There is not enough memory.
     #[error(
         "a {width}×{height} image needs {} of memory, more than is available; make it smaller{}",
-        describe_size(*.bytes),
+        describe_byte_size(*.bytes),
         remedy(*.crop_helps)
     )]
     Memory {
@@ -40,7 +40,7 @@ pub enum FilmError {
     },
 }
 
-fn describe_size(bytes: u64) -> String {
+fn describe_byte_size(bytes: u64) -> String {
     match bytes {
         0..1_000_000_000 => format!("{} MB", bytes.div_ceil(1_000_000)),
         1_000_000_000.. => format!("{:.1} GB", bytes as f64 / 1e9),
@@ -252,7 +252,7 @@ impl Film {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
         let bytes = bytes_needed(width, height, crop);
-        let tiles = if bytes <= most_bytes { allocate(width, height, crop) } else { None };
+        let tiles = if bytes <= most_bytes { allocate_tiles(width, height, crop) } else { None };
         let tiles = tiles.ok_or_else(|| {
             let least = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
             let crop_helps = crop == whole && least <= most_bytes && can_allocate(least);
@@ -303,7 +303,7 @@ impl Film {
     }
 
     /// Number of cells: [`CELLS`] per tile. Some cells of the last tiles may have no pixels.
-    pub fn cell_count(&self) -> usize {
+    pub fn noise_cell_count(&self) -> usize {
         CELLS * self.tiles.len()
     }
 
@@ -337,9 +337,9 @@ impl Film {
         tile.resize(rect.area());
         let count = samples.samples as usize;
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
-            let (x, y) = samples.pixels.position(i as u32);
+            let (x, y) = samples.pixels.image_position(i as u32);
             let Some(index) = pixel_index_in_rect(rect, x, y) else { continue };
-            let (cell, inside) = cell_at(rect, x, y);
+            let (cell, inside) = cell_and_rect_at(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
             let half = pixel_index_in_rect(inside, x, y)
@@ -394,7 +394,7 @@ fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
 }
 
 /// Cell that contains a pixel in a tile, and the cell's rectangle.
-fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
+fn cell_and_rect_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
     (cell, cell_rect(tile, cell).unwrap_or(tile))
@@ -447,7 +447,7 @@ pub(super) fn can_allocate(bytes: u64) -> bool {
 
 /// Allocates the tiles. First tries to allocate all the memory at once, because a system that overcommits
 /// memory refuses only a single huge allocation.
-fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
+fn allocate_tiles(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     if !can_allocate(bytes_needed(width, height, crop)) {
         return None;
     }

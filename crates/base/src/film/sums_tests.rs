@@ -28,7 +28,7 @@ fn image_bits(image: &RadianceImage) -> Vec<[u32; 3]> {
 }
 
 /// Sample count of a pixel in a film with a single row of tiles.
-fn pixel_samples(film: &Film, x: u32, y: u32) -> u32 {
+fn pixel_sample_count(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
     pixel_index_in_rect(rect, x, y).map_or(0, |index| film.lock_tile(tile).count(index))
@@ -113,8 +113,8 @@ fn pixel_means_and_counts_are_correct() {
     assert_eq!(image.pixels[40 + 3], Vec3::splat(3.0));
     assert_eq!(image.pixels[40 + 39], Vec3::splat(0.5));
     assert_eq!(image.pixels.iter().filter(|p| **p != Vec3::ZERO).count(), 2);
-    assert_eq!((pixel_samples(&film, 3, 1), pixel_samples(&film, 39, 1)), (3, 1));
-    assert_eq!((pixel_samples(&film, 3, 0), pixel_samples(&film, 39, 0)), (0, 0));
+    assert_eq!((pixel_sample_count(&film, 3, 1), pixel_sample_count(&film, 39, 1)), (3, 1));
+    assert_eq!((pixel_sample_count(&film, 3, 0), pixel_sample_count(&film, 39, 0)), (0, 0));
     assert_eq!(film.sample_count_stats(), SampleCountStats { min: 0, mean: 4.0 / 80.0, max: 3 });
 }
 
@@ -130,7 +130,7 @@ fn non_finite_samples_are_black_and_counted() {
     film.add_samples(0, &TileSamples { pixels: film.crop().into(), samples: 4, radiance, negative: None });
     assert_eq!(film.non_finite_samples(), 3);
     assert_eq!(film.radiance().pixels, [Vec3::ONE]);
-    assert_eq!(pixel_samples(&film, 0, 0), 4);
+    assert_eq!(pixel_sample_count(&film, 0, 0), 4);
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn samples_outside_the_tile_are_ignored() {
         0,
         &TileSamples { pixels: wide.into(), samples: 0, radiance: Vec::new(), negative: None },
     );
-    assert_eq!([29, 30, 31, 32].map(|x| pixel_samples(&film, x, 0)), [0, 2, 0, 1]);
+    assert_eq!([29, 30, 31, 32].map(|x| pixel_sample_count(&film, x, 0)), [0, 2, 0, 1]);
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn panics_while_holding_a_tile_are_harmless() {
     assert!(film.tiles[0].is_poisoned());
     assert_eq!(image_bits(&film.radiance()), before);
     film.add_samples(0, &varied_samples(film.tile_rect(0).expect("a tile"), 3, 1));
-    assert_eq!(pixel_samples(&film, 0, 0), 4);
+    assert_eq!(pixel_sample_count(&film, 0, 0), 4);
 }
 
 #[test]

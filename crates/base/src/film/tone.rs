@@ -93,9 +93,11 @@ impl ToneMapping {
 /// Converts an image to 8 bits per channel.
 pub fn tone_map_to_8_bits(image: &RadianceImage, tone: &ToneMapping) -> Srgb8Image {
     let pixels = match tone.transfer {
-        Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8_by_table)),
+        Transfer::Srgb => {
+            tone_map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8_by_table))
+        }
         Transfer::Identity => {
-            map_pixels(image, tone, |color| color.to_array().map(|x| (x * 255.0 + 0.5) as u8))
+            tone_map_pixels(image, tone, |color| color.to_array().map(|x| (x * 255.0 + 0.5) as u8))
         }
     };
     Srgb8Image { width: image.width, height: image.height, pixels }
@@ -106,14 +108,14 @@ pub fn tone_map_to_16_bits(image: &RadianceImage, tone: &ToneMapping) -> Srgb16I
     let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
     let pixels = match tone.transfer {
         Transfer::Srgb => {
-            map_pixels(image, tone, |color| color.to_array().map(|x| quantise(linear_to_srgb(x))))
+            tone_map_pixels(image, tone, |color| color.to_array().map(|x| quantise(linear_to_srgb(x))))
         }
-        Transfer::Identity => map_pixels(image, tone, |color| color.to_array().map(quantise)),
+        Transfer::Identity => tone_map_pixels(image, tone, |color| color.to_array().map(quantise)),
     };
     Srgb16Image { width: image.width, height: image.height, pixels }
 }
 
-fn map_pixels<T: Send>(
+fn tone_map_pixels<T: Send>(
     image: &RadianceImage,
     tone: &ToneMapping,
     encode: impl Fn(Vec3) -> T + Sync,
@@ -242,7 +244,7 @@ mod tests {
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let threads = || {
             let named = |_: Vec3| std::thread::current().name().map(str::to_owned);
-            map_pixels(&image, &tone(Tonemap::None), named)
+            tone_map_pixels(&image, &tone(Tonemap::None), named)
                 .into_iter()
                 .collect::<std::collections::HashSet<_>>()
         };

@@ -50,9 +50,9 @@ impl PiecewiseConstant2D {
     /// Samples a point with two numbers in [0, 1): the first selects the column, the second the row.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> GridSample {
-        let (row, across) = find_interval(&self.rows, &self.row_guide, u[1]);
+        let (row, across) = find_interval_and_position(&self.rows, &self.row_guide, u[1]);
         let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
-        let (column, along) = find_interval(self.row_cumulative_sums(row), guide, u[0]);
+        let (column, along) = find_interval_and_position(self.row_cumulative_sums(row), guide, u[0]);
         GridSample { column, row, rest: [along, across] }
     }
 
@@ -118,7 +118,7 @@ fn find_interval_forward(sums: &[f32], mut place: usize, u: f32) -> usize {
 
 /// Finds the interval that contains `u` in [0, 1), and the relative position of `u` within it, in [0, 1).
 #[inline(always)]
-fn find_interval(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
+fn find_interval_and_position(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
     // Rounding may select the part after the correct part, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
     let first = find_interval_forward(sums, guide[part] as usize, u);
@@ -186,7 +186,7 @@ mod tests {
             let even = (0..10_000).map(|i| i as f32 / 1e4);
             for u in borders.chain(even).filter(|u| *u < 1.0) {
                 let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("sums should start at 0");
-                assert_eq!(find_interval(&sums, &guide, u).0, expected, "{u} of {count}");
+                assert_eq!(find_interval_and_position(&sums, &guide, u).0, expected, "{u} of {count}");
             }
         }
     }

@@ -32,10 +32,10 @@ fn entry_names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsS
 pub fn remove_folder_and_contents(folder: &Path) -> io::Result<()> {
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = folder.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-    remove_folder(File::open(parent)?.as_fd(), name)
+    remove_folder_recursively(File::open(parent)?.as_fd(), name)
 }
 
-fn remove_folder(parent: BorrowedFd<'_>, name: &OsStr) -> io::Result<()> {
+fn remove_folder_recursively(parent: BorrowedFd<'_>, name: &OsStr) -> io::Result<()> {
     let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     let folder: OwnedFd = openat(parent, name, flags, Mode::empty())?;
     // Read all names first because removing entries may disturb the listing.
@@ -43,7 +43,9 @@ fn remove_folder(parent: BorrowedFd<'_>, name: &OsStr) -> io::Result<()> {
     for name in names {
         match unlinkat(&folder, &name, AtFlags::empty()) {
             Ok(()) => {}
-            Err(rustix::io::Errno::ISDIR | rustix::io::Errno::PERM) => remove_folder(folder.as_fd(), &name)?,
+            Err(rustix::io::Errno::ISDIR | rustix::io::Errno::PERM) => {
+                remove_folder_recursively(folder.as_fd(), &name)?;
+            }
             Err(error) => return Err(error.into()),
         }
     }

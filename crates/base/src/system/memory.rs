@@ -12,7 +12,7 @@ thread_local! {
 }
 
 /// Whether the caller of the current allocation handles its failure.
-pub(super) fn allocation_may_fail() -> bool {
+pub(super) fn is_allocation_failure_handled() -> bool {
     MAY_FAIL.get()
 }
 
@@ -124,7 +124,7 @@ mod tests {
     fn only_fallible_reservations_may_fail() {
         let mut bytes = Vec::<u8>::new();
         assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
-        assert!(!allocation_may_fail());
+        assert!(!is_allocation_failure_handled());
         assert!(try_reserve_exact(&mut bytes, 100).is_ok() && bytes.capacity() >= 100);
     }
 

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
-use crate::scene::keys::{all_tables, color_names, documented_paths};
+use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{has_mesh_extension, read_current_text};
 
@@ -59,7 +59,7 @@ pub(crate) fn set_arg_completer() -> ArgValueCompleter {
 pub(crate) fn key_path_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let all = documented_paths().into_iter().filter(|(path, _)| path.starts_with(current));
+        let all = all_paths_with_descriptions().into_iter().filter(|(path, _)| path.starts_with(current));
         all.map(|(path, doc)| CompletionCandidate::new(path).help(Some(doc.replace('`', "").into())))
             .collect()
     })

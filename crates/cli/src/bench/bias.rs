@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::statistics::{student_t_quantile, student_t_tail};
-use crate::compare::TwoReferences;
+use crate::compare::ReferencePair;
 use crate::film::RadianceImage;
 
 /// Significance level of the test for bias.
@@ -36,7 +36,7 @@ impl SquaredBias {
 }
 
 /// Estimates the bias from images with different seeds. `None` for fewer than [`MIN_SEEDS`].
-pub fn estimate_bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<SquaredBias> {
+pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> Option<SquaredBias> {
     if pictures.len() < MIN_SEEDS {
         return None;
     }
@@ -63,11 +63,12 @@ struct PairwiseErrorProducts {
 }
 
 impl PairwiseErrorProducts {
-    fn from_images(references: &TwoReferences, pictures: &[RadianceImage]) -> Self {
+    fn from_images(references: &ReferencePair, pictures: &[RadianceImage]) -> Self {
         let count = pictures.len();
         let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-        let products =
-            pairs.map(|(i, j)| (i, j, references.cross_error(&pictures[i], &pictures[j]))).collect();
+        let products = pairs
+            .map(|(i, j)| (i, j, references.cross_error_of_two_images(&pictures[i], &pictures[j])))
+            .collect();
         Self { count, products }
     }
 
@@ -147,7 +148,7 @@ mod tests {
         fn found(&mut self, seeds: usize, offset: f32, block: u32) -> SquaredBias {
             let names = [Path::new("r1"), Path::new("r2")];
             let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
-            let references = TwoReferences::new(pair.expect("a pair"));
+            let references = ReferencePair::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
             estimate_bias(&references, &pictures).expect("enough seeds")
         }
@@ -204,7 +205,7 @@ mod tests {
             noise.picture(0.0, 0.0, 1),
             noise.picture(0.0, 0.0, 1),
         );
-        let references = TwoReferences::new(pair.expect("a pair"));
+        let references = ReferencePair::new(pair.expect("a pair"));
         let of =
             |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough seeds");
         assert!(!of(noise.picture(0.0, 0.0, 1)).is_significant());

@@ -8,9 +8,9 @@ use super::request::{BenchError, StepSchedule};
 use super::results::{ImageResult, MethodResult, StepResult};
 use super::run::SceneRun;
 use super::statistics::median;
-use super::table::{format_error, format_samples};
+use super::table::{format_error_or_near_zero, format_samples_with_unit};
 use super::time_budget::TimeBudget;
-use crate::compare::TwoReferences;
+use crate::compare::ReferencePair;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
 use crate::pipeline::session::{RenderedImage, Session};
@@ -36,7 +36,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) method: &'a Method,
     /// Fingerprints of the references.
     pub(super) keys: &'a ReferenceFingerprints,
-    pub(super) two: &'a TwoReferences,
+    pub(super) two: &'a ReferencePair,
     /// Default maximum number of samples per step.
     pub(super) most_samples: f64,
 }
@@ -62,7 +62,8 @@ impl MethodRun<'_> {
         }
         let last = self.render(&mut session, SEEDS[0], begin)?;
         if last.key != first.key
-            || self.run.reference_renderer(self.common).compute_fingerprints(&mut session)? != *self.keys
+            || self.run.reference_renderer(self.common).compute_reference_fingerprints(&mut session)?
+                != *self.keys
         {
             return Err(self.run.scene_changed_error());
         }
@@ -126,8 +127,8 @@ impl MethodRun<'_> {
         let (name, seconds) = (&self.method.name, words::format_seconds(step.seconds));
         self.run.report_task_done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
-            format_samples(step.samples),
-            format_error(step.relmse)
+            format_samples_with_unit(step.samples),
+            format_error_or_near_zero(step.relmse)
         ));
         self.run.report_step(name, &step);
         Ok(step)
@@ -144,19 +145,19 @@ impl MethodRun<'_> {
         let order = self.run.order;
         let amount = match aim.budget {
             Some(seconds) => words::format_seconds(seconds),
-            None => format_samples(aim.samples.into()),
+            None => format_samples_with_unit(aim.samples.into()),
         };
         let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
         // Estimate the time per image from the previous image or step.
         let each = match (pictures, took.last()) {
             ([.., last], _) => Some(last.seconds),
-            ([], Some(step)) => Some(self.expected_time_growth(aim) * step / f64::from(order.seeds)),
+            ([], Some(step)) => Some(self.time_ratio_to_previous_step(aim) * step / f64::from(order.seeds)),
             ([], None) => None,
         };
         let remaining = f64::from(order.seeds - number);
         let left = each.map(|each| {
-            budget.seconds_left(
-                each * (remaining + f64::from(order.seeds) * self.later_steps_time_ratio(aim)),
+            budget.estimate_seconds_to_end(
+                each * (remaining + f64::from(order.seeds) * self.later_to_current_time_ratio(aim)),
                 false,
             )
         });
@@ -164,7 +165,7 @@ impl MethodRun<'_> {
     }
 
     /// Returns the expected ratio of this step's time to the previous step's time.
-    fn expected_time_growth(&self, aim: StepTarget) -> f64 {
+    fn time_ratio_to_previous_step(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => f64::from(SAMPLE_RATIO),
@@ -174,7 +175,7 @@ impl MethodRun<'_> {
     }
 
     /// Returns the expected total time of all later steps, as a multiple of this step's time.
-    fn later_steps_time_ratio(&self, aim: StepTarget) -> f64 {
+    fn later_to_current_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => 0.0,
@@ -207,7 +208,7 @@ fn summarize_step(
     aim: StepTarget,
     pictures: Vec<ImageResult>,
     images: &[RadianceImage],
-    two: &TwoReferences,
+    two: &ReferencePair,
 ) -> StepResult {
     let of = |value: fn(&ImageResult) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
     let errors = of(|picture| picture.relmse);

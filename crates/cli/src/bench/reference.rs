@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::cache::{self, ReferenceCost, ReferencesWithCost};
 use super::request::BenchError;
 use super::results::ReferenceResult;
-use crate::compare::{Pair, TwoReferences};
+use crate::compare::{Pair, ReferencePair};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
 use crate::pipeline::session::{RenderedImage, Session};
@@ -61,7 +61,7 @@ impl ReferenceQuality {
 
 /// A scene's references, and a warning if they could not be cached.
 pub(super) struct SceneReferences {
-    pub(super) two: TwoReferences,
+    pub(super) two: ReferencePair,
     pub(super) result: ReferenceResult,
     pub(super) warnings: Vec<Diagnostic>,
     /// Error message if the references could not be cached.
@@ -86,7 +86,7 @@ pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferenc
     })?;
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
     names.dedup();
-    let two = TwoReferences::new(pair);
+    let two = ReferencePair::new(pair);
     let noise = two.reference_noise();
     let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
     Ok(SceneReferences { two, result, warnings: Vec::new(), cache_error: None })
@@ -110,7 +110,7 @@ impl ReferenceRenderer<'_> {
 
     /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can
     /// be read.
-    pub(super) fn compute_fingerprints(
+    pub(super) fn compute_reference_fingerprints(
         &self,
         session: &mut Session,
     ) -> Result<ReferenceFingerprints, BenchError> {
@@ -205,7 +205,7 @@ fn create_scene_references(
     cache_error: Option<String>,
 ) -> SceneReferences {
     let ReferencesWithCost { pair, cost } = stored;
-    let two = TwoReferences::new(pair);
+    let two = ReferencePair::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
         noise: two.reference_noise(),

@@ -175,8 +175,8 @@ impl MethodResult {
         Self {
             name,
             setup_seconds,
-            slope: mean_loglog_slope(&group_by_image(&steps)),
-            last_slope: mean_loglog_slope(&group_by_image(&steps[steps.len().saturating_sub(2)..])),
+            slope: mean_loglog_slope(&error_series_by_image(&steps)),
+            last_slope: mean_loglog_slope(&error_series_by_image(&steps[steps.len().saturating_sub(2)..])),
             time_to: TARGETS.map(|target| time_to_error(target, &middle).filter(is_expected)),
             verdict,
             steps,
@@ -186,7 +186,7 @@ impl MethodResult {
 
 /// Groups the results into one series per image number: the first image of every step, the second image of
 /// every step, and so on.
-fn group_by_image(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
+fn error_series_by_image(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
     let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
     (0..count).map(|index| steps.iter().map(|step| point(step, index)).collect()).collect()

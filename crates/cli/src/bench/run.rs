@@ -142,12 +142,12 @@ impl SceneRun<'_> {
             ReferenceSource::InTime | ReferenceSource::Samples(_) => None,
         };
         let (width, height) = match &given {
-            Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
+            Some(reference) => (reference.two.image_pair().a().width, reference.two.image_pair().a().height),
             None => image_size(&loaded.scene, (order.width, order.height)),
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let keys = self.reference_renderer(&common).compute_fingerprints(session)?;
+        let keys = self.reference_renderer(&common).compute_reference_fingerprints(session)?;
         self.check_outputs_are_not_inputs(session)?;
         Ok(PreparedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
@@ -177,7 +177,7 @@ impl SceneRun<'_> {
             None => self.load_or_render_references(&mut session, &common, &keys, budget)?,
         };
         drop(session);
-        let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
+        let (width, height) = (reference.two.image_pair().a().width, reference.two.image_pair().a().height);
         self.report_references(&reference, (width, height));
         let most_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();
@@ -218,8 +218,9 @@ impl SceneRun<'_> {
             return Ok(kept);
         }
         let begin = |left: usize| {
-            let seconds =
-                amount.seconds.map(|seconds| budget.seconds_left(seconds * left as f64 / 2.0, true));
+            let seconds = amount
+                .seconds
+                .map(|seconds| budget.estimate_seconds_to_end(seconds * left as f64 / 2.0, true));
             self.report_task_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
         let made = maker.render_reference_pair(session, amount, begin)?;

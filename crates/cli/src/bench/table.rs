@@ -44,7 +44,7 @@ fn format_scene(scene: &SceneResult) -> Vec<String> {
 }
 
 fn format_references(reference: &ReferenceResult, scene: &SceneResult) -> String {
-    let noise = format!("noise {}", format_error(reference.noise));
+    let noise = format!("noise {}", format_error_or_near_zero(reference.noise));
     let Some(samples) = reference.samples else {
         return match reference.files.as_slice() {
             [one] => format!("reference: {one} (a single reference, so its noise counts as error)"),
@@ -62,22 +62,22 @@ fn format_step(name: &str, step: &StepResult, width: usize) -> String {
     let [least, most] = step.spread;
     format!(
         "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
-        format_count(step.samples),
+        format_sample_count(step.samples),
         words::format_seconds(step.seconds),
-        format_error(step.relmse),
-        format_error(least),
-        format_error(most),
-        format_error(step.seconds * step.relmse)
+        format_error_or_near_zero(step.relmse),
+        format_error_or_near_zero(least),
+        format_error_or_near_zero(most),
+        format_error_or_near_zero(step.seconds * step.relmse)
     )
 }
 
 /// Formats a sample count, without decimals for integers.
-fn format_count(samples: f64) -> String {
+fn format_sample_count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
 
 /// Formats an error with three digits. Negative errors and 0 are below the noise of the references.
-pub(super) fn format_error(value: f64) -> String {
+pub(super) fn format_error_or_near_zero(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
@@ -98,8 +98,8 @@ fn format_target_times(method: &MethodResult) -> Option<String> {
 }
 
 /// Formats a sample count with its unit, as in `1 sample`.
-pub(super) fn format_samples(samples: f64) -> String {
-    format!("{} sample{}", format_count(samples), if samples == 1.0 { "" } else { "s" })
+pub(super) fn format_samples_with_unit(samples: f64) -> String {
+    format!("{} sample{}", format_sample_count(samples), if samples == 1.0 { "" } else { "s" })
 }
 
 /// Formats a slope, as in `−0.98 ± 0.02`.
@@ -110,20 +110,28 @@ pub(super) fn format_slope(Slope { value, error }: Slope) -> String {
 
 /// Describes a method's bias.
 fn describe_bias(method: &MethodResult) -> String {
-    let at =
-        method.steps.last().map_or(String::new(), |step| format!(" at {}", format_samples(step.samples)));
+    let at = method
+        .steps
+        .last()
+        .map_or(String::new(), |step| format!(" at {}", format_samples_with_unit(step.samples)));
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
     match method.verdict {
         BiasVerdict::Unknown => "too few seeds to detect a bias".to_owned(),
-        BiasVerdict::NoneFound { bound } => format!("no bias in relMSE, below {}{at}", format_error(bound)),
+        BiasVerdict::NoneFound { bound } => {
+            format!("no bias in relMSE, below {}{at}", format_error_or_near_zero(bound))
+        }
         BiasVerdict::Falls { size, share } => {
-            format!("bias that decreases with samples: {}, {}{at}", format_error(size), percent(share))
+            format!(
+                "bias that decreases with samples: {}, {}{at}",
+                format_error_or_near_zero(size),
+                percent(share)
+            )
         }
         BiasVerdict::Stays { size, share } => {
             let last = method
                 .last_slope
                 .map_or(String::new(), |slope| format!(", last slope {}", format_slope(slope)));
-            format!("BIAS: {}, {}{at}{last}", format_error(size), percent(share))
+            format!("BIAS: {}, {}{at}{last}", format_error_or_near_zero(size), percent(share))
         }
     }
 }
@@ -168,7 +176,10 @@ mod tests {
 
     #[test]
     fn errors_below_noise_are_shown_as_zero() {
-        assert_eq!((format_error(-1e-9).as_str(), format_error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
-        assert_eq!((format_count(16.0).as_str(), format_count(16.25).as_str()), ("16", "16.2"));
+        assert_eq!(
+            (format_error_or_near_zero(-1e-9).as_str(), format_error_or_near_zero(0.0123).as_str()),
+            ("≈ 0", "1.23e-2")
+        );
+        assert_eq!((format_sample_count(16.0).as_str(), format_sample_count(16.25).as_str()), ("16", "16.2"));
     }
 }

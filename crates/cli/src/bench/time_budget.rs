@@ -81,7 +81,7 @@ impl TimeBudget {
 
     /// Estimated seconds until the benchmark ends. `of_this` is the time left for the current reference or
     /// method.
-    pub(super) fn seconds_left(&self, of_this: f64, is_reference: bool) -> f64 {
+    pub(super) fn estimate_seconds_to_end(&self, of_this: f64, is_reference: bool) -> f64 {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let remaining = if is_reference { self.methods } else { self.methods.saturating_sub(1) };
         let of_each = if self.done.is_empty() {
@@ -105,14 +105,14 @@ mod tests {
         let mut budget = TimeBudget::new(1000.0, 2);
         budget.begin_scene(4);
         near(budget.reference_allowance(), 375.0);
-        near(budget.seconds_left(375.0, true), 1000.0);
+        near(budget.estimate_seconds_to_end(375.0, true), 1000.0);
         budget.begin_method();
         near(budget.method_allowance(), 125.0);
-        near(budget.seconds_left(20.0, false), 1000.0);
+        near(budget.estimate_seconds_to_end(20.0, false), 1000.0);
         budget.end_method();
         budget.begin_method();
         near(budget.method_allowance(), 166.7);
-        near(budget.seconds_left(20.0, false), 520.0);
+        near(budget.estimate_seconds_to_end(20.0, false), 520.0);
         budget.end_method();
         budget.end_scene();
         budget.begin_scene(1);

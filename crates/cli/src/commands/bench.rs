@@ -37,7 +37,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
 
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
-    priority::lower_priority(args.nice);
+    priority::lower_inherited_priority(args.nice);
     let order = bench_request(args, console)?;
     let scenes = order.scenes.len();
     let outputs = BenchOutputs::from_checked_args(args, &order.scenes, console)?;

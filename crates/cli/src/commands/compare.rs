@@ -61,7 +61,7 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
 fn compare_to_thresholds(summary: &Summary<'_>, console: &Console) -> Exit {
     match summary.max_relmse {
         Some(most) if !summary.is_within => {
-            let relmse = format_significant_digits(summary.relmse);
+            let relmse = format_six_significant_digits(summary.relmse);
             console.print_error(Exit::FAILED, &format!("relMSE {relmse} is above --max-relmse {most}"))
         }
         Some(_) | None => Exit::DONE,
@@ -278,25 +278,30 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
     let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
     let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels per degree; mean, 0 to 1");
     let mut rows = vec![
-        ("RMSE", format_significant_digits(summary.rmse), "", "linear".to_owned()),
+        ("RMSE", format_six_significant_digits(summary.rmse), "", "linear".to_owned()),
         (
             "relMSE",
-            format_significant_digits(summary.relmse),
+            format_six_significant_digits(summary.relmse),
             "",
             "linear: mean of (a - b)²/(b² + 0.01)".to_owned(),
         ),
-        ("relMSE, trimmed", format_significant_digits(summary.relmse_trimmed), "", trimmed),
-        ("max |a - b|", format_significant_digits(summary.max), "", format!("linear{place}")),
+        ("relMSE, trimmed", format_six_significant_digits(summary.relmse_trimmed), "", trimmed),
+        ("max |a - b|", format_six_significant_digits(summary.max), "", format!("linear{place}")),
         ("PSNR", format_decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
         ("SSIM", format!("{:.6}", summary.ssim), "", "luma of clamped sRGB".to_owned()),
-        ("FLIP", format_significant_digits(summary.flip), "", flip),
+        ("FLIP", format_six_significant_digits(summary.flip), "", flip),
     ];
     if let Some(bias) = summary.bias {
         let noise = summary.bias_standard_error.map_or_else(
             || "noise unknown".to_owned(),
-            |error| format!("standard error {}", format_significant_digits(error)),
+            |error| format!("standard error {}", format_six_significant_digits(error)),
         );
-        rows.push(("bias", format_signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
+        rows.push((
+            "bias",
+            format_possibly_negative(bias),
+            "",
+            format!("linear: mean(a - b)/mean(b); {noise}"),
+        ));
     }
     if let Some(z) = summary.bias_z {
         let verdict = if z.abs() > SIGNIFICANT_Z { SIGNIFICANT } else { "" };
@@ -305,13 +310,13 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
     rows
 }
 
-fn format_signed(value: f64) -> String {
+fn format_possibly_negative(value: f64) -> String {
     let sign = if value < 0.0 { "-" } else { "" };
-    format!("{sign}{}", format_significant_digits(value.abs()))
+    format!("{sign}{}", format_six_significant_digits(value.abs()))
 }
 
 /// Formats six significant digits.
-fn format_significant_digits(value: f64) -> String {
+fn format_six_significant_digits(value: f64) -> String {
     let is_short = (1e-4..1e6).contains(&value);
     let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
     match value {
@@ -390,7 +395,7 @@ mod tests {
             (5e30, "5.00000e30"),
         ];
         for (value, text) in cases {
-            assert_eq!(format_significant_digits(value), text);
+            assert_eq!(format_six_significant_digits(value), text);
         }
         assert_eq!(format_decibels(f64::INFINITY), "∞");
         assert_eq!(format_decibels(31.25), "31.2500");

@@ -14,7 +14,7 @@ use crate::tui::{self, ColorDepth, ProbeReplies, TerminalProbe, probe_terminal};
 /// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
     let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
-    lines.extend([("processor", describe_processor()), ("threads", describe_threads())]);
+    lines.extend([("processor", describe_simd_instructions()), ("threads", describe_threads())]);
     match probe_terminal() {
         Some(probe) => lines.extend(describe_terminal(&probe)),
         None => lines.push(("terminal", "none (not a tty); use --once".to_owned())),
@@ -30,7 +30,7 @@ fn environment_variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
-fn describe_processor() -> String {
+fn describe_simd_instructions() -> String {
     let words = |instructions| match instructions {
         InstructionSet::Portable => "no supported SIMD instructions",
         InstructionSet::Avx2 => "AVX2",

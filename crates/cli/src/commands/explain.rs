@@ -3,7 +3,7 @@
 use crate::console::{Console, stdout_columns};
 use crate::exit::Exit;
 use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableTypeInfo, ValueKind};
-use crate::scene::keys::{all_tables, documented_paths, find_table};
+use crate::scene::keys::{all_paths_with_descriptions, all_tables, find_table};
 use crate::scene::nearest::{nearest_name, translate_foreign_name};
 use crate::scene::sanitize::shortened;
 use crate::tui::wrap_text;
@@ -44,7 +44,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
 const MIN_COLUMNS: usize = 16;
 
 /// Whether a table defines a type with this name.
-fn defines_type(table: &TableInfo, name: &str) -> bool {
+fn has_table_type_named(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
 
@@ -67,8 +67,8 @@ fn explain_path(path: &str) -> Option<String> {
     match parts.as_slice() {
         [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
-            None if all_tables().iter().any(|table| defines_type(table, name)) => {
-                let types = all_tables().iter().filter(|table| defines_type(table, name));
+            None if all_tables().iter().any(|table| has_table_type_named(table, name)) => {
+                let types = all_tables().iter().filter(|table| has_table_type_named(table, name));
                 let texts = types.filter_map(|table| Some(type_details(table, table.find_type(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
@@ -135,7 +135,7 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
             }
         },
     );
-    row("example", format!("{} = {}", key.name, key.example()));
+    row("example", format!("{} = {}", key.name, key.default_or_example()));
     if let ValueKind::Words(list) = key.kind {
         text.push('\n');
         for word in list() {
@@ -197,7 +197,7 @@ fn format_sentence(text: &str) -> String {
 /// Error message for an unknown path, with a suggestion.
 fn unknown_path_message(path: &str) -> String {
     let shown = shortened(path, 60);
-    let all = documented_paths();
+    let all = all_paths_with_descriptions();
     let names: Vec<&str> = all.iter().map(|(path, _)| path.as_str()).collect();
     let parts: Vec<&str> = path.split('.').collect();
     let (first, last) =
@@ -257,7 +257,7 @@ mod tests {
             "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
         assert_eq!(wrap_indented(text, 34), expected);
         assert_eq!(wrap_indented(text, 10), text, "too narrow to wrap");
-        for (path, _) in documented_paths() {
+        for (path, _) in all_paths_with_descriptions() {
             let text = wrap_indented(&explain_path(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn every_path_is_explained() {
-        for (path, doc) in documented_paths() {
+        for (path, doc) in all_paths_with_descriptions() {
             let text = explain_path(&path).unwrap_or_default();
             assert!(text.contains(&without_backticks(doc)), "{path}: {text}");
         }

@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use rayon::ThreadPool;
 use serde_json::json;
 
-use self::inputs::{RenderInputFiles, scene_paths};
+use self::inputs::{RenderInputFiles, possible_scene_paths};
 use crate::args::{MergeArgs, ProgressMode};
 use crate::console::{Console, stdout_columns};
 use crate::control::{CancelToken, Cancelled};
@@ -23,7 +23,7 @@ use crate::output::write::{WritePolicy, atomic_with_policy};
 use crate::output::{
     self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
 };
-use crate::progress::{bar_style, json_line};
+use crate::progress::{bar_style_from_template, json_line};
 use crate::scene::sanitize::{escape_invisible_chars, shortened};
 use crate::signals;
 use crate::system::threads::core_pool;
@@ -175,7 +175,7 @@ impl MergeCommand<'_> {
                 }
             }
             waiting = rest;
-            let unfinished: Vec<&Path> = waiting.iter().filter_map(AwaitedPart::incomplete_path).collect();
+            let unfinished: Vec<&Path> = waiting.iter().filter_map(AwaitedPart::path_if_incomplete).collect();
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
@@ -322,8 +322,9 @@ impl MergeCommand<'_> {
             sweep: None,
             losses: AttributeLossPolicy::Report(&tell),
         };
-        let bytes =
-            self.pool.install(|| finish.encode(film, (&finish.extract_image(film), &[]), format, token));
+        let bytes = self.pool.install(|| {
+            finish.encode_extracted_image(film, (&finish.extract_image(film), &[]), format, token)
+        });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,
@@ -347,7 +348,7 @@ impl MergeCommand<'_> {
 /// Records the scene's path relative to the output, as an unsharded render does.
 fn set_relative_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
-    if let Some(path) = scene_paths(parts, out).find(|path| path.is_file()) {
+    if let Some(path) = possible_scene_paths(parts, out).find(|path| path.is_file()) {
         *scene = scene_path::relative_to_image(&path, out);
     }
 }
@@ -390,7 +391,7 @@ impl AwaitedPart {
     }
 
     /// Returns the part's path if the file exists but is incomplete.
-    fn incomplete_path(&self) -> Option<&Path> {
+    fn path_if_incomplete(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }
 }
@@ -407,7 +408,8 @@ impl StepProgress {
     fn new(progress: ProgressMode, console: &Console, what: &'static str) -> Self {
         let template = "  {wide_bar} {percent:>3}% {msg}";
         let has_bar = progress == ProgressMode::Auto && console.is_terminal;
-        let bar = has_bar.then(|| ProgressBar::new(1).with_style(bar_style(template)).with_message(what));
+        let bar = has_bar
+            .then(|| ProgressBar::new(1).with_style(bar_style_from_template(template)).with_message(what));
         Self { what, bar, is_json: progress == ProgressMode::Json, said: 0 }
     }
 

@@ -28,7 +28,8 @@ pub(super) struct ProgressBars {
 impl ProgressBars {
     pub(super) fn new(time: Option<f64>) -> Self {
         let all = MultiProgress::new();
-        let stage = all.add(ProgressBar::new_spinner().with_style(bar_style("{spinner} {msg}")));
+        let stage =
+            all.add(ProgressBar::new_spinner().with_style(bar_style_from_template("{spinner} {msg}")));
         Self { all, stage, assets: HashMap::new(), render: None, time }
     }
 
@@ -44,8 +45,8 @@ impl ProgressBars {
     fn show_asset(&mut self, progress: &AssetProgress) {
         let (all, stage) = (&self.all, &self.stage);
         let bar = self.assets.entry(progress.name.clone()).or_insert_with(|| {
-            let bar =
-                ProgressBar::new(progress.total).with_style(bar_style("  {bar:24} {percent:>3}% {msg}"));
+            let bar = ProgressBar::new(progress.total)
+                .with_style(bar_style_from_template("  {bar:24} {percent:>3}% {msg}"));
             let bar = all.insert_after(stage, bar);
             bar.set_message(escape_invisible_chars(&progress.name).into_owned());
             bar
@@ -59,7 +60,10 @@ impl ProgressBars {
     fn show_progress(&mut self, progress: &RenderProgress) {
         let all = &self.all;
         let bar = self.render.get_or_insert_with(|| {
-            all.add(ProgressBar::new(STEPS).with_style(bar_style("  {wide_bar} {percent:>3}% {msg}")))
+            all.add(
+                ProgressBar::new(STEPS)
+                    .with_style(bar_style_from_template("  {wide_bar} {percent:>3}% {msg}")),
+            )
         });
         // Query the size every time, because the terminal may be resized.
         let columns =
@@ -111,7 +115,7 @@ fn format_bar_text(progress: &RenderProgress, time: Option<f64>, columns: usize)
 }
 
 /// Creates a style from a template. Falls back to the library's default.
-pub(crate) fn bar_style(template: &str) -> ProgressStyle {
+pub(crate) fn bar_style_from_template(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 

@@ -31,7 +31,7 @@ pub(super) struct JsonReporter;
 impl Reporter for JsonReporter {
     fn handle_event(&mut self, event: &Event) {
         if let Some(value) = event_to_json(event) {
-            print_json_line(&value);
+            print_json_line_to_stderr(&value);
         }
     }
 
@@ -45,7 +45,7 @@ impl Reporter for JsonReporter {
 }
 
 /// Prints a JSON line to stderr, ignoring errors.
-pub(crate) fn print_json_line(value: &Value) {
+pub(crate) fn print_json_line_to_stderr(value: &Value) {
     if let Ok(text) = with_event_first(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }

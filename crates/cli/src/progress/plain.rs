@@ -66,7 +66,7 @@ impl Reporter for PlainReporter {
         if let Event::Stage { stage, .. } = event
             && stage.status != Status::Running
         {
-            self.console.print_message(&stage_line(stage));
+            self.console.print_message(&stage_status_line(stage));
         } else if let Event::Asset { progress, .. } = event
             && self.is_newly_loaded(progress)
         {
@@ -88,7 +88,7 @@ fn format_progress(progress: &RenderProgress) -> String {
 }
 
 /// Describes a finished stage, as in `parse done 0.40 ms`.
-pub(super) fn stage_line(stage: &StageReport) -> String {
+pub(super) fn stage_status_line(stage: &StageReport) -> String {
     let status = match stage.status {
         Status::Running => "running",
         Status::Done => "done",

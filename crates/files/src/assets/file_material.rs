@@ -186,7 +186,7 @@ impl FileTexture {
     }
 
     /// Whether both textures show the same image at the same texture coordinates.
-    pub fn is_same_image(&self, other: &Self) -> bool {
+    pub fn has_same_image_and_mapping(&self, other: &Self) -> bool {
         let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
         self.path == other.path && at(self) == at(other)
     }

@@ -122,8 +122,8 @@ pub struct LoadedMesh {
 
 impl LoadedMesh {
     /// Whether the mesh has no normals and consists of flat faces, like a box.
-    pub fn is_faceted(&self) -> bool {
-        mesh::normals::is_faceted(&self.mesh)
+    pub fn is_faceted_without_normals(&self) -> bool {
+        mesh::normals::is_faceted_without_normals(&self.mesh)
     }
 
     /// Whether the mesh has triangles but no materials.

@@ -52,7 +52,7 @@ fn parse(path: &Path, text: &str) -> Result<GkitOrbiterCamera, AssetError> {
             Some("p") => position = Some(parse_numbers("p", words).map_err(wrong)?),
             Some("r") => rotation = Some(parse_numbers("r", words).map_err(wrong)?),
             Some("s") => size = Some(check_distance(parse_numbers("s", words)).map_err(wrong)?),
-            Some("f") => field = Some(check_fov(parse_numbers("f", words)).map_err(wrong)?),
+            Some("f") => field = Some(check_fov_and_image_size(parse_numbers("f", words)).map_err(wrong)?),
             Some(other) => {
                 let shown: String = other.chars().take(20).collect();
                 return Err(wrong(unknown_line_message(&shown)));
@@ -130,7 +130,7 @@ fn check_distance(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String>
     }
 }
 
-fn check_fov(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
+fn check_fov_and_image_size(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
     let [fov, width, height] = numbers?;
     if !(fov > 0.0 && fov < 180.0) {
         return Err(invalid_fov_message(fov));

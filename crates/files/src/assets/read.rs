@@ -89,7 +89,7 @@ pub(crate) fn read_text_or_binary(
 }
 
 /// Reads a text or binary file. Rejects files that start with [`START`] zeros.
-pub(crate) fn read_unless_all_zero(
+pub(crate) fn read_unless_zeros_at_start(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
@@ -237,7 +237,7 @@ mod tests {
         for numbers in [[33_u16, 126, 40], [0xfeff, 65, 66]] {
             let content: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
             fs::write(&path, &content).expect("written");
-            for read in [read_bytes, read_unless_all_zero] {
+            for read in [read_bytes, read_unless_zeros_at_start] {
                 assert_eq!(read(&path, 100, monitor(&token)).expect("numbers"), content);
             }
         }
@@ -250,7 +250,7 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_text_or_binary, read_unless_all_zero, read_bytes] {
+        for read in [read_text, read_text_or_binary, read_unless_zeros_at_start, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }

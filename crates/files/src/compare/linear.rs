@@ -50,7 +50,7 @@ pub(super) fn measure(pair: &Pair) -> LinearErrors {
     LinearErrors {
         rmse: (sums.square / (3 * pixels) as f64).sqrt(),
         relmse,
-        relmse_trimmed: if dropped == 0 { relmse } else { trimmed_mean(pair, dropped) },
+        relmse_trimmed: if dropped == 0 { relmse } else { trimmed_relmse(pair, dropped) },
         dropped_pixels: dropped as u64,
         max: sums.max,
         max_at: sums.max_at,
@@ -87,7 +87,7 @@ fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// Mean of [`relative_squared_error`], excluding the largest values.
-fn trimmed_mean(pair: &Pair, dropped: usize) -> f64 {
+fn trimmed_relmse(pair: &Pair, dropped: usize) -> f64 {
     let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;

@@ -19,7 +19,7 @@ pub use bias::Bias;
 pub use diff::{absolute_difference, flip_heat_map};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
-pub use two_references::TwoReferences;
+pub use two_references::ReferencePair;
 
 /// Errors in the first image of a pair. The second image is the reference. Means are over pixels and
 /// channels.

@@ -13,13 +13,13 @@ fn luminance(color: DVec3) -> f64 {
 
 /// Two independently rendered references for the same image.
 #[derive(Clone, Debug)]
-pub struct TwoReferences {
+pub struct ReferencePair {
     pair: Pair,
     /// 1/(r² + 0.01), divided by the number of channels and pixels. r is the mean of both references.
     weights: Vec<DVec3>,
 }
 
-impl TwoReferences {
+impl ReferencePair {
     /// Creates references from a pair of images.
     pub fn new(pair: Pair) -> Self {
         let values = 3.0 * pair.a().pixels.len() as f64;
@@ -32,19 +32,19 @@ impl TwoReferences {
     }
 
     /// Both references.
-    pub fn pair(&self) -> &Pair {
+    pub fn image_pair(&self) -> &Pair {
         &self.pair
     }
 
     /// Returns an image's relMSE, without bias from the references' noise. It can be negative. The image must
     /// have the same size as the references.
     pub fn unbiased_relmse(&self, x: &RadianceImage) -> f64 {
-        self.cross_error(x, x)
+        self.cross_error_of_two_images(x, x)
     }
 
     /// Mean of (x − r)(y − r), relative to r². For two images rendered with the same method and independent
     /// noise, the expected value is the squared bias.
-    pub fn cross_error(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
+    pub fn cross_error_of_two_images(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
         let pixels = self.weighted_pixels().zip(x.pixels.iter().zip(&y.pixels));
         let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
             let (x, y) = (x.as_dvec3(), y.as_dvec3());
@@ -124,9 +124,9 @@ mod tests {
         RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
     }
 
-    fn references(noise: f32) -> TwoReferences {
+    fn references(noise: f32) -> ReferencePair {
         let names = [Path::new("r1"), Path::new("r2")];
-        TwoReferences::new(
+        ReferencePair::new(
             Pair::new(names, test_image(1, noise, 0.0), test_image(2, noise, 0.0)).expect("a pair"),
         )
     }
@@ -167,7 +167,9 @@ mod tests {
     #[test]
     fn cross_error_is_the_squared_bias() {
         let references = references(0.02);
-        let cross = |offset| references.cross_error(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
+        let cross = |offset| {
+            references.cross_error_of_two_images(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset))
+        };
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
         assert!(
             cross(0.0).abs() < 0.04 * references.unbiased_relmse(&test_image(5, 0.2, 0.0)),

@@ -42,7 +42,7 @@ impl DevelopSettings {
     ///
     /// # Errors
     /// Same as [`encode`](super::encode).
-    pub fn encode(
+    pub fn encode_extracted_image(
         &self,
         film: &Film,
         (image, layers): (&RadianceImage, &[LayerImage]),

@@ -47,7 +47,7 @@ fn backup_path(target: &Path) -> PathBuf {
     name.into()
 }
 
-/// A replacement in progress. The steps are [`Self::begin`], [`Self::swap`] and [`Self::finish_or_restore`].
+/// A replacement in progress. The steps are [`Self::move_new_to_backup_path`], [`Self::swap`] and [`Self::finish_or_restore`].
 pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -60,9 +60,13 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A backup already exists, or a system call fails.
-    pub(super) fn begin(mut new: TemporaryFile, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
+    pub(super) fn move_new_to_backup_path(
+        mut new: TemporaryFile,
+        target: &'a Path,
+        expected: &'a [u8],
+    ) -> io::Result<Self> {
         let held = backup_path(target);
-        new.rename_no_replace(&held).map_err(|error| backup_error(&held, error))?;
+        new.rename_no_replace(&held).map_err(|error| explain_if_backup_exists(&held, error))?;
         Ok(Self { target, held, expected, new })
     }
 
@@ -134,9 +138,9 @@ impl<'a> StepwiseReplacement<'a> {
     ///
     /// # Errors
     /// A backup already exists, or a system call fails.
-    pub(super) fn begin(target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
+    pub(super) fn move_old_to_backup_path(target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
-        rename_no_replace(target, &held).map_err(|error| backup_error(&held, error))?;
+        rename_no_replace(target, &held).map_err(|error| explain_if_backup_exists(&held, error))?;
         Ok(Self { target, held, expected })
     }
 
@@ -145,7 +149,7 @@ impl<'a> StepwiseReplacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn finish_or_restore(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
+    pub(super) fn place_new_or_restore_old(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
         if fs::read(&self.held)? != self.expected {
             return rename_no_replace(&self.held, self.target).map(|()| None);
         }
@@ -177,18 +181,18 @@ pub(super) fn replace_if_unchanged(
     target: &Path,
     expected: &[u8],
 ) -> io::Result<Option<File>> {
-    match Replacement::begin(new, target, expected)?.swap() {
+    match Replacement::move_new_to_backup_path(new, target, expected)?.swap() {
         Ok(replacement) => replacement.finish_or_restore(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
-            StepwiseReplacement::begin(target, expected)?.finish_or_restore(new)
+            StepwiseReplacement::move_old_to_backup_path(target, expected)?.place_new_or_restore_old(new)
         }
         Err((error, _)) => Err(error),
     }
 }
 
 /// Adds an explanation if the backup already exists.
-fn backup_error(held: &Path, error: io::Error) -> io::Error {
+fn explain_if_backup_exists(held: &Path, error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::AlreadyExists => io::Error::new(ErrorKind::AlreadyExists, backup_exists_message(held)),
         _ => error,
@@ -214,7 +218,7 @@ fn exchange_files(_: &Path, _: &Path) -> io::Result<()> {
 }
 
 /// Warning about a backup that differs from its file.
-pub fn backup_warning(held: &Path) -> String {
+pub fn backup_differs_warning(held: &Path) -> String {
     format!(
         "{} contains another version of this scene, because glimt was interrupted while saving it",
         held.display()
@@ -226,7 +230,7 @@ mod tests {
     use std::ffi::OsStr;
     use std::io::Write;
 
-    use super::super::temporary::remove_stale;
+    use super::super::temporary::remove_stale_files;
     use super::*;
 
     const OLD: &str = "as glimt read it";
@@ -250,7 +254,8 @@ mod tests {
 
         /// New text in a temporary file.
         fn new_text(&self) -> TemporaryFile {
-            let new = TemporaryFile::create(self.folder.path(), OsStr::new("a.toml"), 0o644).expect("a file");
+            let new = TemporaryFile::create_locked(self.folder.path(), OsStr::new("a.toml"), 0o644)
+                .expect("a file");
             (&new.file).write_all(NEW.as_bytes()).expect("written");
             new
         }
@@ -265,7 +270,7 @@ mod tests {
         /// Returns all texts that exist after the process is killed, stale files are removed and glimt
         /// restarts.
         fn after_a_kill(&self) -> Vec<String> {
-            remove_stale(self.folder.path(), &|_| false);
+            remove_stale_files(self.folder.path(), &|_| false);
             recover_backup(&self.scene());
             let entries = fs::read_dir(self.folder.path()).expect("a folder");
             let names = entries.map(|entry| entry.expect("an entry").path());
@@ -297,10 +302,15 @@ mod tests {
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
         // Repeat with stepwise replacement.
         let scene = folder.scene();
-        let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
-        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
-        let steps = StepwiseReplacement::begin(&scene, NEWER.as_bytes()).expect("taken");
-        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_some() && folder.has(NEW));
+        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
+        assert!(
+            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_none()
+                && folder.has(NEWER)
+        );
+        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, NEWER.as_bytes()).expect("taken");
+        assert!(
+            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_some() && folder.has(NEW)
+        );
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
     }
 
@@ -324,7 +334,8 @@ mod tests {
                 if steps == 0 {
                     std::mem::forget(new);
                 } else {
-                    let mut replacement = Replacement::begin(new, &scene, OLD.as_bytes()).expect("begun");
+                    let mut replacement =
+                        Replacement::move_new_to_backup_path(new, &scene, OLD.as_bytes()).expect("begun");
                     save(1);
                     if steps == 2 {
                         replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
@@ -355,7 +366,8 @@ mod tests {
         let folder = SceneDir::new();
         let scene = folder.scene();
         folder.save("first");
-        let replacement = Replacement::begin(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
+        let replacement =
+            Replacement::move_new_to_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
         let replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
         folder.save("second");
         assert!(replacement.finish_or_restore().expect("no error").is_none());
@@ -367,19 +379,26 @@ mod tests {
     fn missing_files_are_restored_from_backups() {
         let folder = SceneDir::new();
         let scene = folder.scene();
-        std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));
+        std::mem::forget(
+            StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
+        );
         assert!(!scene.exists());
         assert_eq!(recover_backup(&scene), BackupRecovery::Restored);
         assert!(folder.has(OLD));
         // Repeat through a symbolic link.
         let link = folder.folder.path().join("link.toml");
         std::os::unix::fs::symlink(&scene, &link).expect("a link");
-        std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));
+        std::mem::forget(
+            StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
+        );
         assert_eq!(recover_backup(&link), BackupRecovery::Restored);
         assert_eq!(recover_backup(&link), BackupRecovery::None);
         // An editor saves while the old text is the backup.
-        let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
+        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);
-        assert!(steps.finish_or_restore(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
+        assert!(
+            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_none()
+                && folder.has(NEWER)
+        );
     }
 }

@@ -43,7 +43,7 @@ impl TargetFile {
 /// Resolves a path, and checks without writing whether it can be written.
 pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
-        return Err(directory_error(path));
+        return Err(target_is_directory_error(path));
     }
     match follow_links(path).map_err(|error| OutputError::file(path, error))? {
         (target, None) => resolve_new(path, target),
@@ -97,7 +97,7 @@ fn resolve_new(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError>
 fn resolve_existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTarget, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
-        return Err(directory_error(path));
+        return Err(target_is_directory_error(path));
     }
     if kind.is_block_device() || kind.is_socket() {
         let what = if kind.is_socket() { "a socket" } else { "a block device" };
@@ -155,7 +155,7 @@ fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), Output
     access(what, how).map_err(|errno| OutputError::file(path, errno))
 }
 
-fn directory_error(path: &Path) -> OutputError {
+fn target_is_directory_error(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
     OutputError::Target { path: path.to_owned(), why, way_out: "specify a file in it" }
 }

@@ -33,7 +33,7 @@ pub(super) struct TemporaryFile {
 impl TemporaryFile {
     /// Creates an empty, locked file for a target called `name`. The file is called
     /// `.NAME.glimt-<machine>-<process>-<number>.tmp`.
-    pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
+    pub(super) fn create_locked(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
             let path = directory.join(next_temporary_name(name));
             match OpenOptions::new().write(true).create_new(true).mode(mode).open(&path) {
@@ -100,7 +100,7 @@ pub(super) fn check_can_create(directory: &Path) -> io::Result<()> {
     if create_unnamed(directory).is_ok() {
         return Ok(());
     }
-    TemporaryFile::create(directory, OsStr::new("probe"), 0o600).map(drop)
+    TemporaryFile::create_locked(directory, OsStr::new("probe"), 0o600).map(drop)
 }
 
 #[cfg(target_os = "linux")]
@@ -116,7 +116,7 @@ fn create_unnamed(_: &Path) -> io::Result<()> {
 /// Removes temporary files left by killed processes on this machine, unless `is_kept` returns true. Keeps
 /// files from other machines, earlier boots and running processes. Ignores files that cannot be removed,
 /// because they must not prevent a write.
-pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
+pub(super) fn remove_stale_files(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {
             let _ = remove_if_stale(&path, |path| fs::remove_file(path));
@@ -245,7 +245,8 @@ pub(super) mod tests {
     #[test]
     fn only_stale_local_files_are_removed() {
         let directory = tempfile::tempdir().expect("a directory");
-        let living = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        let living =
+            TemporaryFile::create_locked(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         let write = |name: OsString| {
             let path = directory.path().join(name);
             fs::write(&path, "half").expect("a file");
@@ -259,7 +260,7 @@ pub(super) mod tests {
             write(".b.png.glimt-123-4.tmp".into()),
             write(".b.png.tmp".into()),
         ];
-        remove_stale(directory.path(), &|_| false);
+        remove_stale_files(directory.path(), &|_| false);
         assert!(living.path.exists());
         assert!(!stale.exists());
         for path in kept {
@@ -281,7 +282,8 @@ pub(super) mod tests {
     fn a_panic_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
         let result = std::panic::catch_unwind(|| {
-            let _file = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+            let _file =
+                TemporaryFile::create_locked(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
             panic!("while writing");
         });
         assert!(result.is_err());
@@ -291,7 +293,8 @@ pub(super) mod tests {
     #[test]
     fn removed_temporary_files_are_not_claimed() {
         let directory = tempfile::tempdir().expect("a directory");
-        let file = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        let file =
+            TemporaryFile::create_locked(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         fs::remove_file(&file.path).expect("removed");
         assert!(!file.try_lock().expect("no error"));
         fs::write(&file.path, "another").expect("a file");

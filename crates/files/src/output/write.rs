@@ -228,11 +228,11 @@ fn create_temporary(
 ) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.mark_searched(directory)) {
-        temporary::remove_stale(directory, guard.is_kept);
+        temporary::remove_stale_files(directory, guard.is_kept);
     }
     let mode = if target.existing.is_some() { 0o600 } else { 0o666 };
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
-    let new = TemporaryFile::create(directory, name, mode)?;
+    let new = TemporaryFile::create_locked(directory, name, mode)?;
     let old = target.existing.as_ref().map(|existing| FileAttributes::read(&target.path, existing));
     let carried = old.map(|old| old.carry_over(&new.file));
     Ok((new, carried))

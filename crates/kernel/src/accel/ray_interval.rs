@@ -4,7 +4,7 @@ use crate::geometry::{Aabb, Ray};
 
 /// A tree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TreeNode {
+pub struct TreeNodeSummary {
     /// Bounding box.
     pub bounds: Aabb,
     /// Number of ancestors.
@@ -15,7 +15,7 @@ pub struct TreeNode {
 
 /// The part of a ray that is inside a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayInterval {
+pub struct RayBoxInterval {
     /// Distance at which the ray enters the box (negative if it starts inside), and the axis of the entry
     /// face.
     pub enter: (f32, usize),
@@ -23,7 +23,7 @@ pub struct RayInterval {
     pub leave: (f32, usize),
 }
 
-impl RayInterval {
+impl RayBoxInterval {
     /// Intersects a ray with a box. Returns `None` if the box is not hit before the ray's end. Uses the plain
     /// slab test, so rays that only touch the box may hit or miss.
     #[inline]

@@ -27,7 +27,7 @@ impl SimdBounds {
 
     /// Bounding box of a slice of references.
     #[inline]
-    pub fn around(references: &[TriangleReference]) -> Self {
+    pub fn around_references(references: &[TriangleReference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
             all.grow(&reference.bounds);
             all
@@ -100,8 +100,8 @@ impl TriangleReference {
         let mut references: Vec<Self> =
             (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
         token.check()?;
-        if !references.par_iter().all(Self::is_usable) {
-            references.retain(Self::is_usable);
+        if !references.par_iter().all(Self::is_hittable_and_finite) {
+            references.retain(Self::is_hittable_and_finite);
         }
         Ok(references)
     }
@@ -127,7 +127,7 @@ impl TriangleReference {
     }
 
     /// Whether the triangle can be hit and its box is finite.
-    fn is_usable(&self) -> bool {
+    fn is_hittable_and_finite(&self) -> bool {
         self.bounds.extent().truncate().is_finite()
     }
 
@@ -143,7 +143,7 @@ impl TriangleReference {
             if (from < at && at < to) || (to < at && at < from) {
                 let (start, way) = (before.as_dvec3(), corner.as_dvec3() - before.as_dvec3());
                 let part = (f64::from(at) - f64::from(from)) / (f64::from(to) - f64::from(from));
-                let crossing = round_outward(start + way * part);
+                let crossing = outward_rounded_point_bounds(start + way * part);
                 parts[0].grow(&crossing);
                 parts[1].grow(&crossing);
             }
@@ -157,13 +157,13 @@ impl TriangleReference {
             before = corner;
         }
         let [left, right] = self.bounds.halves(axis, at);
-        [self.with_intersection_bounds(left, &parts[0]), self.with_intersection_bounds(right, &parts[1])]
+        [self.with_intersection_or_half(left, &parts[0]), self.with_intersection_or_half(right, &parts[1])]
     }
 
     /// Replaces the reference's box with the intersection of both boxes, or with `half` if they do not
     /// overlap.
     #[inline(always)]
-    fn with_intersection_bounds(&self, half: SimdBounds, part: &SimdBounds) -> Self {
+    fn with_intersection_or_half(&self, half: SimdBounds, part: &SimdBounds) -> Self {
         let mut both =
             SimdBounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
         both = if both.extent().truncate().cmpge(Vec3::ZERO).all() { both } else { half };
@@ -174,7 +174,7 @@ impl TriangleReference {
 
 /// `f32` box around a double-precision point, rounded outward.
 #[inline(always)]
-fn round_outward(exact: DVec3) -> SimdBounds {
+fn outward_rounded_point_bounds(exact: DVec3) -> SimdBounds {
     let near = exact.as_vec3();
     let off = exact - near.as_dvec3();
     let [mut min, mut max] = [near; 2];

@@ -9,12 +9,12 @@ use crate::math::Vec3;
 use crate::math::lanes::Simd;
 use crate::math::random::signed_generator;
 
-struct Tested<'a> {
+struct ClosestAndAnyHitKernel<'a> {
     rays: &'a [Ray],
     triangles: &'a [[Vec3; 3]],
 }
 
-impl SimdKernel for Tested<'_> {
+impl SimdKernel for ClosestAndAnyHitKernel<'_> {
     type Output = (HitPacket, u32);
 
     #[inline(always)]
@@ -71,7 +71,8 @@ fn packets_match_single_rays_bit_for_bit() {
             })
             .collect();
         for instructions in InstructionSet::ALL {
-            let (found, any) = instructions.run(Tested { rays: &rays, triangles: &triangles });
+            let (found, any) =
+                instructions.run(ClosestAndAnyHitKernel { rays: &rays, triangles: &triangles });
             for (i, alone) in alone.iter().enumerate() {
                 assert_eq!(found.get(i), *alone, "{instructions:?}: {:?} {triangles:?}", rays[i]);
                 assert_eq!(any & 1 << i != 0, alone.is_some(), "{instructions:?}: {:?}", rays[i]);

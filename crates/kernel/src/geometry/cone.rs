@@ -34,7 +34,10 @@ impl SurfaceF64 for Cone {
             return self.base().closest_point_f64(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
-        self.side_point_f64(radial_direction(local.truncate()), self.slant_direction_and_distance(local))
+        self.side_point_from_slant_f64(
+            radial_direction(local.truncate()),
+            self.slant_direction_and_distance(local),
+        )
     }
 }
 
@@ -120,7 +123,7 @@ impl Cone {
         let out = radial_direction(local.truncate());
         let (down, along) = self.slant_direction_and_distance(local);
         let around = out.perp() * (-TAU * down.x * along);
-        let SurfacePointF64 { point, normal, reach } = self.side_point_f64(out, (down, along));
+        let SurfacePointF64 { point, normal, reach } = self.side_point_from_slant_f64(out, (down, along));
         SurfacePoint::from_f64(
             point,
             normal,
@@ -133,7 +136,7 @@ impl Cone {
 
     /// Computes the point on the side from a direction perpendicular to the axis and the result of
     /// [`Cone::slant_direction_and_distance`].
-    fn side_point_f64(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
+    fn side_point_from_slant_f64(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
             normal: self.frame.vector_to_world((out * down.y).extend(-down.x)),
@@ -240,7 +243,7 @@ impl Cone {
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
+    pub fn encloses(&self, point: DVec3) -> bool {
         let p = self.frame.point_to_local(point);
         p.z < self.height && p.truncate().length() < self.radius / self.height * p.z
     }

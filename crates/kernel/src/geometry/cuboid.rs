@@ -114,7 +114,7 @@ impl Cuboid {
     }
 
     /// Whether a surface point is farther away than `margin` from all faces but one.
-    pub fn is_on_one_face(&self, point: DVec3, margin: f64) -> bool {
+    pub fn is_near_only_one_face(&self, point: DVec3, margin: f64) -> bool {
         let from_center = point - self.center;
         let along = DVec3::new(
             self.axes.x_axis.dot(from_center),
@@ -193,7 +193,7 @@ impl Cuboid {
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
+    pub fn encloses(&self, point: DVec3) -> bool {
         (self.axes.transpose() * (point - self.center)).abs().cmplt(self.half).all()
     }
 

@@ -32,7 +32,7 @@ impl SurfaceF64 for Cylinder {
             return self.cap(hit.primitive).closest_point_f64(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
-        self.side_point_f64(out, z)
+        self.side_point_at_height_f64(out, z)
     }
 }
 
@@ -104,7 +104,7 @@ impl Cylinder {
             return self.cap(hit.primitive).closest_surface_point(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
-        let SurfacePointF64 { point, normal, reach } = self.side_point_f64(out, z);
+        let SurfacePointF64 { point, normal, reach } = self.side_point_at_height_f64(out, z);
         SurfacePoint::from_f64(
             point,
             normal,
@@ -122,7 +122,7 @@ impl Cylinder {
     }
 
     /// Computes the point on the side from a height and a direction perpendicular to the axis.
-    fn side_point_f64(&self, out: DVec2, z: f64) -> SurfacePointF64 {
+    fn side_point_at_height_f64(&self, out: DVec2, z: f64) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * self.radius).extend(z)),
             normal: self.frame.vector_to_world(out.extend(0.0)),
@@ -218,7 +218,7 @@ impl Cylinder {
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
+    pub fn encloses(&self, point: DVec3) -> bool {
         // The height test rejects most points.
         self.frame.height(point).abs() < self.half_length
             && self.frame.point_to_local(point).truncate().length() < self.radius

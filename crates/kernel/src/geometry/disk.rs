@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
 use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
@@ -137,13 +137,13 @@ impl Disk {
     /// Local geometry of the disk near a point, for density estimation.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
-        let extent = LocalSurfaceShape::Flat(self.radius - from.length());
+        let extent = SurfaceExtent::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
         LocalGeometry::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false because a disk has no volume.
-    pub fn contains(&self, _: DVec3) -> bool {
+    pub fn encloses(&self, _: DVec3) -> bool {
         false
     }
 

@@ -124,7 +124,13 @@ impl Shape {
 
     /// Implements [`SurfacePacket::fill`]. Returns whether the shape supports SIMD.
     #[inline(always)]
-    fn fill_surfaces(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
+    fn try_fill_surfaces(
+        &self,
+        row: &mut SurfacePacket,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+    ) -> bool {
         match self {
             Self::Sphere(sphere) => row.fill_from_shape(sphere, rays, hits, of),
             Self::Quad(quad) => row.fill_from_shape(quad, rays, hits, of),
@@ -170,7 +176,7 @@ impl Shape {
         if asked.uv {
             self.surface_point(ray, hit)
         } else {
-            for_shape!(self, it => it.surface_point_f64(ray, hit)).without_uv()
+            for_shape!(self, it => it.surface_point_f64(ray, hit)).to_surface_point_without_uv()
         }
     }
 
@@ -221,8 +227,8 @@ impl Shape {
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
-        for_shape!(self, it => it.contains(point))
+    pub fn encloses(&self, point: DVec3) -> bool {
+        for_shape!(self, it => it.encloses(point))
     }
 
     /// Whether the shape encloses a volume. A plane encloses the half-space behind it.
@@ -255,7 +261,7 @@ impl Shape {
             | Self::Quad(_)
             | Self::Triangle(_)
             | Self::Disk(_) => {
-                self.is_closed().then(|| for_shape!(self, it => points.map(|point| it.contains(point))))
+                self.is_closed().then(|| for_shape!(self, it => points.map(|point| it.encloses(point))))
             }
         }
     }
@@ -273,7 +279,7 @@ impl Shape {
             Self::Sphere(sphere) => 1.0 / sphere.radius,
             Self::Cylinder(cylinder) => cylinder.curvature(part),
             Self::Cone(cone) => cone.curvature(part, point),
-            Self::Torus(torus) => torus.curvature(point),
+            Self::Torus(torus) => torus.mean_curvature(point),
         }
     }
 
@@ -317,7 +323,7 @@ impl Shape {
     pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         match self {
             Self::Sphere(sphere) => sphere.radius > distance,
-            Self::Box(cuboid) => cuboid.is_on_one_face(point, distance),
+            Self::Box(cuboid) => cuboid.is_near_only_one_face(point, distance),
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Triangle(_)
@@ -484,8 +490,8 @@ mod tests {
                 let surface = shape.surface_point(&ray, &hit);
                 let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
                 let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
-                assert!(!shape.contains(before) || !is_closed, "{shape:?}");
-                seen += u32::from(shape.contains(behind));
+                assert!(!shape.encloses(before) || !is_closed, "{shape:?}");
+                seen += u32::from(shape.encloses(behind));
             }
             assert_eq!(
                 seen > 100,

@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 
 /// Mask of the lanes with a nonnegative end.
 #[inline(always)]
-pub fn active_lanes(ends: &F32x16, simd: impl Simd) -> u32 {
+pub fn nonnegative_end_mask(ends: &F32x16, simd: impl Simd) -> u32 {
     let mut traced = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };

@@ -127,7 +127,7 @@ impl Parallelogram {
     }
 
     /// Whether a point is inside. Always false because a quad has no volume.
-    pub fn contains(&self, _: DVec3) -> bool {
+    pub fn encloses(&self, _: DVec3) -> bool {
         false
     }
 

@@ -1,6 +1,6 @@
 //! Infinite planes in double precision.
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
 use super::surface::planar_tangents;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
@@ -99,23 +99,23 @@ impl Plane {
     }
 
     /// Distance from a point to the plane.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn unsigned_distance(&self, point: DVec3) -> f64 {
         (point - self.point).dot(self.normal).abs()
     }
 
     /// Local geometry of the plane near a point, for density estimation.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
-        let distance = self.distance(point);
+        let distance = self.unsigned_distance(point);
         let ground = NearestSurface {
             normal: self.normal,
             height: distance,
-            extent: LocalSurfaceShape::Flat(f64::INFINITY),
+            extent: SurfaceExtent::Flat(f64::INFINITY),
         };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false, unlike [`Plane::is_behind`].
-    pub fn contains(&self, _: DVec3) -> bool {
+    pub fn encloses(&self, _: DVec3) -> bool {
         false
     }
 

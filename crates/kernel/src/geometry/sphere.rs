@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -121,12 +121,12 @@ impl Sphere {
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground =
-            NearestSurface { normal: out, height: distance, extent: LocalSurfaceShape::Round(self.radius) };
+            NearestSurface { normal: out, height: distance, extent: SurfaceExtent::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
+    pub fn encloses(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
         // The slow square root is only needed if rounding errors could change the result.
         if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {

@@ -95,19 +95,19 @@ impl SurfacePoint {
 /// from there. `reach` is the largest magnitude among the lengths in these computations.
 #[inline(always)]
 pub fn point_error_bound(point: Vec3, reach: f64) -> Vec3 {
-    rounding_error(point) + Vec3::splat(f64_error_bound(reach))
+    doubled_point_rounding_error(point) + Vec3::splat(f64_arithmetic_error_bound(reach))
 }
 
 /// Bound on the error of `f64` arithmetic for a hit, its surface point, and the next intersection test from
 /// there. `reach` is the largest magnitude among the lengths in these computations.
 #[inline(always)]
-pub fn f64_error_bound(reach: f64) -> f32 {
+pub fn f64_arithmetic_error_bound(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32
 }
 
 /// Twice the error due to rounding a point to `f32`.
 #[inline(always)]
-pub fn rounding_error(point: Vec3) -> Vec3 {
+pub fn doubled_point_rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }
 

@@ -38,7 +38,7 @@ pub struct SurfacePointF64 {
 
 impl SurfacePointF64 {
     /// Surface point without texture coordinates and tangents.
-    pub fn without_uv(&self) -> SurfacePoint {
+    pub fn to_surface_point_without_uv(&self) -> SurfacePoint {
         SurfacePoint::from_f64(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
     }
 }
@@ -77,7 +77,7 @@ impl SurfacePacket {
     /// false if the shape has no SIMD loop.
     #[inline(always)]
     pub fn fill(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
-        shape.fill_surfaces(self, rays, hits, of)
+        shape.try_fill_surfaces(self, rays, hits, of)
     }
 
     /// Computes the texture coordinates of the hits selected by `of`, which must be on the same shape.
@@ -149,7 +149,7 @@ impl SurfacePacket {
 
     /// Copies the selected shading normals and shadow points from another packet.
     #[inline(always)]
-    pub fn copy_shading_normals(&mut self, of: u32, found: &Self) {
+    pub fn copy_shading_normals_from(&mut self, of: u32, found: &Self) {
         self.smooth |= of;
         let of = mask_from_bits(of);
         for axis in 0..3 {

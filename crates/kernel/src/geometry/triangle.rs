@@ -106,7 +106,7 @@ impl Triangle {
     }
 
     /// Whether a point is inside. Always false because a triangle has no volume.
-    pub fn contains(&self, _: DVec3) -> bool {
+    pub fn encloses(&self, _: DVec3) -> bool {
         false
     }
 

@@ -94,7 +94,7 @@ pub struct TriangleList {
 }
 
 /// Nearest candidate for each ray in a packet.
-struct Candidates {
+struct NearestCandidates {
     /// Lower bound on t of the nearest candidate; ∞ if there is none.
     near: F32x16,
     /// Triangle index of the nearest candidate.
@@ -168,8 +168,8 @@ impl TriangleList {
         found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
-        let candidates = self.find_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
-        let CandidateHits { hit, undecided, hits } =
+        let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
+        let CandidateTestResults { hit, undecided, hits } =
             self.test_candidates(rays, &candidates, (met, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
@@ -188,7 +188,7 @@ impl TriangleList {
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> [u32; 2] {
-        let candidates = self.find_candidates(rays, ends, except, simd);
+        let candidates = self.find_nearest_candidates(rays, ends, except, simd);
         let mut is_met = candidates.doubtful;
         for i in 0..PACKET_SIZE {
             is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
@@ -196,21 +196,22 @@ impl TriangleList {
         if simd.movemask(&is_met) & met == 0 {
             return [0; 2];
         }
-        let CandidateHits { hit, undecided, .. } = self.test_candidates(rays, &candidates, (met, ends), simd);
+        let CandidateTestResults { hit, undecided, .. } =
+            self.test_candidates(rays, &candidates, (met, ends), simd);
         [simd.movemask(&hit) & met, undecided]
     }
 
     /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
     #[inline(always)]
-    fn find_candidates(
+    fn find_nearest_candidates(
         &self,
         rays: &RayPacket,
         ends: &F32x16,
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
-    ) -> Candidates {
+    ) -> NearestCandidates {
         let ErrorTerms { plane, far, across, length, end } = self.error_terms(rays);
-        let mut found = Candidates {
+        let mut found = NearestCandidates {
             near: [f32::INFINITY; PACKET_SIZE],
             number: [0; PACKET_SIZE],
             next: [f32::INFINITY; PACKET_SIZE],
@@ -290,10 +291,10 @@ impl TriangleList {
     fn test_candidates(
         &self,
         rays: &RayPacket,
-        candidates: &Candidates,
+        candidates: &NearestCandidates,
         (met, ends): (u32, &F32x16),
         simd: impl Simd,
-    ) -> CandidateHits {
+    ) -> CandidateTestResults {
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
         for i in 0..PACKET_SIZE {
             let own = &self.corners[candidates.number[i] as usize];
@@ -314,7 +315,7 @@ impl TriangleList {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        CandidateHits { hit, undecided: simd.movemask(&undecided) & met, hits }
+        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & met, hits }
     }
 
     /// Computes the error terms for the rays.
@@ -353,7 +354,7 @@ impl TriangleList {
 }
 
 /// Results of the watertight test on each ray's nearest candidate.
-struct CandidateHits {
+struct CandidateTestResults {
     /// Rays that are certain to hit their candidate before any other candidate.
     hit: Mask,
     /// Mask of the undecided rays.

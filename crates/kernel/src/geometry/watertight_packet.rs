@@ -32,19 +32,19 @@ pub(super) struct Hits {
 /// A triangle corner, shared by all rays or different for each ray.
 pub(super) trait Corner: Copy {
     /// Coordinate of the corner for the ray in a lane.
-    fn coordinate(self, axis: usize, lane: usize) -> f32;
+    fn coordinate_in_lane(self, axis: usize, lane: usize) -> f32;
 }
 
 impl Corner for Vec3 {
     #[inline(always)]
-    fn coordinate(self, axis: usize, _: usize) -> f32 {
+    fn coordinate_in_lane(self, axis: usize, _: usize) -> f32 {
         self[axis]
     }
 }
 
 impl Corner for &Vec3x16 {
     #[inline(always)]
-    fn coordinate(self, axis: usize, lane: usize) -> f32 {
+    fn coordinate_in_lane(self, axis: usize, lane: usize) -> f32 {
         self[axis][lane]
     }
 }
@@ -173,7 +173,8 @@ impl<'a> ShearedPacket<'a> {
     fn shear_corner(&self, corner: impl Corner) -> Vec3x16 {
         let mut seen = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
-            let [x, y, z] = [0, 1, 2].map(|axis| corner.coordinate(axis, i) - self.rays.origin[axis][i]);
+            let [x, y, z] =
+                [0, 1, 2].map(|axis| corner.coordinate_in_lane(axis, i) - self.rays.origin[axis][i]);
             let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
             let along = if is_x {
                 x

@@ -46,12 +46,12 @@ pub mod tree;
 
 pub use area::{
     AreaLight, EmissionTexture, Emitter, EmittingPart, MeshEmitter, Side, UvMapping, UvTriangle,
-    back_area_light, front_area_light, see_through_area_light,
+    back_area_light, front_area_light, see_through_side_area_light,
 };
 pub use light::{Light, LightFamily};
 pub use packet::{LightGeometryPacket, LightSamplePacket};
 pub use photon_emission::{
-    BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
+    BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
 pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightTransportKind, Lights};

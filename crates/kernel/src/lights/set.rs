@@ -167,7 +167,7 @@ impl Lights {
     }
 
     /// Memory used by the trees over lights and over the triangles of mesh lights, in bytes.
-    pub fn memory_bytes(&self) -> usize {
+    pub fn tree_memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| {
             let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
             mesh.and_then(MeshEmitter::light_tree).map_or(0, LightTree::memory_bytes)
@@ -239,7 +239,7 @@ impl Lights {
     }
 
     /// Solid angle of the largest light at infinity, in sr. 0 if no light has an extent.
-    pub fn infinite_solid_angle(&self) -> f32 {
+    pub fn max_infinite_light_solid_angle(&self) -> f32 {
         match self.environment {
             Some(_) => 4.0 * std::f32::consts::PI,
             None => self.suns.iter().map(|(_, sun)| sun.inverse_pdf()).fold(0.0, f32::max),

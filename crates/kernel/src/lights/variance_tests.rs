@@ -31,7 +31,7 @@ impl PcgRandom {
 }
 
 /// Samples of the irradiance from a light with radiance 1, at a point on the floor y = 0.
-fn sample_irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
+fn irradiance_samples(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     let mut random = PcgRandom(5);
     let mut one = || {
         let sample = light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]);
@@ -41,7 +41,7 @@ fn sample_irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
 }
 
 /// The mean, and the relative standard deviation of a single sample.
-fn mean_and_deviation(samples: &[f64]) -> (f64, f64) {
+fn mean_and_relative_deviation(samples: &[f64]) -> (f64, f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
     let variance = samples.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / n;
@@ -49,7 +49,7 @@ fn mean_and_deviation(samples: &[f64]) -> (f64, f64) {
 }
 
 /// Shapes about 1 unit in size, at a distance of `gap` above or next to the origin.
-fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
+fn named_light_shapes(gap: f64) -> Vec<(&'static str, Shape)> {
     let at = |x: f64, y: f64| DVec3::new(x, y + gap, 0.0);
     let slant = DVec3::new(0.1, 1.0, 0.05).normalize();
     vec![
@@ -87,10 +87,10 @@ fn light_from_shape(shape: &Shape) -> AreaLight {
 fn area_light_variance_is_bounded() {
     let mut worse = Vec::new();
     for gap in [1e-4, 0.01, 0.1, 1.0, 10.0] {
-        for (name, shape) in area_lights(gap) {
+        for (name, shape) in named_light_shapes(gap) {
             for from in [Vec3::ZERO, Vec3::new(0.05, 0.0, 0.1)] {
-                let samples = sample_irradiance(&light_from_shape(&shape), from, 20_000);
-                let (mean, scatter) = mean_and_deviation(&samples);
+                let samples = irradiance_samples(&light_from_shape(&shape), from, 20_000);
+                let (mean, scatter) = mean_and_relative_deviation(&samples);
                 if !(mean > 1e-9) {
                     continue;
                 }
@@ -135,8 +135,8 @@ fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
     let Some(towards) = sum.try_normalize() else { return (0.0, 0.0) };
     let ball = Shape::Sphere(Sphere { center: from.as_dvec3() + towards.as_dvec3(), radius });
     (
-        mean_and_deviation(&sample_irradiance(&light_from_shape(&ball), from, 20_000)).1,
-        mean_and_deviation(&cosines).1,
+        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(&ball), from, 20_000)).1,
+        mean_and_relative_deviation(&cosines).1,
     )
 }
 
@@ -155,7 +155,7 @@ fn shape_samples_follow_their_pdf() {
     let mut checked = 0;
     for (gap, from) in PLACES {
         let ball = ("ball", Shape::Sphere(Sphere { center: DVec3::Y * (0.5 + gap), radius: 0.5 }));
-        for (name, shape) in area_lights(gap).into_iter().chain([ball]) {
+        for (name, shape) in named_light_shapes(gap).into_iter().chain([ball]) {
             let name = format!("{name} at {gap}");
             checked += u32::from(follows_its_pdf(&name, &shape, &light_from_shape(&shape), from));
         }
@@ -238,7 +238,7 @@ fn small_bright_areas_have_low_variance() {
         let plain = light_from_shape(&Shape::Quad(quad));
         let with_texture = AreaLight { shape: Emitter::TexturedQuad(Box::new(textured)), ..plain.clone() };
         let small = Parallelogram::new(DVec3::new(-0.2, gap, 0.1), DVec3::X * 0.1, DVec3::Z * 0.1);
-        let exact = mean_and_deviation(&sample_irradiance(
+        let exact = mean_and_relative_deviation(&irradiance_samples(
             &light_from_shape(&Shape::Quad(small)),
             Vec3::ZERO,
             40_000,
@@ -255,7 +255,7 @@ fn small_bright_areas_have_low_variance() {
                 })
             };
             let samples: Vec<f64> = (0..40_000).map(|_| one()).collect();
-            let (mean, scatter) = mean_and_deviation(&samples);
+            let (mean, scatter) = mean_and_relative_deviation(&samples);
             let error = mean * scatter / 200.0;
             assert!((mean - exact).abs() < 4.0 * error, "{gap}: {mean} ± {error} instead of {exact}");
             scatter
@@ -272,7 +272,7 @@ fn expected_counts(
     from: Vec3,
     directions: &DirectionGrid,
 ) -> Vec<(f64, f64)> {
-    let square = directions.solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
+    let square = directions.total_solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
     let mut random = PcgRandom(3);
     let mut bins = vec![(0.0, 0.0); SIDE * SIDE];
     for i in 0..SIDE * FINE {
@@ -326,7 +326,8 @@ fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
 #[track_caller]
 fn assert_irradiance(shape: &Shape, exact: f64, greatest_error: f64) {
     let count = 40_000;
-    let (mean, scatter) = mean_and_deviation(&sample_irradiance(&light_from_shape(shape), Vec3::ZERO, count));
+    let (mean, scatter) =
+        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(shape), Vec3::ZERO, count));
     let error = mean * scatter / f64::from(count).sqrt();
     assert!(error <= greatest_error * exact, "{shape:?}: ± {error}");
     let allowed = 4.0 * error + 1e-5 * exact;
@@ -388,7 +389,7 @@ struct DirectionGrid {
 }
 
 impl DirectionGrid {
-    fn solid_angle(&self) -> f64 {
+    fn total_solid_angle(&self) -> f64 {
         std::f64::consts::TAU * f64::from(self.one_minus_cos)
     }
 

@@ -14,7 +14,7 @@ use glimt_base::soa;
 
 soa! {
     /// Factors that select which lobes an image shows.
-    pub struct LobeFactors in LobeFactorsPacket {
+    pub struct ShownLobeFactors in LobeFactorsPacket {
         /// Factor for the wide lobes.
         wide: f32 = 0.0,
         /// Factor for the narrow lobes.
@@ -24,7 +24,7 @@ soa! {
     }
 }
 
-impl From<LobeFilter> for LobeFactors {
+impl From<LobeFilter> for ShownLobeFactors {
     #[inline(always)]
     fn from(shown: LobeFilter) -> Self {
         let factor = |is_shown: bool| if is_shown { 1.0 } else { 0.0 };
@@ -55,7 +55,7 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
         Self {
             bsdf: B::default().splat(),
             view: B::View::default().splat(),
-            shown: LobeFactors::default().splat(),
+            shown: ShownLobeFactors::default().splat(),
             any: B::ALWAYS,
             shows_all: true,
         }
@@ -64,7 +64,7 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
 
 /// Flags in which the compiler knows the value of [`BxdfFlags::NARROW`], so it can remove code from loops.
 #[inline(always)]
-fn with_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
+fn specialize_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
     if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
 }
 
@@ -89,7 +89,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         self.shows_all &= shown == LobeFilter::ALL;
         bsdf.compute_view_terms(directions, self.any).set(&mut self.view, i);
         bsdf.set(&mut self.bsdf, i);
-        LobeFactors::from(shown).set(&mut self.shown, i);
+        ShownLobeFactors::from(shown).set(&mut self.shown, i);
     }
 
     /// Copies a surface from another packet.
@@ -97,7 +97,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
         B::get(&other.bsdf, from).set(&mut self.bsdf, i);
         B::View::get(&other.view, from).set(&mut self.view, i);
-        LobeFactors::get(&other.shown, from).set(&mut self.shown, i);
+        ShownLobeFactors::get(&other.shown, from).set(&mut self.shown, i);
         self.any = self.any.union(other.any);
         self.shows_all &= other.shows_all;
     }
@@ -126,7 +126,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         for &(of, shown) in shown {
             let of = mask_from_bits(of);
             B::select(&of, &filled, &mut self.bsdf);
-            LobeFactors::select(&of, &LobeFactors::from(shown).splat(), &mut self.shown);
+            ShownLobeFactors::select(&of, &ShownLobeFactors::from(shown).splat(), &mut self.shown);
             self.shows_all &= shown == LobeFilter::ALL;
         }
         self.any = self.any.union(bsdf.flags());
@@ -199,7 +199,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
         if !self.shows_all {
             for i in 0..PACKET_SIZE {
-                let shown = LobeFactors::get(&self.shown, i);
+                let shown = ShownLobeFactors::get(&self.shown, i);
                 let wide = lane(&values.wide, i) * shown.wide + Vec3::splat(shown.unit);
                 let narrow = lane(&values.narrow, i) * shown.narrow;
                 set_lane(&mut values.wide, i, wide);
@@ -226,21 +226,21 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub fn pdf(&self, lobes: SampledLobes, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
         if self.has_narrow_lobes() {
-            self.pdf_lanes::<true>(lobes, normals, wi, values)
+            self.pdf_specialized_by_narrow_flag::<true>(lobes, normals, wi, values)
         } else {
-            self.pdf_lanes::<false>(lobes, normals, wi, values)
+            self.pdf_specialized_by_narrow_flag::<false>(lobes, normals, wi, values)
         }
     }
 
     #[inline(always)]
-    fn pdf_lanes<const NARROW: bool>(
+    fn pdf_specialized_by_narrow_flag<const NARROW: bool>(
         &self,
         lobes: SampledLobes,
         normals: &Vec3x16,
         wi: &Vec3x16,
         values: &BsdfValues,
     ) -> F32x16 {
-        let any = with_narrow_flag::<NARROW>(self.any);
+        let any = specialize_narrow_flag::<NARROW>(self.any);
         let mut pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -275,7 +275,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
-        let any = with_narrow_flag::<NARROW>(self.any);
+        let any = specialize_narrow_flag::<NARROW>(self.any);
         let mut wi = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -288,7 +288,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Flags of one surface.
     #[inline(always)]
-    fn flags(&self, i: usize) -> BxdfFlags {
+    fn lane_flags(&self, i: usize) -> BxdfFlags {
         B::get(&self.bsdf, i).flags().union(B::ALWAYS)
     }
 
@@ -297,7 +297,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     pub fn narrow_lobe_mask(&self) -> u32 {
         let mut narrow = 0;
         for i in 0..PACKET_SIZE {
-            narrow |= u32::from(self.flags(i).contains(BxdfFlags::NARROW)) << i;
+            narrow |= u32::from(self.lane_flags(i).contains(BxdfFlags::NARROW)) << i;
         }
         narrow
     }
@@ -305,7 +305,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// The narrow lobe of a surface, if it has one.
     #[inline(always)]
     pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
-        if !self.flags(i).contains(BxdfFlags::NARROW) {
+        if !self.lane_flags(i).contains(BxdfFlags::NARROW) {
             return None;
         }
         B::get(&self.bsdf, i).narrow_lobe(&B::View::get(&self.view, i))
@@ -326,7 +326,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// directions.
     #[inline(always)]
     pub fn constant_f(&self, i: usize) -> Option<Vec3> {
-        let is_constant = B::HAS_CONSTANT_WIDE && !self.flags(i).contains(BxdfFlags::NARROW);
+        let is_constant = B::HAS_CONSTANT_WIDE && !self.lane_flags(i).contains(BxdfFlags::NARROW);
         is_constant.then(|| self.lane_f(i, Vec3::Z)[0])
     }
 
@@ -335,7 +335,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline]
     pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
-        let (shown, flags) = (LobeFactors::get(&self.shown, i), self.flags(i));
+        let (shown, flags) = (ShownLobeFactors::get(&self.shown, i), self.lane_flags(i));
         let (mut f, mut all) = (Vec3::splat(shown.unit), Vec3::ZERO);
         if flags.contains(BxdfFlags::WIDE) {
             let wide = bsdf.wide_lobe_value(&view, wi, self.any).f;

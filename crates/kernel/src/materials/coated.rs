@@ -35,7 +35,7 @@ impl Coated {
     }
 
     /// All textures of the coat.
-    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+    pub fn coat_textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         self.specular.texture().into_iter()
     }
 }

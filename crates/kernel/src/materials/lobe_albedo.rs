@@ -109,7 +109,7 @@ impl AlbedoTable {
     }
 
     /// A table with a single entry.
-    pub fn from_albedo(albedo: LobeAlbedo) -> Self {
+    pub fn from_single_albedo(albedo: LobeAlbedo) -> Self {
         Self { rows: vec![albedo] }
     }
 
@@ -265,7 +265,7 @@ impl VisibleFacets {
 
     /// A point on the chord at x whose facet reflects light above the surface. `None` if there is no such
     /// point.
-    fn lit_point(&self, x: f64) -> Option<f64> {
+    fn find_any_lit_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
         let heights = parts.map(|part| (part, self.reflected_height(x, part)));
@@ -313,12 +313,12 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
 ) -> f64 {
     let facets = VisibleFacets::new(cosine, alpha);
     // Half of the disk is enough because the integrand is symmetric.
-    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit_point(libm::sin(turn)).is_some());
+    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.find_any_lit_point(libm::sin(turn)).is_some());
     let along = quadrature_dense_at_ends(ALONG);
     let mut sum = 0.0;
     for (turn, by_turn) in quadrature_dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
-        let Some(lit) = facets.lit_point(x) else { continue };
+        let Some(lit) = facets.find_any_lit_point(x) else { continue };
         let [from, to] = facets.lit_interval(x, lit);
         for &(part, by_part) in &along {
             let [between, mirrored] = facets.reflection_cosines(x, chord * (from + (to - from) * part));

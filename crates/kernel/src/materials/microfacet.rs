@@ -85,7 +85,7 @@ impl HalfVector {
 
     /// Cosine between the half vector and either direction of a reflection.
     #[inline(always)]
-    pub fn cosine(&self) -> f32 {
+    pub fn cosine_to_either_direction(&self) -> f32 {
         0.5 * self.squared.sqrt()
     }
 

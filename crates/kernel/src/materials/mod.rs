@@ -94,7 +94,7 @@ impl Material {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),
             Bsdf::Mirror(mirror) => mirror.textures().collect(),
-            Bsdf::Coated(coated) => coated.textures().chain(coated.base.textures()).collect(),
+            Bsdf::Coated(coated) => coated.coat_textures().chain(coated.base.textures()).collect(),
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
             Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
         };

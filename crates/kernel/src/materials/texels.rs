@@ -49,7 +49,7 @@ impl Texels {
             TexelData::Linear8(bytes) => unit_color_from_bytes(bytes[place]),
             TexelData::Float(floats) => floats[place],
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
-                self.unpremultiplied_texel(place)
+                self.unpremultiplied_color(place)
             }
         }
     }
@@ -65,7 +65,7 @@ impl Texels {
 
     /// Linear color at a texel index, not premultiplied by alpha.
     #[cold]
-    fn unpremultiplied_texel(&self, place: usize) -> Vec3 {
+    fn unpremultiplied_color(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::SrgbAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
@@ -105,7 +105,7 @@ impl Texels {
 
     /// Linear values at several texel indices.
     #[inline(always)]
-    pub fn gather<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
+    pub fn linear_colors_at_indices<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
         let mut values = [Vec3::ZERO; N];
         self.for_each_decoded_texel(places, |i, value| values[i] = value);
         values
@@ -114,7 +114,7 @@ impl Texels {
     /// Linear values at packets of texel indices. Writes them in place because compilers handle large return
     /// values poorly.
     #[inline(always)]
-    pub fn gather_packets(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
+    pub fn write_color_packets_at_indices(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
         for (places, values) in places.iter().zip(values) {
             self.for_each_decoded_texel(places, |i, value| set_lane(values, i, value));
         }
@@ -144,7 +144,7 @@ impl Texels {
             }
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
                 for i in 0..N {
-                    put(i, self.unpremultiplied_texel(places[i]));
+                    put(i, self.unpremultiplied_color(places[i]));
                 }
             }
         }

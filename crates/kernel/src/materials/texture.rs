@@ -252,7 +252,7 @@ impl Texture {
 
     /// Converts slopes in the image to slopes along the texture's own coordinates. [`Wrap::Mirror`] may flip
     /// them.
-    pub fn unmirrored_slopes(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
+    pub fn flip_slopes_in_mirrored_tiles(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
         if self.wrap != Wrap::Mirror {
             return slopes;
         }
@@ -282,8 +282,8 @@ impl Texture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
-            None => self.lookup_repeated_packet(uv, self.repeat.as_dvec2()),
-            Some(moved) => self.lookup_transformed_packet(moved, uv),
+            None => self.lookup_packet_at_scaled_uv(uv, self.repeat.as_dvec2()),
+            Some(moved) => self.transform_and_lookup_packet(moved, uv),
         };
         if let Some(factor) = self.factor {
             let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
@@ -297,13 +297,13 @@ impl Texture {
     /// [`Texture::lookup_packet`] for textures that have a transform.
     #[cold]
     #[inline(never)]
-    fn lookup_transformed_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.lookup_repeated_packet(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
+    fn transform_and_lookup_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
+        self.lookup_packet_at_scaled_uv(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn lookup_repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [self.wrap.fold_packet(&uv[0], repeat.x), self.wrap.fold_packet(&uv[1], repeat.y)];
         let extent = integer_size(texels);
@@ -333,7 +333,7 @@ impl Texture {
             around[3] = texel_indices(&right, &upper, extent);
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        texels.gather_packets(&around[..count], &mut corners);
+        texels.write_color_packets_at_indices(&around[..count], &mut corners);
         if count == 1 {
             return corners[0];
         }
@@ -395,7 +395,7 @@ impl Texture {
             return self.bilinear(&self.texels, folded);
         };
         if self.texels.has_alpha() {
-            let [near, far] = [near, far].map(|texels| self.bilinear_premultiplied(texels, folded));
+            let [near, far] = [near, far].map(|texels| self.bilinear_premultiplied_rgba(texels, folded));
             return unpremultiply(near.lerp(far, part));
         }
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
@@ -448,7 +448,7 @@ impl Texture {
     /// Interpolates premultiplied texels and their alpha bilinearly.
     #[cold]
     #[inline(never)]
-    fn bilinear_premultiplied(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
+    fn bilinear_premultiplied_rgba(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
         let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
         let corners = places.map(|place| texels.premultiplied_texel(place));
         corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
@@ -456,10 +456,10 @@ impl Texture {
 
     fn bilinear(&self, texels: &Texels, folded: [f32; 2]) -> Vec3 {
         if texels.has_alpha() {
-            return unpremultiply(self.bilinear_premultiplied(texels, folded));
+            return unpremultiply(self.bilinear_premultiplied_rgba(texels, folded));
         }
         let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
-        let corners = texels.gather(&places);
+        let corners = texels.linear_colors_at_indices(&places);
         let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
         lower.lerp(upper, fy)
     }

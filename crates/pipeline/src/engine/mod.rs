@@ -22,7 +22,7 @@ pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
 use self::outcome::Outcome;
 pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
-use self::own::{SavedSceneImage, saved_scene_plan, texture_needs};
+use self::own::{SavedSceneImage, combined_texture_needs, saved_scene_plan};
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{Memo, NamedCache};
@@ -50,15 +50,17 @@ use super::stages::coplanar::warn_about_coplanar_lights;
 use super::stages::glass::find_glass_solids;
 use super::stages::lights::{SkyMemo, collect_lights};
 use super::stages::meshes::{CachedMesh, MeshName, Meshes, load_meshes};
-use super::stages::parse::{ParsedScene, SceneSource, parse};
+use super::stages::parse::{ParsedScene, SceneParseRequest, parse};
 use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, trace_first_photons};
 use super::stages::render::render;
 use super::stages::textures::{
-    NeededTextures, TextureCache, Textures, add_unused_textures, find_needed_textures, load_textures,
+    NeededTextures, TextureCache, Textures, add_check_only_textures, find_needed_textures, load_textures,
 };
-use super::stages::write::{Destination, TurntableFrames, WrittenImages, check_targets, write_on_request};
+use super::stages::write::{
+    ImageWriteContext, TurntableFrames, WrittenImages, check_targets, write_on_request,
+};
 use super::stages::{FileReadContext, Findings, StageResult, StopReason};
-use super::stopwatch::Stopwatch;
+use super::stopwatch::PauseExcludingStopwatch;
 use super::table::StageRunner;
 use super::targets::conflicts;
 use super::trace::{TileKernel, Tracer};
@@ -296,7 +298,7 @@ impl Engine {
         context: &RequestContext<'_>,
         findings: &mut Findings,
     ) -> Result<Report, StopReason> {
-        let watch = Stopwatch::start(context.token);
+        let watch = PauseExcludingStopwatch::start(context.token);
         let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: false };
         // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
@@ -460,7 +462,7 @@ impl Engine {
         // does not depend on the scene.
         let pool = self.thread_pool(thread_count(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
-            let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
+            let origin = SceneParseRequest { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
         })?;
         let text = parsed.loaded.source.shared_file_text();
@@ -497,11 +499,12 @@ impl Engine {
         let reading =
             FileReadContext { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
-        let lookups = texture_needs(&plan, own_image_plan.as_ref());
+        let lookups = combined_texture_needs(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) =
             self.load_assets(&parsed, lookups, findings, table, &reading)?;
         verify_files_unchanged(contents, token)?;
-        let estimate = MemoryEstimate::for_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
+        let estimate =
+            MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
         self.check_memory(&estimate, request, (&plan, own_image_plan.as_ref()))?;
         self.inputs = collect_protected_inputs(&parsed, &meshes, findings);
         self.check_conflicts(request, &plan, findings, table.sink)?;
@@ -540,7 +543,7 @@ impl Engine {
         let parts = (built, lights, Arc::clone(bodies));
         let world = build_or_reuse_world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
-        let film = keys::film_key(world.0, &plan.settings, plan.crop);
+        let film = keys::film_sums_key(world.0, &plan.settings, plan.crop);
         let camera = own::saved_scene_overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
         let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).rotated_for_turntable(own.turn);
@@ -607,13 +610,19 @@ impl Engine {
         let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
-        let watch = Stopwatch::start(context.token);
+        let watch = PauseExcludingStopwatch::start(context.token);
         // Borrow the state that the stage modifies separately from the state that it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
         let is_own = request.own.is_none();
-        let to =
-            Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, is_own, sink };
+        let to = ImageWriteContext {
+            plan,
+            layers: &[],
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own,
+            sink,
+        };
         let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
                 context.report_postponed_write(sink);
@@ -715,7 +724,7 @@ impl Engine {
         let mut findings = Findings::default();
         let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
             let containers = GltfContainers::default();
-            let origin = SceneSource { path, sets, show: ModelView::default() };
+            let origin = SceneParseRequest { path, sets, show: ModelView::default() };
             let pool = engine.thread_pool_for(core_count(), false)?;
             let read = || parse(origin, (contents, &containers), &mut engine.parsed, findings, token);
             let parsed = pool.install(read)?.value;
@@ -723,7 +732,7 @@ impl Engine {
             let loaded = &parsed.loaded;
             let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
             let mut wanted = find_needed_textures(loaded, &found, TextureNeeds::ALL, &engine.textures);
-            add_unused_textures(loaded, &mut wanted.textures);
+            add_check_only_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
             verify_files_unchanged(contents, token)?;

@@ -6,7 +6,7 @@ use super::super::protocol::{ImageReport, Report, Request, WriteMode, reasons};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::EventSink;
-use super::super::stages::write::{Destination, write_animation, write_if_wanted, write_on_request};
+use super::super::stages::write::{ImageWriteContext, write_animation, write_if_wanted, write_on_request};
 use super::super::stages::{Findings, StageResult, StopReason};
 use super::super::targets::conflicts;
 use super::Engine;
@@ -48,7 +48,7 @@ impl Engine {
             );
             return sink.send_write_failed(None, message);
         }
-        let to = Destination {
+        let to = ImageWriteContext {
             plan,
             layers: &self.layers,
             inputs: &self.inputs,
@@ -141,7 +141,7 @@ impl Engine {
         let Some(state) = self.films.current() else {
             return Err(StopReason::work_failure("the film is missing"));
         };
-        let to = Destination {
+        let to = ImageWriteContext {
             plan,
             layers: &self.layers,
             inputs: &self.inputs,

@@ -21,7 +21,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::parse::ParsedScene;
-use crate::stages::write::{Destination, develop_settings, write_if_wanted};
+use crate::stages::write::{ImageWriteContext, develop_settings, write_if_wanted};
 use crate::stages::{StageResult, StopReason};
 use crate::watch::content::FileRead;
 use crate::world::TextureNeeds;
@@ -52,7 +52,7 @@ impl SavedSceneImage {
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
         let world = keys::world_key(surfaces, &eye.camera, &of);
-        let film = keys::film_key(world, &plan.settings, plan.crop);
+        let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = written_image_key(film, &plan);
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
@@ -68,12 +68,12 @@ impl SavedSceneImage {
 /// Returns the key for a finished image and its output files.
 fn written_image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     let mut key = FingerprintHasher::new("own image");
-    key.add_fingerprint(&keys::image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
+    key.add_fingerprint(&keys::developed_image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
         key.add_choice(*layer);
     });
     plan.outputs.iter().for_each(|path| {
-        key.add_path(path);
+        key.add_path_bytes(path);
     });
     key.finish()
 }
@@ -120,7 +120,7 @@ impl Engine {
         (plan, own_image_plan): (&RenderPlan, Option<&RenderPlan>),
     ) -> u64 {
         let (Some(own), Some(own_image_plan)) = (&self.own, own_image_plan) else { return 0 };
-        let of = |plan: &RenderPlan| keys::film_key(own.film, &plan.settings, plan.crop);
+        let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
         let is_shared = of(plan) == of(own_image_plan)
             && request.overrides.camera == saved_scene_overrides(request).camera;
         let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
@@ -185,7 +185,7 @@ impl Engine {
         if state.key != own.film || !is_simple || !state.is_finished(&own.plan) {
             return only_shown();
         }
-        let to = Destination {
+        let to = ImageWriteContext {
             plan: &own.plan,
             layers: &[],
             inputs: &self.inputs,
@@ -273,7 +273,7 @@ pub(super) fn saved_scene_plan(
 
 /// Returns the textures that a request needs. These include the textures for the scene's own image, because
 /// its film key depends on them.
-pub(super) fn texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> TextureNeeds {
+pub(super) fn combined_texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> TextureNeeds {
     let shown = plan.settings.texture_needs();
     own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::outputs::remove_outdated_report;
-use super::own::{saved_scene_plan, texture_needs};
+use super::own::{combined_texture_needs, saved_scene_plan};
 use super::{Engine, RequestContext};
 use crate::control::Cancelled;
 use crate::memory::MemoryEstimate;
@@ -37,7 +37,7 @@ pub(super) struct LastValidScene {
 
 impl LastValidScene {
     /// Whether a file other than the scene file has changed since it was read.
-    fn have_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
+    fn have_asset_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
         let loaded = &self.parsed.loaded;
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
         for FileRead { path, content } in &self.files {
@@ -92,10 +92,10 @@ impl Engine {
         let token = context.token;
         let reading =
             FileReadContext { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
-        let lookups = texture_needs(&plan, own.as_ref());
+        let lookups = combined_texture_needs(&plan, own.as_ref());
         let Some(good) = self.load_missing_textures(good, lookups, &reading)? else { return Ok(None) };
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
-        let estimate = MemoryEstimate::for_scene(&plan, &plan.scene, meshes, texture_bytes);
+        let estimate = MemoryEstimate::for_image_and_scene(&plan, &plan.scene, meshes, texture_bytes);
         self.check_memory(&estimate, &request, (&plan, own.as_ref()))?;
         // Prepare the scene, reusing unchanged values.
         let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: true };
@@ -131,7 +131,7 @@ impl Engine {
         if needed.textures.iter().all(is_there) {
             return Ok(Some(good));
         }
-        if good.have_files_changed(reading)? {
+        if good.have_asset_files_changed(reading)? {
             return Ok(None);
         }
         let mut findings = Findings::default();

@@ -54,7 +54,7 @@ pub(super) fn frame_model(
     // Move the camera back until every point is inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
-    for back in TurntableFrame::camera_offsets(turns.min(MAX_MEASURED), back, up) {
+    for back in TurntableFrame::target_to_camera_vectors(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);
         let above = back.cross(right);
         for point in points {
@@ -85,7 +85,7 @@ const ELEVATION: f64 = 50.0;
 const ASIDE: f64 = 40.0;
 
 /// Direction in which the key light travels. The light comes from above the viewer's left shoulder.
-pub(super) fn key_light_direction(eye: &CameraPose) -> DVec3 {
+pub(super) fn key_light_travel_direction(eye: &CameraPose) -> DVec3 {
     let back = eye.position - eye.look_at;
     // For views from directly above or below, use the front direction instead.
     let flat = DVec3::new(back.x, 0.0, back.z);
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn ground_is_as_bright_as_the_sky() {
         let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (ViewSide::Iso, 1), 1.0);
-        let direction = key_light_direction(&eye).normalize();
+        let direction = key_light_travel_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");

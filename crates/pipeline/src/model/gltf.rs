@@ -123,7 +123,7 @@ impl SceneWriter<'_> {
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
             true => Lighting::Default { is_polished: scene.materials.iter().any(may_cast_caustics) },
-            false => Lighting::from_file_lights(max_irradiance(&scene.lights, bounds)),
+            false => Lighting::from_file_light_irradiance(max_irradiance(&scene.lights, bounds)),
         };
         write_render_settings(&mut self.toml, size, lighting);
         let eye = match own {
@@ -150,7 +150,7 @@ impl SceneWriter<'_> {
         scene.lights.iter().for_each(|light| self.write_light(light));
         // Write the materials, then the meshes that use them.
         let mut names = UniqueNames::default();
-        let materials = MaterialWriter::write(scene, &mut names, self);
+        let materials = MaterialWriter::write_all_and_return_names(scene, &mut names, self);
         let mut shapes = UniqueNames::default();
         for instance in &scene.instances {
             self.write_mesh(instance, &materials[instance.material], &mut shapes);

@@ -59,7 +59,7 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
                 ExportSource::Image(image) => {
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
                     // arbitrary files as images.
-                    container.check_image(image, token)?;
+                    container.check_image_decodes(image, token)?;
                     container.read_image_bytes(image, token)?
                 }
             };

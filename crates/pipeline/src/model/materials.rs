@@ -50,7 +50,11 @@ pub(super) struct MaterialWriter<'a, F> {
 
 impl<F: SceneExport> MaterialWriter<'_, F> {
     /// Writes the tables and returns the material names.
-    pub(super) fn write(scene: &ModelScene, names: &mut UniqueNames, files: &mut F) -> Vec<String> {
+    pub(super) fn write_all_and_return_names(
+        scene: &ModelScene,
+        names: &mut UniqueNames,
+        files: &mut F,
+    ) -> Vec<String> {
         let mut all = MaterialWriter { files, textures: HashMap::new(), names: UniqueNames::default() };
         scene
             .materials

@@ -11,7 +11,7 @@ mod toml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_direction};
+use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_travel_direction};
 use self::gltf::{ExportStorage, ExportedFile};
 use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
 use super::settings::{Overrides, UpAxis, ViewSide};
@@ -153,7 +153,7 @@ enum Lighting {
 
 impl Lighting {
     /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
-    fn from_file_lights(irradiance: f64) -> Self {
+    fn from_file_light_irradiance(irradiance: f64) -> Self {
         // At this irradiance, a white surface is as bright as under the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
@@ -209,7 +209,7 @@ fn write_lights(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     if matches!(light, Lighting::Default { .. }) {
         toml.table("[[light]]");
         toml.key("type", "\"directional\"");
-        toml.key("direction", format_vector(key_light_direction(eye)));
+        toml.key("direction", format_vector(key_light_travel_direction(eye)));
         toml.key("irradiance", format_number(KEY));
         toml.key("angle", "6");
     }

@@ -137,7 +137,7 @@ pub(super) fn scene_text(
     }
     // STL has no vertex normals, and mechanical parts have sharp edges.
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
-    if is_stl || loaded.is_faceted() {
+    if is_stl || loaded.is_faceted_without_normals() {
         toml.key("smooth", "false");
     }
     if needs_material {
@@ -151,7 +151,7 @@ pub(super) fn scene_text(
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
     notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
-    containers.store_mesh(path, loaded);
+    containers.store_mesh_for_next_load(path, loaded);
     Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })
 }
 

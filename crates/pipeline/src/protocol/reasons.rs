@@ -43,6 +43,6 @@ pub const OTHER_IMAGE_WRITTEN: &str = "w wrote another image";
 pub const RESUMED: &str = "resumed after ";
 
 /// Returns the reason for a render that continued from `samples` samples per pixel.
-pub fn resume_reason(samples: u32) -> String {
+pub fn continued_from_samples_reason(samples: u32) -> String {
     format!("{RESUMED}{samples} samples")
 }

@@ -100,12 +100,12 @@ impl FilmState {
         )?
         .with_convergence(convergence)
         .with_sum_order(blocks)?;
-        let film_cells = film.cell_count();
+        let film_cells = film.noise_cell_count();
         let goals = SampleGoals::undecided(film_cells);
         let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));
         let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
         let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
-        let done = (0..film.cell_count()).map(none).collect();
+        let done = (0..film.noise_cell_count()).map(none).collect();
         Ok(Self {
             key,
             number: 0,
@@ -220,7 +220,7 @@ impl FilmState {
     fn assigned_cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
         halves.filter(|(cell, half)| {
-            self.is_tile_in_shard(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0
+            self.is_tile_in_shard(cell / CELLS) && self.film.cell_half_pixel_count(*cell, *half) > 0
         })
     }
 
@@ -254,7 +254,7 @@ impl FilmState {
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
             let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
-            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(uniform_sample_range(&cells)) {
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common_sample_range(&cells)) {
                 jobs.push(job(rect.into(), samples));
                 continue;
             }
@@ -332,16 +332,16 @@ impl FilmState {
         for cell in (0..self.done.len()).filter(is_there) {
             let lacks = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
-                let pixels = self.film.half_pixel_count(cell, half) as f64;
+                let pixels = self.film.cell_half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
-                self.pixel_share.equivalent_samples(samples, pixels * f64::from(jobs(done, end)))
+                self.pixel_share.samples_including_overhead(samples, pixels * f64::from(jobs(done, end)))
             };
             let (lacking, cost) = (lacks(0) + lacks(1), &self.costs[cell]);
             if cost.is_unknown() {
                 others += lacking;
                 continue;
             }
-            let of_cell = cost.equivalent_samples(self.pixel_share);
+            let of_cell = cost.samples_including_overhead(self.pixel_share);
             seconds += lacking * cost.seconds() / of_cell;
             known += cost.seconds();
             worth += of_cell;
@@ -374,14 +374,14 @@ impl FilmState {
 
     fn sum_pixel_samples(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
         let units = |(cell, half): (usize, usize)| {
-            self.film.half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
+            self.film.cell_half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
         self.assigned_cell_halves().map(units).sum()
     }
 }
 
 /// Returns the sample range that all halves of all cells need, if it is the same for all of them.
-fn uniform_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+fn common_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }
@@ -396,7 +396,7 @@ mod tests {
     /// Creates a film with two tiles.
     fn state() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
-        let cells = film.cell_count();
+        let cells = film.noise_cell_count();
         FilmState {
             key: FingerprintHasher::new("test").finish(),
             number: 0,

@@ -68,7 +68,7 @@ impl<'a> CoarseImageRenderer<'a> {
         let tracer = Tracer { settings: &settings, photons, ..self.tracer };
         let mut picture = RadianceImage::black(width, height);
         let begin = Instant::now();
-        tracer.run(
+        tracer.run_all_jobs_in_parallel(
             &split_into_jobs(rect),
             |_, piece| piece,
             |result| {

@@ -115,7 +115,7 @@ fn render_view(
         true => Convergence::Photons,
         false => Convergence::Stratified,
     };
-    let key = keys::film_key(
+    let key = keys::film_sums_key(
         FingerprintHasher::new("layer").add_fingerprint(&picture.key).finish(),
         &plan.settings,
         plan.crop,

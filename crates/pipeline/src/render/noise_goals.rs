@@ -80,7 +80,7 @@ impl SampleGoals {
             |tile: usize| self.judged[tile] < samples && self.has_undecided_half(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
-            self.decide_from_noise(&noise, done, samples, &aim);
+            self.decide_all_goals_from_noise(&noise, done, samples, &aim);
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
             judged.for_each(|(judged, _)| *judged = samples);
         }
@@ -121,7 +121,7 @@ impl SampleGoals {
         halves.any(|(goal, done)| goal > done && *done < LEAST)
     }
 
-    fn decide_from_noise(
+    fn decide_all_goals_from_noise(
         &mut self,
         noise: &[Option<TileNoise>],
         done: &[[u32; 2]],

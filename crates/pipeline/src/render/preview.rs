@@ -37,7 +37,7 @@ impl PreviewTarget<'_> {
     /// because it uses the thread pool.
     pub(crate) fn show(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
-        if self.send_section(state, true) {
+        if self.send_section_if_requested(state, true) {
             return;
         }
         while !pool.install(|| update_previewer(state, self.plan.settings.view.quantity(), size)) {
@@ -52,11 +52,11 @@ impl PreviewTarget<'_> {
     /// was completed and sent.
     pub(crate) fn update_briefly(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.size() else { return false };
-        if self.send_section(state, false) {
+        if self.send_section_if_requested(state, false) {
             return true;
         }
         update_previewer(state, self.plan.settings.view.quantity(), size);
-        let is_whole = state.previewer.as_ref().is_some_and(Previewer::covers_all_tiles);
+        let is_whole = state.previewer.as_ref().is_some_and(Previewer::has_processed_all_tiles);
         if is_whole {
             self.send_current(state, false);
         }
@@ -73,13 +73,13 @@ impl PreviewTarget<'_> {
     }
 
     /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
-    fn send_section(&self, state: &FilmState, has_time: bool) -> bool {
+    fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
         let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
-        let image = state.film.cropped_image(quantity, rect, base);
+        let image = state.film.image_in_rect(quantity, rect, base);
         self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
         true
     }
@@ -99,7 +99,7 @@ impl PreviewTarget<'_> {
     ) {
         let range = tone.range_map.range().map(|range| range.limits());
         let source = PreviewSource {
-            image: keys::image_key(state.key, self.plan, state.number),
+            image: keys::developed_image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };
         self.sink.send_preview(tone_map_to_8_bits(image, tone), range, section, source);

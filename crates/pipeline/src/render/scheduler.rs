@@ -23,7 +23,7 @@ use crate::sink::EventSink;
 use crate::stages::StopReason;
 use crate::stages::photons::{PhotonContext, PhotonStore};
 use crate::stopwatch::PausableClock;
-use crate::trace::{TileJob, Tracer, next_pass_samples};
+use crate::trace::{TileJob, Tracer, samples_after_next_pass};
 
 /// Minimum time between two progress reports.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
@@ -193,7 +193,7 @@ impl<'a> Scheduler<'a> {
         let jobs: Vec<TileJob> = (0..pilot.count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
         let keep = |_: &TileJob, samples: TileSamples| BrightnessPrepass::pixel_luminance(samples);
-        self.rendering.tracer.run(&jobs, keep, |result| {
+        self.rendering.tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;
                 self.rays += cost.rays;
@@ -227,7 +227,7 @@ impl<'a> Scheduler<'a> {
             }
             let pixels = self.state.film.crop().area();
             let target =
-                next_pass_samples(self.state.min_unfinished_samples_in(part, samples), samples, pixels);
+                samples_after_next_pass(self.state.min_unfinished_samples_in(part, samples), samples, pixels);
             self.run_pass(part, target)?;
             if target.is_power_of_two() {
                 self.measure_noise_if_due();
@@ -339,7 +339,7 @@ impl<'a> Scheduler<'a> {
             }
             film.add_samples(job.tile, &samples);
         };
-        tracer.run(&jobs, keep, |result| {
+        tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
                 self.units += self.state.record_job(job, &cost);
                 self.rays += cost.rays;

@@ -88,8 +88,10 @@ fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
         let errors = [0, 1].map(|half| film.cell_half_error(cell, half, known));
-        let units: f64 =
-            [0, 1].map(|half| film.half_pixel_count(cell, half) as f64 * f64::from(done[half])).iter().sum();
+        let units: f64 = [0, 1]
+            .map(|half| film.cell_half_pixel_count(cell, half) as f64 * f64::from(done[half]))
+            .iter()
+            .sum();
         let cost = BESIDE + rays[cell] as f64 / units;
         for half in 0..2 {
             // A one-pixel cell has no second half.
@@ -97,7 +99,7 @@ fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32
             let error = error * libm::pow(f64::from(known), power);
             let samples = done[half];
             let goal = samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX).min(most);
-            let pixels = film.half_pixel_count(cell, half) as f64;
+            let pixels = film.cell_half_pixel_count(cell, half) as f64;
             halves.push(HalfCell {
                 cell,
                 half,
@@ -135,7 +137,7 @@ mod tests {
     fn film(spreads: &[[f32; 2]], samples: u32) -> (Film, Vec<[u32; 2]>) {
         let film = Film::new(SIDE * spreads.len() as u32, SIDE, None).expect("a film");
         let mut next = unit_generator(7);
-        let mut done = vec![[u32::MAX; 2]; film.cell_count()];
+        let mut done = vec![[u32::MAX; 2]; film.noise_cell_count()];
         for (cell, spreads) in cells(&film).into_iter().zip(spreads) {
             done[cell] = [samples; 2];
             for half in 0..2 {
@@ -147,7 +149,7 @@ mod tests {
 
     /// Returns the cells that have pixels, from left to right.
     fn cells(film: &Film) -> Vec<usize> {
-        (0..film.cell_count()).filter(|cell| film.cell_rect(*cell).is_some()).collect()
+        (0..film.noise_cell_count()).filter(|cell| film.cell_rect(*cell).is_some()).collect()
     }
 
     /// Returns the goals for the next round, for the film's cells from left to right.
@@ -220,7 +222,7 @@ mod tests {
             left = if is_bright { gap() } else { left - 1 };
             if is_bright { 500.0 } else { 0.0 }
         };
-        let mut done = vec![[u32::MAX; 2]; film.cell_count()];
+        let mut done = vec![[u32::MAX; 2]; film.noise_cell_count()];
         let places: Vec<_> = cells(&film).into_iter().flat_map(|cell| [(cell, 0), (cell, 1)]).collect();
         for &(cell, half) in &places {
             add(&film, (cell, half), 16, &mut sample);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{ImageReport, LightSelectionMode, LightsReport, PhotonsReport, Report, WorkCounters};
+use super::{ImageReport, LightsReport, PhotonsReport, Report, SampledLightSet, WorkCounters};
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::ProtectedInputs;
@@ -112,15 +112,15 @@ fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
     let selection = lights.sampler(light_sampling_purpose(settings, are_gathered));
     let (sampled, picks) = match selection {
-        Some(selection) => (LightSelectionMode::Picked, samples * u64::from(selection.picks.count)),
-        None => (LightSelectionMode::All, 0),
+        Some(selection) => (SampledLightSet::Picked, samples * u64::from(selection.picks.count)),
+        None => (SampledLightSet::All, 0),
     };
     LightsReport {
         count: lights.len() as u64,
         sampled,
         picks,
         tree_nodes: selection.map_or(0, |selection| selection.tree.node_count()) as u64,
-        memory_bytes: lights.memory_bytes() as u64,
+        memory_bytes: lights.tree_memory_bytes() as u64,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::protocol::Stage;
 
 /// Keys shared by reports of all versions. No other JSON file is expected to contain all of them.
 #[derive(Deserialize)]
-pub(crate) struct ReportSignature {
+pub(crate) struct ReportRecognitionFields {
     #[serde(rename = "glimt")]
     _version: String,
     #[serde(rename = "scene")]
@@ -16,7 +16,7 @@ pub(crate) struct ReportSignature {
     _image: IgnoredAny,
     #[serde(rename = "settings")]
     _settings: IgnoredAny,
-    stages: Vec<StageSignature>,
+    stages: Vec<StageRecognitionFields>,
     #[serde(rename = "counters")]
     _counters: IgnoredAny,
     #[serde(rename = "seconds")]
@@ -26,11 +26,11 @@ pub(crate) struct ReportSignature {
 }
 
 #[derive(Deserialize)]
-struct StageSignature {
+struct StageRecognitionFields {
     name: String,
 }
 
-impl ReportSignature {
+impl ReportRecognitionFields {
     /// Whether the report contains all render stages.
     pub(crate) fn have_all_stages(&self) -> bool {
         self.stages.iter().map(|stage| stage.name.as_str()).eq(Stage::ALL.map(Stage::name))

@@ -15,7 +15,7 @@ use crate::assets::{AssetError, Companion, DroppedFaces, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::scene::{LoadedScene, MeshBounds};
+use crate::scene::{LoadedScene, MeshBoundingBox};
 
 /// A mesh file and the other files that it references.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub(crate) struct CachedMesh {
     pub(crate) key: Fingerprint,
     companions: Vec<FileRead>,
     /// Bounds of the mesh, computed on demand.
-    bounds: OnceLock<MeshBounds>,
+    bounds: OnceLock<MeshBoundingBox>,
 }
 
 impl CachedMesh {
@@ -33,7 +33,7 @@ impl CachedMesh {
         Self { mesh, key, companions, bounds: OnceLock::new() }
     }
 
-    fn bounds(&self) -> MeshBounds {
+    fn bounds(&self) -> MeshBoundingBox {
         *self.bounds.get_or_init(|| self.mesh.mesh.bounds())
     }
 }
@@ -219,7 +219,7 @@ fn load_one(
             let mut key = FingerprintHasher::new("mesh");
             key.add_fingerprint(&file_key(file, content));
             for file in &companions {
-                file.content.add_to_fingerprint(key.add_path(&file.path));
+                file.content.add_to_fingerprint(key.add_path_bytes(&file.path));
             }
             Ok((Arc::new(CachedMesh::new(Arc::new(mesh), key.finish(), companions)), false))
         }
@@ -259,7 +259,7 @@ fn read_current_contents(
 fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
     let mut key = FingerprintHasher::new("file");
     content.add_to_fingerprint(
-        key.add_path(&file.value).add_index(file.part.map_or(0, |part| part as usize + 1)),
+        key.add_path_bytes(&file.value).add_usize(file.part.map_or(0, |part| part as usize + 1)),
     );
     key.finish()
 }

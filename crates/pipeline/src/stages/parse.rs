@@ -39,7 +39,7 @@ pub(crate) struct ParsedScene {
 
 /// The scene to parse: its path, the overrides and, for a model, the view.
 #[derive(Clone, Copy)]
-pub(crate) struct SceneSource<'a> {
+pub(crate) struct SceneParseRequest<'a> {
     /// Path of a scene file or model.
     pub(crate) path: &'a Path,
     /// Scene key overrides from the command line.
@@ -50,7 +50,7 @@ pub(crate) struct SceneSource<'a> {
 
 /// Generates a scene for a model. Also returns all other files that the generated scene depends on.
 fn generate_model_scene(
-    SceneSource { path, sets, show }: SceneSource<'_>,
+    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
     (contents, containers): (&Snapshot, &GltfContainers),
     findings: &mut Findings,
     token: &CancelToken,
@@ -95,19 +95,19 @@ fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnost
 /// # Errors
 /// Returns all errors in the scene file.
 pub(crate) fn parse(
-    origin: SceneSource<'_>,
+    origin: SceneParseRequest<'_>,
     (contents, containers): (&Snapshot, &GltfContainers),
     memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<StageResult<Arc<ParsedScene>>, StopReason> {
-    let SceneSource { path, show, .. } = origin;
+    let SceneParseRequest { path, show, .. } = origin;
     if let BackupRecovery::Differs(held) = held::recover_backup(path) {
         let help =
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
         findings.warnings.push(Diagnostic {
             help,
-            ..file_diagnostic(path, Severity::Warning, held::backup_warning(&held))
+            ..file_diagnostic(path, Severity::Warning, held::backup_differs_warning(&held))
         });
     }
     let content = contents.read_content_id(path, token)?;
@@ -144,7 +144,8 @@ pub(crate) fn parse(
     };
     findings.replace_read_file(FileRead { path: path.to_owned(), content });
     companions.iter().for_each(|file| findings.add_file(file.clone()));
-    let (orbiter, orbiter_content) = read_orbiter(&loaded, known.as_deref(), contents, findings, token)?;
+    let (orbiter, orbiter_content) =
+        read_orbiter_camera_file(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(StageResult::reused(parsed, reasons::UNCHANGED));
@@ -159,16 +160,16 @@ pub(crate) fn parse(
 }
 
 /// A scene, its file's content, the other files it depends on, and the approximations made.
-type SceneReadResult = (Arc<scene::LoadedScene>, FileContentId, Vec<FileRead>, Vec<Diagnostic>);
+type SceneAndDependencies = (Arc<scene::LoadedScene>, FileContentId, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read_scene(
-    origin: SceneSource<'_>,
+    origin: SceneParseRequest<'_>,
     (contents, containers): (&Snapshot, &GltfContainers),
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<SceneReadResult, StopReason> {
-    let SceneSource { path, sets, .. } = origin;
+) -> Result<SceneAndDependencies, StopReason> {
+    let SceneParseRequest { path, sets, .. } = origin;
     if !is_model(path) {
         let loaded = scene::load(path, sets).map_err(|errors| {
             StopReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
@@ -187,12 +188,12 @@ fn read_scene(
 
 /// Returns the key for a scene whose file has this content.
 fn scene_key(
-    SceneSource { path, sets, show }: SceneSource<'_>,
+    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
     content: FileContentId,
     is_model: bool,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("parse");
-    content.add_to_fingerprint(key.add_path(path));
+    content.add_to_fingerprint(key.add_path_bytes(path));
     sets.iter().for_each(|set| {
         key.add_str(set);
     });
@@ -252,7 +253,7 @@ pub fn companion_files<'a>(
 type OrbiterReadResult = (Option<GkitOrbiterCamera>, Option<FileContentId>);
 
 /// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
-fn read_orbiter(
+fn read_orbiter_camera_file(
     loaded: &scene::LoadedScene,
     known: Option<&ParsedScene>,
     contents: &Snapshot,

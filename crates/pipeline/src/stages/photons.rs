@@ -14,7 +14,7 @@ use super::super::cache::Memo;
 use super::super::plan::RenderPlan;
 use super::super::protocol::{PhotonsReport, reasons};
 use super::super::sink::EventSink;
-use super::super::stopwatch::Stopwatch;
+use super::super::stopwatch::PauseExcludingStopwatch;
 use super::super::trace::TICK;
 use super::{StageResult, StopReason};
 use crate::control::{CancelToken, Cancelled, Progress};
@@ -83,7 +83,7 @@ impl PhotonStore {
     }
 
     /// Average number of seconds needed to trace a pass. 0 if no pass was traced.
-    pub(crate) fn seconds_of_pass(&self) -> f64 {
+    pub(crate) fn mean_seconds_per_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
         if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
@@ -118,7 +118,7 @@ impl PhotonStore {
             return Ok(Arc::clone(pass));
         }
         let PhotonContext { world, plan, pool, token, .. } = sending;
-        let watch = Stopwatch::start(token);
+        let watch = PauseExcludingStopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.without_ineffective_settings();
         let pass = run_with_ticks(pool, tick, || photons.trace_pass(world, &settings, number, token))?;
@@ -223,9 +223,11 @@ pub(crate) fn trace_first_photons(
     }
     before()?;
     let PhotonContext { world, pool, token, .. } = sending;
-    let watch = Stopwatch::start(token);
+    let watch = PauseExcludingStopwatch::start(token);
     let send = |progress: Progress<'_>| {
-        run_with_ticks(pool, &mut tick, || PhotonMapper::new(world, &settings, of_photons, progress, token))
+        run_with_ticks(pool, &mut tick, || {
+            PhotonMapper::new_with_first_pass(world, &settings, of_photons, progress, token)
+        })
     };
     let (photons, first) = sending.sink.load_with_progress("photons", send)?;
     let seconds = watch.seconds();

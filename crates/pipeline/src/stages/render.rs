@@ -26,7 +26,7 @@ pub(crate) fn render(
 ) -> Result<StageResult<RayCounters>, StopReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.make_current(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
+    films.make_current_if_cached(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::emits_photons) {
             true => Convergence::Photons,
@@ -79,6 +79,6 @@ pub(crate) fn render(
             StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }
         (false, 0) => StageResult::done(rays, ""),
-        (false, _) => StageResult::done(rays, reasons::resume_reason(had)),
+        (false, _) => StageResult::done(rays, reasons::continued_from_samples_reason(had)),
     })
 }

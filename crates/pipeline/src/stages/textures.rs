@@ -136,7 +136,7 @@ pub(crate) fn find_needed_textures(
 }
 
 /// An image and all textures that use it.
-struct TextureRequest<'a> {
+struct ImageWithTextures<'a> {
     name: TextureName,
     content: FileContentId,
     /// The image file that the glTF file references.
@@ -320,7 +320,7 @@ fn warn(loaded: &LoadedScene, one: &NeededTexture, message: &str, findings: &mut
 /// Warns about pixels that are negative, not finite or too large.
 fn warn_about_unusable_pixels(
     loaded: &LoadedScene,
-    image: &TextureRequest<'_>,
+    image: &ImageWithTextures<'_>,
     texels: &Texels,
     findings: &mut Findings,
 ) {
@@ -339,7 +339,7 @@ fn warn_about_unusable_pixels(
 /// effect.
 fn warn_about_gray_normal_map(
     loaded: &LoadedScene,
-    image: &TextureRequest<'_>,
+    image: &ImageWithTextures<'_>,
     texels: &Texels,
     findings: &mut Findings,
 ) {
@@ -358,7 +358,7 @@ fn warn_about_gray_normal_map(
 /// Warns about an image used with `channel = "a"` whose alpha is 1 everywhere.
 fn warn_about_opaque_alpha(
     loaded: &LoadedScene,
-    image: &TextureRequest<'_>,
+    image: &ImageWithTextures<'_>,
     texels: &Texels,
     findings: &mut Findings,
 ) {
@@ -377,7 +377,7 @@ fn environment_span(scene: &Scene) -> Option<Range<usize>> {
     scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
 }
 
-impl TextureRequest<'_> {
+impl ImageWithTextures<'_> {
     /// Whether any use needs mipmaps.
     fn needs_mipmaps(&self) -> bool {
         self.asked_by.iter().any(|one| one.has_mipmaps)
@@ -390,13 +390,15 @@ impl TextureRequest<'_> {
     fn key(&self) -> Fingerprint {
         let (path, image, encoding, coverage) = &self.name;
         let mut key = FingerprintHasher::new("texture");
-        key.add_path(path).add_index(encoding.index()).add_index(image.map_or(0, |image| image as usize + 1));
+        key.add_path_bytes(path)
+            .add_usize(encoding.index())
+            .add_usize(image.map_or(0, |image| image as usize + 1));
         if let Some(cutoff) = coverage {
             key.add_f32(cutoff.value());
         }
         self.content.add_to_fingerprint(&mut key);
         if let Some(FileRead { path, content }) = &self.linked {
-            content.add_to_fingerprint(key.add_path(path));
+            content.add_to_fingerprint(key.add_path_bytes(path));
         }
         key.finish()
     }
@@ -407,8 +409,8 @@ fn group_by_image<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
     reading: &FileReadContext<'_>,
-) -> Result<Vec<TextureRequest<'a>>, Cancelled> {
-    let mut images: Vec<TextureRequest<'a>> = Vec::new();
+) -> Result<Vec<ImageWithTextures<'a>>, Cancelled> {
+    let mut images: Vec<ImageWithTextures<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {
         let name = texture_name(&one.source);
@@ -423,7 +425,7 @@ fn group_by_image<'a>(
             Ok(FileRead { path: path.clone(), content })
         });
         let (linked, kept) = (linked.transpose()?, CachedTexture::default());
-        images.push(TextureRequest { name, content, linked, kept, asked_by: vec![one] });
+        images.push(ImageWithTextures { name, content, linked, kept, asked_by: vec![one] });
     }
     for image in &mut images {
         let key = image.key();
@@ -437,11 +439,11 @@ fn group_by_image<'a>(
 
 /// Loads all images. Returns an error for each image that would raise the total size above `most_bytes`.
 fn load_all(
-    images: &[TextureRequest<'_>],
+    images: &[ImageWithTextures<'_>],
     most_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureContentIds, Result<LoadedTexture, AssetError>)> {
-    let size = |image: &TextureRequest<'_>| {
+) -> Vec<(TextureFileContentIds, Result<DecodedTextureWithMipmaps, AssetError>)> {
+    let size = |image: &ImageWithTextures<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
                 (texels.width, texels.height, texels.memory_bytes() as u64)
@@ -459,7 +461,7 @@ fn load_all(
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = memory_limit_errors(&sizes, most_bytes);
-    let load = |(image, over): (&TextureRequest<'_>, Option<String>)| {
+    let load = |(image, over): (&ImageWithTextures<'_>, Option<String>)| {
         let mut contents = (image.content, image.linked.clone());
         let result = match over {
             Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
@@ -491,17 +493,17 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if this is a glTF file, of the image file that it references.
-type TextureContentIds = (FileContentId, Option<FileRead>);
+type TextureFileContentIds = (FileContentId, Option<FileRead>);
 
 /// An image and its mipmaps, and whether both came from the cache.
-type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
+type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
-    image: &TextureRequest<'_>,
-    contents: &mut TextureContentIds,
+    image: &ImageWithTextures<'_>,
+    contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
-) -> Result<LoadedTexture, AssetError> {
+) -> Result<DecodedTextureWithMipmaps, AssetError> {
     let mut was_kept = true;
     let decoded = match &image.kept.texels {
         Some(decoded) => decoded.clone(),
@@ -527,8 +529,8 @@ fn load_one(
 
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
-    image: &TextureRequest<'_>,
-    contents: &mut TextureContentIds,
+    image: &ImageWithTextures<'_>,
+    contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
@@ -589,7 +591,7 @@ fn image_dimensions(
 }
 
 /// Adds textures that only `check` loads: unused textures from the scene file, and a black environment map.
-pub(crate) fn add_unused_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
+pub(crate) fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {

@@ -51,8 +51,9 @@ impl WrittenImages {
         paths: &'a [PathBuf],
         contents: &FileHashCache,
     ) -> Option<&'a Path> {
-        let is_ours =
-            |path: &Path| self.files.get(path).is_some_and(|(_, known)| has_content(path, *known, contents));
+        let is_ours = |path: &Path| {
+            self.files.get(path).is_some_and(|(_, known)| has_content_id(path, *known, contents))
+        };
         let is_there = |path: &Path| path.symlink_metadata().is_ok();
         paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
     }
@@ -65,7 +66,7 @@ impl WrittenImages {
     /// Whether a file on disk contains an image with keyboard changes that the user wrote. It is replaced
     /// only after the scene is saved, or when the user writes another image.
     pub(crate) fn has_user_written_image(&self, contents: &FileHashCache) -> bool {
-        self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content(path, *known, contents))
+        self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content_id(path, *known, contents))
     }
 
     /// Allows the scene's own image to replace any other.
@@ -81,14 +82,14 @@ impl WrittenImages {
 }
 
 /// Whether a file has the given content.
-fn has_content(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
+fn has_content_id(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
     // Use a token that is never cancelled.
     contents.read_content_id(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
 
 /// An image's output files, and files that must not be overwritten.
 #[derive(Clone, Copy)]
-pub(crate) struct Destination<'a> {
+pub(crate) struct ImageWriteContext<'a> {
     pub(crate) plan: &'a RenderPlan,
     /// Image layers for EXR files.
     pub(crate) layers: &'a [LayerImage],
@@ -156,7 +157,7 @@ fn check_each_target(
 pub(crate) fn write_if_wanted(
     writing: WriteMode,
     state: &FilmState,
-    to: Destination<'_>,
+    to: ImageWriteContext<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
 ) -> Result<StageResult<bool>, StopReason> {
@@ -175,12 +176,12 @@ pub(crate) fn write_if_wanted(
 /// Returns [`StopReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
 fn write_outdated_outputs(
     state: &FilmState,
-    to: Destination<'_>,
+    to: ImageWriteContext<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
     is_must: bool,
 ) -> Result<StageResult<bool>, StopReason> {
-    let Destination { plan, contents, is_own, sink, .. } = to;
+    let ImageWriteContext { plan, contents, is_own, sink, .. } = to;
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = SweptFolders::default();
     }
@@ -245,7 +246,11 @@ fn write_outdated_outputs(
 
 /// Writes the image at the user's request, even if the files are up to date. Reports failures as events.
 /// Returns whether all files were written.
-pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenImages) -> bool {
+pub(crate) fn write_on_request(
+    state: &FilmState,
+    to: ImageWriteContext<'_>,
+    written: &mut WrittenImages,
+) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         to.sink.send_write_conflicts(conflicts);
@@ -272,11 +277,11 @@ pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 /// The token is cancelled, or a file could not be written.
 pub(crate) fn write_animation(
     state: &FilmState,
-    to: Destination<'_>,
+    to: ImageWriteContext<'_>,
     (turn, frames): (TurntableFrame, &mut TurntableFrames),
     token: &CancelToken,
 ) -> Result<StageResult<bool>, StopReason> {
-    let Destination { plan, inputs, sink, .. } = to;
+    let ImageWriteContext { plan, inputs, sink, .. } = to;
     let finish = develop_settings(plan);
     let image = finish.extract_image(&state.film);
     frames.0.truncate(turn.number as usize);
@@ -315,7 +320,7 @@ pub(crate) fn write_animation(
 fn write_one(
     image: &RadianceImage,
     state: &FilmState,
-    Destination { plan, layers, inputs, sink, .. }: Destination<'_>,
+    ImageWriteContext { plan, layers, inputs, sink, .. }: ImageWriteContext<'_>,
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
@@ -324,7 +329,8 @@ fn write_one(
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
-    let bytes = finish.encode(&state.film, (image, layers), Format::from_path(path)?, token)?;
+    let bytes =
+        finish.encode_extracted_image(&state.film, (image, layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::for_image(plan, path), Some(sweep));
     write_guarded(plan, inputs, target, sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)
@@ -335,7 +341,7 @@ fn write_one(
 /// Writes the part of the image that was rendered by this process.
 fn write_part(
     state: &FilmState,
-    Destination { plan, inputs, sink, .. }: Destination<'_>,
+    ImageWriteContext { plan, inputs, sink, .. }: ImageWriteContext<'_>,
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
@@ -416,10 +422,10 @@ fn image_file_key(state: &FilmState, plan: &RenderPlan, path: &Path) -> Fingerpr
     let SampleCountStats { min, mean, max } = state.film.sample_count_stats();
     let mut key = FingerprintHasher::new("write");
     key.add_fingerprint(&state.key).add_u64(min.into()).add_f64(mean).add_u64(max.into());
-    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_index(plan.tone.curve as usize);
-    key.add_index(plan.tone.transfer as usize).add_u64(plan.bit_depth.into());
+    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_usize(plan.tone.curve as usize);
+    key.add_usize(plan.tone.transfer as usize).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
         key.add_choice(*layer);
     });
-    key.add_path(path).finish()
+    key.add_path_bytes(path).finish()
 }

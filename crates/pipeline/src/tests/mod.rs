@@ -26,7 +26,7 @@ use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 use crate::settings::Overrides;
 use crate::trace::TileKernel;
-use crate::worker::{Handle, start_with};
+use crate::worker::{Handle, start_with_config};
 
 /// Loads a scene from text, with a default camera.
 pub(crate) fn loaded_of(text: &str) -> LoadedScene {
@@ -107,7 +107,7 @@ impl Bench {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let output = folder.path().join("out.ppm");
         let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
-        let worker = start_with(config).expect("a thread");
+        let worker = start_with_config(config).expect("a thread");
         let bench = Self {
             folder,
             scene: "scene.toml",

@@ -114,7 +114,7 @@ impl WatchedFolders {
     }
 
     /// Renews all watches. If a notification was missed, any watch may be broken.
-    pub(super) fn renew(&mut self) {
+    pub(super) fn renew_all(&mut self) {
         self.unwatch_matching(|_| true);
         self.watch_wanted();
     }

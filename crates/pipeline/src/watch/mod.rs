@@ -273,7 +273,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         } else {
             // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
             // check.
-            self.folders.renew();
+            self.folders.renew_all();
             self.change_tracker.hint(ChangeHint::Touched, now);
             true
         };

@@ -106,7 +106,7 @@ impl WrittenOutputs {
     }
 
     /// Returns the files that no longer have the content written by glimt.
-    pub fn changed_externally(&self, contents: &FileHashCache) -> Vec<(PathBuf, ExternalChange)> {
+    pub fn list_external_changes(&self, contents: &FileHashCache) -> Vec<(PathBuf, ExternalChange)> {
         let found = self.reported_and_current_changes(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
@@ -239,7 +239,7 @@ mod tests {
         fs::write(&path, "of another again").expect("written");
         assert_eq!((look(&contents, 6000), look(&contents, 7000)), (vec![], vec![]), "once");
         assert_eq!(
-            contents.outputs.changed_externally(&contents),
+            contents.outputs.list_external_changes(&contents),
             [(path.clone(), ExternalChange::Replaced)]
         );
         fs::remove_file(&path).expect("removed");
@@ -268,9 +268,9 @@ mod tests {
         write(&contents, &path, "one");
         contents.outputs.begin_write(&path, OverwriteProtection::Parts);
         contents.outputs.end_write(&path, None);
-        assert_eq!(contents.outputs.changed_externally(&contents), []);
+        assert_eq!(contents.outputs.list_external_changes(&contents), []);
         fs::remove_file(&path).expect("removed");
-        assert_eq!(contents.outputs.changed_externally(&contents), [(path, ExternalChange::Removed)]);
+        assert_eq!(contents.outputs.list_external_changes(&contents), [(path, ExternalChange::Removed)]);
         // A file that was never written is not watched.
         let other = folder.path().join("b.png");
         contents.outputs.begin_write(&other, OverwriteProtection::Parts);
@@ -293,7 +293,7 @@ mod tests {
             contents.outputs.begin_write(&path, protection);
             contents.outputs.end_write(&path, None);
             fs::write(&path, "of another").expect("written");
-            assert_eq!(contents.outputs.changed_externally(&contents), [(path.clone(), change)]);
+            assert_eq!(contents.outputs.list_external_changes(&contents), [(path.clone(), change)]);
         }
     }
 }

@@ -144,7 +144,7 @@ impl Fingerprinted for Camera {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::LookAt { position, look_at, up, fov, aperture, focus } => {
-                key.add_index(0)
+                key.add_usize(0)
                     .add_dvec3(*position)
                     .add_dvec3(*look_at)
                     .add_dvec3(*up)
@@ -155,7 +155,7 @@ impl Fingerprinted for Camera {
             // Hash the file's contents rather than its name.
             Self::Orbiter { file: _, fov, aperture, focus } => {
                 // 0 is neither a valid angle nor a valid distance.
-                key.add_index(1).add_f64(*aperture).add_f64(fov.unwrap_or(0.0)).add_f64(focus.unwrap_or(0.0));
+                key.add_usize(1).add_f64(*aperture).add_f64(fov.unwrap_or(0.0)).add_f64(focus.unwrap_or(0.0));
                 key.add_str(of.orbiter.unwrap_or(""));
             }
         }

@@ -128,7 +128,7 @@ impl Fingerprinted for Environment {
         let Self { color, file, rotate } = self;
         key.add_vec3(*color).add_f64(*rotate).add_bool(file.is_some());
         if let Some(file) = file {
-            key.add_path(&file.value);
+            key.add_path_bytes(&file.value);
         }
     }
 }

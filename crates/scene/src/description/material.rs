@@ -83,7 +83,7 @@ impl NumberSource {
 
     /// Returns the texture's index, and how to compute the number from a pixel: from the specified channel if
     /// there is one, and otherwise as in `usual`. `None` if the number is constant.
-    pub fn texture(&self, usual: ChannelSelector) -> Option<(usize, ChannelSelector)> {
+    pub fn texture_index_and_channel(&self, usual: ChannelSelector) -> Option<(usize, ChannelSelector)> {
         match *self {
             Self::Constant(_) => None,
             Self::Texture { texture, channel } => {
@@ -116,8 +116,8 @@ impl OpacitySource {
 
     /// Returns the texture's index, and how to compute the opacity from a pixel. `None` if the opacity is
     /// constant.
-    pub fn texture(&self) -> Option<(usize, ChannelSelector)> {
-        self.value.texture(ChannelSelector::Opacity)
+    pub fn texture_index_and_channel(&self) -> Option<(usize, ChannelSelector)> {
+        self.value.texture_index_and_channel(ChannelSelector::Opacity)
     }
 }
 
@@ -421,7 +421,7 @@ pub enum MaterialKind {
 
 impl ColorSource {
     /// Returns the texture's index. `None` if the color is constant.
-    fn texture(&self) -> Option<usize> {
+    fn texture_index(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
             Self::Texture(index) => Some(*index),
@@ -431,7 +431,7 @@ impl ColorSource {
 
 impl MaterialKind {
     /// Returns the color parameters that may be textures, each with its role.
-    fn color_parameters(&self) -> Vec<(&ColorSource, TextureRole)> {
+    fn color_parameters_with_roles(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
                 (diffuse, TextureRole::Diffuse),
@@ -505,19 +505,23 @@ impl Material {
     /// their roles. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
-        let colors =
-            kind.color_parameters().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
+        let colors = kind
+            .color_parameters_with_roles()
+            .into_iter()
+            .filter_map(|(color, role)| Some((color.texture_index()?, role)));
         let numbers = kind
             .number_parameters()
             .into_iter()
-            .filter_map(|number| number.texture(ChannelSelector::Luminance));
+            .filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
         let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.height_channel())));
-        let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
+        let opacity = opacity
+            .texture_index_and_channel()
+            .map(|(texture, number)| (texture, TextureRole::Opacity(number)));
         let coat = self.emitter_coat_parameters().into_iter().flatten();
-        let coat = coat.filter_map(|number| number.texture(ChannelSelector::Luminance));
+        let coat = coat.filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
         colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()
     }
@@ -527,7 +531,7 @@ impl Material {
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;
-        key.add_path(&file.value)
+        key.add_path_bytes(&file.value)
             .add_choice(*filter)
             .add_choice(*wrap)
             .add_choice(*encoding)
@@ -538,7 +542,7 @@ impl Fingerprinted for Texture {
             .add_f32(offset.y)
             .add_vec3(*factor)
             .add_bool(*uv == UvSet::Second);
-        key.add_index(image.map_or(0, |image| image as usize + 1));
+        key.add_usize(image.map_or(0, |image| image as usize + 1));
     }
 }
 
@@ -546,10 +550,10 @@ impl Fingerprinted for ColorSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Constant(color) => {
-                key.add_index(0).add_vec3(*color);
+                key.add_usize(0).add_vec3(*color);
             }
             Self::Texture(index) => {
-                of.textures[*index].add_to(key.add_index(1), of);
+                of.textures[*index].add_to(key.add_usize(1), of);
             }
         }
     }
@@ -566,10 +570,10 @@ impl Fingerprinted for NumberSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match *self {
             Self::Constant(value) => {
-                key.add_index(0).add_f32(value);
+                key.add_usize(0).add_f32(value);
             }
             Self::Texture { texture, channel } => {
-                key.add_index(1).add_bool(channel.is_some());
+                key.add_usize(1).add_bool(channel.is_some());
                 if let Some(channel) = channel {
                     key.add_choice(channel);
                 }
@@ -583,10 +587,10 @@ impl Fingerprinted for FresnelSource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Schlick(color) => {
-                key.add_index(0).add(color, of);
+                key.add_usize(0).add(color, of);
             }
             Self::Index { eta, k } => {
-                key.add_index(1).add(eta, of).add(k, of);
+                key.add_usize(1).add(eta, of).add(k, of);
             }
         }
     }
@@ -620,22 +624,22 @@ impl Fingerprinted for MaterialKind {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Phong { diffuse, specular, shininess, ambient } => {
-                key.add_index(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
+                key.add_usize(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
             }
             Self::Mirror { reflectance } => {
-                key.add_index(1).add(reflectance, of);
+                key.add_usize(1).add(reflectance, of);
             }
             Self::Glass { ior, tint, roughness } => {
-                key.add_index(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of);
+                key.add_usize(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of);
             }
             Self::Pane { ior, tint } => {
-                key.add_index(3).add_f32(*ior).add(tint, of);
+                key.add_usize(3).add_f32(*ior).add(tint, of);
             }
             Self::Metal { fresnel, roughness, anisotropy } => {
-                key.add_index(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
+                key.add_usize(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
             }
             Self::Plastic { diffuse, specular, ior, roughness } => {
-                key.add_index(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
+                key.add_usize(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
             }
             Self::Principled {
                 color,
@@ -648,7 +652,7 @@ impl Fingerprinted for MaterialKind {
                 clearcoat,
                 clearcoat_roughness,
             } => {
-                key.add_index(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
+                key.add_usize(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
                 key.add(specular, of).add(specular_color, of).add(transmission, of);
                 key.add(clearcoat, of).add(clearcoat_roughness, of);
             }

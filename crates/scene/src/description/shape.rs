@@ -341,26 +341,26 @@ pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
 impl Fingerprinted for Shape {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Sphere { center, radius } => key.add_index(0).add_dvec3(*center).add_f64(*radius),
-            Self::Quad { corner, u, v } => key.add_index(1).add_dvec3(*corner).add_dvec3(*u).add_dvec3(*v),
-            Self::Plane { point, normal } => key.add_index(2).add_dvec3(*point).add_dvec3(*normal),
+            Self::Sphere { center, radius } => key.add_usize(0).add_dvec3(*center).add_f64(*radius),
+            Self::Quad { corner, u, v } => key.add_usize(1).add_dvec3(*corner).add_dvec3(*u).add_dvec3(*v),
+            Self::Plane { point, normal } => key.add_usize(2).add_dvec3(*point).add_dvec3(*normal),
             Self::Box { center, size, rotate } => {
-                key.add_index(3).add_dvec3(*center).add_dvec3(*size).add_dvec3(*rotate)
+                key.add_usize(3).add_dvec3(*center).add_dvec3(*size).add_dvec3(*rotate)
             }
-            Self::Triangle { a, b, c } => key.add_index(4).add_dvec3(*a).add_dvec3(*b).add_dvec3(*c),
+            Self::Triangle { a, b, c } => key.add_usize(4).add_dvec3(*a).add_dvec3(*b).add_dvec3(*c),
             Self::Disk { center, normal, radius } => {
-                key.add_index(5).add_dvec3(*center).add_dvec3(*normal).add_f64(*radius)
+                key.add_usize(5).add_dvec3(*center).add_dvec3(*normal).add_f64(*radius)
             }
             Self::Cylinder { a, b, radius, caps } => {
-                key.add_index(6).add_dvec3(*a).add_dvec3(*b).add_f64(*radius).add_bool(*caps)
+                key.add_usize(6).add_dvec3(*a).add_dvec3(*b).add_f64(*radius).add_bool(*caps)
             }
             Self::Cone { base, tip, radius, cap } => {
-                key.add_index(7).add_dvec3(*base).add_dvec3(*tip).add_f64(*radius).add_bool(*cap)
+                key.add_usize(7).add_dvec3(*base).add_dvec3(*tip).add_f64(*radius).add_bool(*cap)
             }
             Self::Torus { center, axis, radius, tube } => {
-                key.add_index(8).add_dvec3(*center).add_dvec3(*axis).add_f64(*radius).add_f64(*tube)
+                key.add_usize(8).add_dvec3(*center).add_dvec3(*axis).add_f64(*radius).add_f64(*tube)
             }
-            Self::Mesh(mesh) => key.add_index(9).add(mesh, of),
+            Self::Mesh(mesh) => key.add_usize(9).add(mesh, of),
         };
     }
 }
@@ -372,10 +372,10 @@ impl Fingerprinted for MeshReference {
         key.add_fingerprint(&of.meshes[file]).add_bool(smooth);
         match placed {
             MeshTransform::Steps { scale, rotate, translate } => {
-                key.add_index(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate);
+                key.add_usize(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate);
             }
             MeshTransform::Matrix { linear: [x, y, z], translate } => {
-                key.add_index(1).add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(translate);
+                key.add_usize(1).add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(translate);
             }
         }
     }

@@ -33,7 +33,7 @@ pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
 /// Whether the orbiter file defines the camera. It does not if `--set` sets both `position` and `look_at`.
 fn uses_orbiter_file(table: &TableReader<'_>) -> bool {
     let is_set =
-        |name| table.optional_key(name).span().is_some_and(|span| table.context.is_in_set_arg(&span));
+        |name| table.optional_key(name).span().is_some_and(|span| table.context.is_span_in_set_arg(&span));
     let is_replaced = is_set("position") && is_set("look_at") && !is_set("orbiter");
     table.optional_key("orbiter").is_present() && !is_replaced
 }

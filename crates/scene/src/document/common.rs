@@ -24,7 +24,7 @@ pub(super) fn read_normal_map(table: &TableReader<'_>, textures: &DefinedNames) 
 
 /// Reads `bump` and `bump_scale`.
 pub(super) fn read_bump(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Bump> {
-    let texture = table.optional_key("bump").number_texture(textures);
+    let texture = table.optional_key("bump").texture_with_optional_channel(textures);
     let scale = table.optional_key("bump_scale").number_f32(table.key_limits("bump_scale")).unwrap_or(0.01);
     warn_if_ineffective_without(table, "bump_scale", "bump");
     texture.map(|(texture, channel)| Bump { texture, channel, scale })

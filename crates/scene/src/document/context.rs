@@ -99,8 +99,8 @@ impl<'a> FileContext<'a> {
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_in_set_arg(&self, span: &Range<usize>) -> bool {
-        self.source.is_in_set_arg(span)
+    pub(super) fn is_span_in_set_arg(&self, span: &Range<usize>) -> bool {
+        self.source.is_span_in_set_arg(span)
     }
 
     /// Adds an issue to the list.
@@ -158,16 +158,16 @@ impl<'a> FileContext<'a> {
 
     /// The 1-based line number of a byte offset.
     pub(super) fn line_number(&self, offset: usize) -> usize {
-        self.line_index().line_number(offset)
+        self.cached_line_start_index().line_number(offset)
     }
 
     /// The text of a line, given its 1-based number.
-    pub(super) fn line_text(&self, line: usize) -> Option<&str> {
+    pub(super) fn line_text_by_number(&self, line: usize) -> Option<&str> {
         let text = self.source.full_text();
-        text.get(self.line_index().line_span(line.checked_sub(1)?, text)?)
+        text.get(self.cached_line_start_index().line_span(line.checked_sub(1)?, text)?)
     }
 
-    fn line_index(&self) -> &LineIndex {
+    fn cached_line_start_index(&self) -> &LineIndex {
         self.lines.get_or_init(|| LineIndex::new(self.source.full_text()))
     }
 

@@ -13,7 +13,9 @@ use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::{TableReader, TableTitle};
-use super::value::{TomlValue, Value, describe_value, number_within, parse_integer, report_wrong_type};
+use super::value::{
+    TomlValue, Value, describe_value, number_within, parse_integer_in_radix, report_wrong_type,
+};
 use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, robust_length};
 use crate::math::{DVec3, Vec2};
@@ -68,7 +70,7 @@ impl<'a> TableKey<'a> {
             report_wrong_type(self.context, self.name, value, "a whole number");
             return None;
         };
-        let number = parse_integer(digits, radix).filter(|number| range.contains(number));
+        let number = parse_integer_in_radix(digits, radix).filter(|number| range.contains(number));
         if number.is_none() {
             let (name, low, high) = (self.name, range.start(), range.end());
             let message = format!("`{name}` must be a whole number between {low} and {high}");
@@ -104,7 +106,7 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads the name of a shape, if any. Reports names that look like numbers.
-    pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
+    pub(super) fn optional_object_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_present() {
             return Some(None);
         }

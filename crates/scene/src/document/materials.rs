@@ -164,7 +164,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn key_from_path<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+fn table_key_at_path<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
@@ -176,7 +176,7 @@ fn read_or_default<'a, T>(
     default: T,
     read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
 ) -> T {
-    read(&key_from_path(table, path), table.key_limits(path)).unwrap_or(default)
+    read(&table_key_at_path(table, path), table.key_limits(path)).unwrap_or(default)
 }
 
 /// Reads a color or a texture.

@@ -142,7 +142,7 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let textures = textures::read_textures(root);
     let materials = materials::read_materials(root, &textures.names);
     if let Some(list) = &materials.list {
-        textures::check_encodings(root.context, &textures, list);
+        textures::report_ambiguous_encodings(root.context, &textures, list);
     }
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read_lights(root);

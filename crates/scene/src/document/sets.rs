@@ -10,7 +10,7 @@ use super::shapes;
 /// The top-level scene keys that are groups of named tables or lists of tables.
 const LAYOUT: TopLevelLayout = TopLevelLayout {
     groups: &["materials", "textures"],
-    is_list: |name| name == "light" || shapes::is_shape_table(name),
+    is_list: |name| name == "light" || shapes::is_shape_table_name(name),
 };
 
 /// Applies all `--set` values and reports keys that cannot be set.

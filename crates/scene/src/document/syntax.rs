@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::super::sanitize::shortened;
-use super::super::toml::{Bracket, SyntaxError, find_array_brackets, innermost_open_bracket};
+use super::super::toml::{Bracket, SyntaxError, find_all_array_brackets, innermost_bracket_open_at_end};
 use super::context::{FileContext, Issue};
 
 /// Reports only the first error on each line, because it usually causes the other errors on the line. Returns
@@ -67,8 +67,8 @@ struct ArrayBrackets<'a> {
 impl ArrayBrackets<'_> {
     /// Returns the opening bracket of the innermost list that is open at byte `end`.
     fn enclosing_open_bracket(&self, end: usize) -> Option<usize> {
-        let all = self.brackets.get_or_init(|| find_array_brackets(self.text));
-        innermost_open_bracket(&all[..all.partition_point(|bracket| bracket.at < end)])
+        let all = self.brackets.get_or_init(|| find_all_array_brackets(self.text));
+        innermost_bracket_open_at_end(&all[..all.partition_point(|bracket| bracket.at < end)])
     }
 }
 
@@ -86,7 +86,7 @@ fn find_unclosed_bracket(
         return if is_bracket { Some(span.start) } else { lists.enclosing_open_bracket(span.end) };
     }
     let open = lists.enclosing_open_bracket(span.start)?;
-    let line = context.line_text(context.line_number(span.start))?.trim();
+    let line = context.line_text_by_number(context.line_number(span.start))?.trim();
     let is_header = line.starts_with('[') && line.ends_with(']') && !line.contains([',', ' ']);
     let is_later = context.line_number(open) < context.line_number(span.start);
     (what == MISSING_COMMA && is_later && (starts_with_key(line) || is_header)).then_some(open)
@@ -108,7 +108,8 @@ fn last_unclosed_bracket(text: &str) -> Option<usize> {
     loop {
         let line = text[..start].rfind('\n').map_or(0, |end| end + 1);
         if starts_with_key(&text[line..start]) {
-            return innermost_open_bracket(&find_array_brackets(&text[line..])).map(|open| line + open);
+            return innermost_bracket_open_at_end(&find_all_array_brackets(&text[line..]))
+                .map(|open| line + open);
         }
         start = line.checked_sub(1)?;
     }
@@ -131,7 +132,7 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
 fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.enclosing_open_bracket(at)?;
     let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
-    let line = context.line_text(context.line_number(at))?;
+    let line = context.line_text_by_number(context.line_number(at))?;
     let inner = line.get(open.checked_sub(line_start)? + 1..)?;
     let inner = &inner[..inner.find(']')?];
     let values = split_values(inner);
@@ -145,7 +146,7 @@ fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, 
 /// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0,
 /// 1, 0)`.
 fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
-    let line = context.line_text(context.line_number(at))?;
+    let line = context.line_text_by_number(context.line_number(at))?;
     let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
     let (key, after) = line.split_once('=').filter(|_| starts_with_key(line))?;
     let value = after.split('#').next()?.trim();
@@ -186,7 +187,8 @@ fn format_list(values: &[&str]) -> Option<String> {
 /// Returns the first line not affected by an error in `line`: the next header if `line` is a broken header,
 /// otherwise the next line.
 fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
-    let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
+    let is_header =
+        |line: usize| context.line_text_by_number(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {
         return line + 1;
     }

@@ -32,7 +32,7 @@ pub(super) fn read_textures(root: &TableReader<'_>) -> TextureList {
 }
 
 fn read_texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
-    let (file, image) = read_image_reference(table);
+    let (file, image) = read_file_and_image_index(table);
     let filter = table.optional_key("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional_key("wrap").choice().unwrap_or(Wrap::Repeat);
     let repeat = table.optional_key("repeat").pair(table.key_limits("repeat")).unwrap_or(Vec2::ONE);
@@ -49,7 +49,7 @@ fn read_texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
 }
 
 /// Reads the file and, for a glTF file, the index of the image.
-fn read_image_reference(table: &TableReader<'_>) -> (Option<Spanned<PathBuf>>, Option<Option<u32>>) {
+fn read_file_and_image_index(table: &TableReader<'_>) -> (Option<Spanned<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required_key("file", "\"picture.png\""), table.optional_key("image"));
     if !number.is_present() {
         return (key.existing_file(MAPS), Some(None));
@@ -59,7 +59,11 @@ fn read_image_reference(table: &TableReader<'_>) -> (Option<Spanned<PathBuf>>, O
 
 /// Reports textures without `encoding` that are used for both colors and numbers. Ignores uses of the alpha
 /// channel, because it has no encoding.
-pub(super) fn check_encodings(context: &FileContext<'_>, textures: &TextureList, materials: &[Material]) {
+pub(super) fn report_ambiguous_encodings(
+    context: &FileContext<'_>,
+    textures: &TextureList,
+    materials: &[Material],
+) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
     for (texture, role) in materials.iter().flat_map(Material::textures) {

@@ -27,7 +27,7 @@ pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
     match value.decode() {
         // Round to the nearest double, as if the number were written as a float.
         TomlValue::Integer { digits, radix } => {
-            Some(parse_integer(digits, radix).map_or(f64::MAX, |number| number as f64))
+            Some(parse_integer_in_radix(digits, radix).map_or(f64::MAX, |number| number as f64))
         }
         TomlValue::Float(text) => {
             let number: f64 = text.parse().ok()?;
@@ -43,7 +43,7 @@ pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
 }
 
 /// Parses an integer. `None` if it overflows.
-pub(super) fn parse_integer(digits: &str, radix: u32) -> Option<i128> {
+pub(super) fn parse_integer_in_radix(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }
 

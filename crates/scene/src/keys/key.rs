@@ -186,7 +186,7 @@ impl TableInfo {
 
 impl KeyInfo {
     /// The default value, or an example.
-    pub fn example(&self) -> String {
+    pub fn default_or_example(&self) -> String {
         match (self.default, self.kind) {
             (DefaultValue::Required(value) | DefaultValue::Is(value), _) => value.to_owned(),
             (DefaultValue::By(_) | DefaultValue::Absent, kind) => kind.example(),

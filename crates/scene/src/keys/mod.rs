@@ -37,7 +37,7 @@ pub fn all_tables() -> &'static [TableInfo] {
 
 /// Paths and descriptions of all tables, types and keys, such as `materials`, `materials.metal`,
 /// `materials.metal.roughness`.
-pub fn documented_paths() -> Vec<(String, &'static str)> {
+pub fn all_paths_with_descriptions() -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
     for table in all_tables() {
         all.push((table.name.to_owned(), table.doc));
@@ -82,7 +82,7 @@ mod tests {
             .flat_map(|info| info.keys_for_type(info.find_type(Some(kind))));
         let required =
             required.filter(|info| table != "camera" && matches!(info.default, DefaultValue::Required(_)));
-        let required = required.map(|info| (info.name.to_owned(), info.example()));
+        let required = required.map(|info| (info.name.to_owned(), info.default_or_example()));
         let fixed: Vec<_> = fixed.iter().copied().map(pair).collect();
         let is_other =
             |all: &[(String, String)], name: &str| name != key && all.iter().all(|(one, _)| one != name);
@@ -105,7 +105,7 @@ mod tests {
         if let Some(kind) = kind {
             text.push_str(&format!("\ntype = \"{}\"", kind.name));
         }
-        text.push_str(&format!("\n{} = {}\n", key.name, key.example()));
+        text.push_str(&format!("\n{} = {}\n", key.name, key.default_or_example()));
         for (name, value) in other_keys(info.name, kind.map_or("", |kind| kind.name), key.name) {
             text.push_str(&format!("{name} = {value}\n"));
         }

@@ -4,7 +4,7 @@ use annotate_snippets::Renderer;
 use anstyle::{AnsiColor, Effects};
 
 use super::super::diagnostic::Diagnostic;
-use super::render_report_with;
+use super::render_report_with_renderer;
 
 /// A line of a report.
 pub type ReportLine = Vec<StyledSpan>;
@@ -40,7 +40,7 @@ pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine>
         .warning(AnsiColor::Yellow.on_default())
         .line_num(AnsiColor::Blue.on_default())
         .emphasis(Effects::BOLD.into());
-    render_report_with(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
+    render_report_with_renderer(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
 }
 
 /// Splits a line at color escape sequences, all of which come from the renderer because text from files is

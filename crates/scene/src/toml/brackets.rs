@@ -13,7 +13,7 @@ pub(crate) struct Bracket {
 }
 
 /// Returns the array brackets in `text`, which must start at the start of an expression.
-pub(crate) fn find_array_brackets(text: &str) -> Vec<Bracket> {
+pub(crate) fn find_all_array_brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
     for token in Source::new(text).lex() {
@@ -47,7 +47,7 @@ pub(crate) fn find_array_brackets(text: &str) -> Vec<Bracket> {
 }
 
 /// Returns the offset of the innermost bracket that is still open at the end of the text.
-pub(crate) fn innermost_open_bracket(brackets: &[Bracket]) -> Option<usize> {
+pub(crate) fn innermost_bracket_open_at_end(brackets: &[Bracket]) -> Option<usize> {
     let mut closed = 0_usize;
     for bracket in brackets.iter().rev() {
         match (bracket.opens, closed) {
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn only_array_brackets_are_found() {
-        let open = |text: &str| innermost_open_bracket(&find_array_brackets(text));
+        let open = |text: &str| innermost_bracket_open_at_end(&find_all_array_brackets(text));
         for closed in [
             "",
             "[a]\n[[b]]\n",

@@ -33,7 +33,7 @@ mod tree;
 use assembly::DocumentBuilder;
 use expression::ExpressionParser;
 
-pub(super) use brackets::{Bracket, find_array_brackets, innermost_open_bracket};
+pub(super) use brackets::{Bracket, find_all_array_brackets, innermost_bracket_open_at_end};
 pub(super) use error::SyntaxError;
 pub(super) use set::{KeyError, KeyErrorKind, TopLevelLayout};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
@@ -48,7 +48,7 @@ const MARK: &str = "\u{feff}";
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty()
-        && document.sole_assignment(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
+        && document.sole_assignment_in_table(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
 /// Applies a `KEY = VALUE` assignment to the document. The assignment is at byte `at` of `source`, and
@@ -63,10 +63,10 @@ pub(super) fn apply_assignment<'s>(
     layout: TopLevelLayout,
 ) -> (Document<'s>, Result<(), KeyError>) {
     let (mut assembly, detached) =
-        DocumentBuilder::from_document_with_new_table(document.with_source(source));
+        DocumentBuilder::from_document_with_new_table(document.with_extended_source(source));
     ExpressionParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
-    let placed = match document.sole_assignment(detached) {
+    let placed = match document.sole_assignment_in_table(detached) {
         Some((keys, value)) => document.set_at_path(&keys, value, layout),
         None => Ok(()),
     };

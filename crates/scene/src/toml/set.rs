@@ -78,7 +78,7 @@ impl<'s> Document<'s> {
         }
         self.check_group_member_exists(keys, depth, table, layout)?;
         if let Some(last) = keys.get(depth) {
-            self.set_value(table, last.clone(), value);
+            self.set_or_add_value(table, last.clone(), value);
         }
         Ok(())
     }
@@ -135,7 +135,11 @@ impl<'s> Document<'s> {
     /// Sets a key to a new, empty table.
     fn create_table(&mut self, parent: TableId, name: &Name<'s>) -> TableId {
         let table = self.add_table(TableOrigin::default());
-        self.set_value(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
+        self.set_or_add_value(
+            parent,
+            name.clone(),
+            ValueNode { span: name.span, kind: NodeKind::Table(table) },
+        );
         table
     }
 

@@ -157,7 +157,7 @@ impl<'s> Document<'s> {
     }
 
     /// Replaces the source with a longer text that starts with the current source.
-    pub(super) fn with_source(self, source: &'s str) -> Self {
+    pub(super) fn with_extended_source(self, source: &'s str) -> Self {
         Self { source, ..self }
     }
 
@@ -274,7 +274,7 @@ impl<'s> Document<'s> {
     }
 
     /// Sets the value of a key, adding it if necessary.
-    pub(super) fn set_value(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
+    pub(super) fn set_or_add_value(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
         let Some(found) = self.find_entry(table, &name.text) else {
             return self.add_entry(table, name, node);
         };
@@ -285,7 +285,7 @@ impl<'s> Document<'s> {
 
     /// Returns the only value in a table and its dotted key. `None` if there are several values or if the
     /// value has a header.
-    pub(super) fn sole_assignment(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
+    pub(super) fn sole_assignment_in_table(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
         let mut value = None;

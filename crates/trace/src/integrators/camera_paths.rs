@@ -75,7 +75,7 @@ pub fn trace_camera_paths(
         place: 0,
         counters,
     };
-    wavefront.begin_bounce();
+    wavefront.prepare_bounce_continuation();
     wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
@@ -107,7 +107,7 @@ pub fn trace_camera_paths(
         }
         let slots: &[PathRay] = rays;
         wavefront.add_direct_light()?;
-        wavefront.direct.flush(
+        wavefront.direct.flush_to_accumulator(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
         );
@@ -117,7 +117,7 @@ pub fn trace_camera_paths(
 }
 
 /// Traversal cost of a path's ray up to the hit.
-fn traversal_cost(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
+fn count_traversal_cost_to_hit(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
     tile.world.geometry.traversal_cost(&Ray { t_max, ..path.ray })
 }
@@ -155,7 +155,8 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
 
     fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>) {
         if self.accumulator.aov == LightAov::TraversalCost {
-            self.accumulator.add_traversal_cost(path.slot, traversal_cost(self.tile, path, next));
+            self.accumulator
+                .add_traversal_cost(path.slot, count_traversal_cost_to_hit(self.tile, path, next));
         }
     }
 
@@ -175,7 +176,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
             Interaction::Glass(vertex, hit, Interface { far, rough }) => {
                 if self.add_emission(path, vertex, OpaqueHit::Direct(hit)) {
                     match rough {
-                        Some(rough) => self.shade_rough_glass(path, vertex, rough, far),
+                        Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
                     }
                 }
@@ -209,10 +210,10 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
         if weaker >= MIN_SPLIT && splits {
-            self.push_reflected(mirrored(reflectance));
+            self.roulette_and_push_reflected(mirrored(reflectance));
             NullInteraction::Passed(left)
         } else if self.tile.chooses_reflection(path, reflectance) {
-            self.push_reflected(mirrored(1.0));
+            self.roulette_and_push_reflected(mirrored(1.0));
             NullInteraction::Ended
         } else {
             NullInteraction::Passed(tint)
@@ -236,7 +237,7 @@ impl CameraWavefront<'_, '_> {
         Ok(())
     }
 
-    fn begin_bounce(&mut self) {
+    fn prepare_bounce_continuation(&mut self) {
         let continuation = || Continuation::new(self.tile, self.depth, SampledLobes::All);
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
@@ -246,7 +247,7 @@ impl CameraWavefront<'_, '_> {
         std::mem::swap(rays, self.next);
         self.next.clear();
         self.depth += 1;
-        self.begin_bounce();
+        self.prepare_bounce_continuation();
     }
 
     /// Shades the hit of one ray in a packet. The path is large, so it is moved only here.
@@ -282,7 +283,10 @@ impl CameraWavefront<'_, '_> {
         if self.accumulator.aov == LightAov::TraversalCost {
             for lane in 0..rays.count() {
                 let path = packet.path(tile, &rays, lane);
-                self.accumulator.add_traversal_cost(path.slot, traversal_cost(tile, &path, packet.hit(lane)));
+                self.accumulator.add_traversal_cost(
+                    path.slot,
+                    count_traversal_cost_to_hit(tile, &path, packet.hit(lane)),
+                );
             }
         }
         // Queue the vertices of plain surfaces for direct lighting.
@@ -407,7 +411,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn add_escaped_light(&mut self, path: &PathRay) {
-        self.add_infinite_light(path, self.tile.infinite_light(path));
+        self.add_infinite_light(path, self.tile.mis_weighted_infinite_light(path));
     }
 
     /// Adds light from infinite lights to a path that leaves the scene. The background is visible but does
@@ -490,7 +494,7 @@ impl CameraWavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading_normals(self.counters);
         let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
-        let aov = self.light_aov_at(path);
+        let aov = self.light_aov_selection_at_vertex(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
@@ -505,7 +509,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Queues the vertices for rough glass: one for each side, or a single vertex if light samples cannot
     /// reach one of the sides.
-    fn shade_rough_glass(
+    fn queue_rough_glass_vertices(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -517,7 +521,7 @@ impl CameraWavefront<'_, '_> {
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading_normals(self.counters);
-        let aov = self.light_aov_at(path);
+        let aov = self.light_aov_selection_at_vertex(path);
         let near = &path.interiors;
         let reflection = BxdfPoint::DielectricReflection(rough);
         let transmission = BxdfPoint::DielectricTransmission(rough);
@@ -555,7 +559,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    fn light_aov_at(&self, path: &PathRay) -> LightAov {
+    fn light_aov_selection_at_vertex(&self, path: &PathRay) -> LightAov {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 
@@ -563,7 +567,7 @@ impl CameraWavefront<'_, '_> {
         let shading = vertex.shading_normals(self.counters);
         let is_colored = self.accumulator.aov.is_colored();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
-        self.push_reflected(reflected_path(path, vertex, &shading, reflectance));
+        self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
 
     /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
@@ -586,7 +590,7 @@ impl CameraWavefront<'_, '_> {
             let specular =
                 coated.specular_factor(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
             if specular != Vec3::ZERO {
-                self.push_reflected(reflected_path(path, vertex, &shading, specular));
+                self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }
         }
         if !is_coat {
@@ -604,26 +608,26 @@ impl CameraWavefront<'_, '_> {
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
-        let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
+        let Some(refracted) = refracted else { return self.roulette_and_push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
         if weaker >= MIN_SPLIT && splits {
-            self.push_reflected(mirrored(reflectance));
-            self.push_refracted(refracted, 1.0 - reflectance);
+            self.roulette_and_push_reflected(mirrored(reflectance));
+            self.roulette_and_push_refracted(refracted, 1.0 - reflectance);
         } else if self.tile.chooses_reflection(path, reflectance) {
-            self.push_reflected(mirrored(1.0));
+            self.roulette_and_push_reflected(mirrored(1.0));
         } else {
-            self.push_refracted(refracted, 1.0);
+            self.roulette_and_push_refracted(refracted, 1.0);
         }
     }
 
-    fn push_reflected(&mut self, ray: PathRay) {
+    fn roulette_and_push_reflected(&mut self, ray: PathRay) {
         let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.reflected_rays += 1;
         self.next.push(ray);
     }
 
-    fn push_refracted(&mut self, mut ray: PathRay, weight: f32) {
+    fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
         let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.refracted_rays += 1;

@@ -2,7 +2,7 @@
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::Ray;
-use crate::math::decimal::{decimal_step, round_to_step};
+use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description::{self, Pose, Viewpoint};
@@ -83,7 +83,9 @@ impl Camera {
                 let Self { position, up, forward, aperture, .. } = Self::new(camera, Some(&file));
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
-                    DVec3::from_array(place.to_array().map(|at| round_to_step(at, decimal_step(file.size))))
+                    DVec3::from_array(
+                        place.to_array().map(|at| round_to_step(at, coordinate_step_at_distance(file.size))),
+                    )
                 };
                 let (position, look_at) = (short(position), short(look_at));
                 // An orbiter does not roll. Unless it is upside down, y points up in the image.

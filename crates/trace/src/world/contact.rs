@@ -107,7 +107,7 @@ impl World {
     ) -> OffsetPoints {
         let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
-            if self.is_hit_on_thick_glass(at, margin) {
+            if self.is_glass_thicker_than(at, margin) {
                 return self.classify_isolated_hit(at, visit);
             }
             self.geometry.set_hit_as_candidate(at, memory)
@@ -118,7 +118,7 @@ impl World {
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
-    fn is_hit_on_thick_glass(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
+    fn is_glass_thicker_than(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
             Object::Shape(shape) => shape.is_thicker_than(at.surface.point.as_dvec3(), far),
@@ -127,7 +127,7 @@ impl World {
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path for [`World::classify_candidates`] if [`World::is_hit_on_thick_glass`] is true and nothing else
+    /// Fast path for [`World::classify_candidates`] if [`World::is_glass_thicker_than`] is true and nothing else
     /// is nearby. In this case, only the incoming ray's side matters.
     fn classify_isolated_hit(
         &self,
@@ -184,7 +184,7 @@ impl World {
             let mesh = geometry.objects()[object as usize].mesh();
             if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.intersect_segment(triangle, ends)) {
                 let hit = Hit { shape, object };
-                found(self.oriented_coincident_surface(hit, self.material_index(&hit) as u32, is_front));
+                found(self.coincident_surface_from_hit(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -207,10 +207,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.oriented_coincident_surface(Hit { shape: own, object }, material, is_front))
+        Some(self.coincident_surface_from_hit(Hit { shape: own, object }, material, is_front))
     }
 
-    fn oriented_coincident_surface(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
+    fn coincident_surface_from_hit(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
         let is_inside_out = self.is_glass_material(material) && self.glass_solids.is_inside_out(hit.object);
         CoincidentSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }

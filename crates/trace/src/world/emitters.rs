@@ -14,7 +14,7 @@ use crate::lights::delta::{PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
     AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvMapping,
-    UvTriangle, back_area_light, front_area_light, see_through_area_light,
+    UvTriangle, back_area_light, front_area_light, see_through_side_area_light,
 };
 use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
@@ -70,7 +70,7 @@ pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<Photon
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
     let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
-    PhotonSource::new(lights, emitter_geometry, BoundingSphere::enclosing(&balls))
+    PhotonSource::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
 }
 
 /// Environment light. `None` if it is black.
@@ -171,7 +171,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
     let of_side = move |side: &Side| {
         let radiance = emissive.emission.scale;
         let light = match (emissive.is_sheer, side) {
-            (true, side) => see_through_area_light(shape, *side, radiance, object)?,
+            (true, side) => see_through_side_area_light(shape, *side, radiance, object)?,
             (false, Side::Front) => front_area_light(shape, radiance, object)?,
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };

@@ -89,7 +89,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
     if source.is_opaque() {
         return None;
     }
-    let (value, cutoff) = match source.texture() {
+    let (value, cutoff) = match source.texture_index_and_channel() {
         None => (ScalarParameter::Constant(source.value.constant()?), source.cutoff),
         Some((index, number)) => {
             let of = SceneTextureLookup { scene, images, material };
@@ -310,7 +310,7 @@ impl SceneTextureLookup<'_> {
 
     /// Scalar parameter. Uses the texture's luminance if the scene does not specify a channel.
     fn number(self, source: &NumberSource, role: fn(ChannelSelector) -> TextureRole) -> ScalarParameter {
-        match (source.constant(), source.texture(ChannelSelector::Luminance)) {
+        match (source.constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
             (Some(number), _) => ScalarParameter::Constant(number),
             (None, Some((texture, number))) => ScalarParameter::Texture(self.texture(texture, role(number))),
             (None, None) => ScalarParameter::Constant(1.0),

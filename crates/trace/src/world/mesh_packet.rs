@@ -77,7 +77,7 @@ impl MeshInstance {
             for i in lane_indices(on_ray) {
                 set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
-            surface.copy_shading_normals(of, &found);
+            surface.copy_shading_normals_from(of, &found);
         }
         if let Some(set) = asked_uvs {
             let all = self.vertex_uvs(set);

@@ -32,7 +32,7 @@ mod unlit_glass;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
+pub use crate::accel::{PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeSummary};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, MAX_INTERIORS, OffsetPoints};

@@ -5,7 +5,7 @@ use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::packet::{HitPacket, RayPacket};
 use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::{BoundingSphere, EmitterGeometry};
+use crate::lights::{BoundingSphere, EmissiveObjectGeometry};
 use crate::math::lanes::Simd;
 
 /// A traceable object.
@@ -112,10 +112,10 @@ impl Object {
     }
 
     /// Geometry of the object as a light source.
-    pub(super) fn emitter_geometry(&self) -> EmitterGeometry {
+    pub(super) fn emitter_geometry(&self) -> EmissiveObjectGeometry {
         match self {
-            Self::Shape(shape) => EmitterGeometry::Shape(*shape),
-            Self::Mesh(mesh) => EmitterGeometry::Mesh { rounding: mesh.max_rounding_error() },
+            Self::Shape(shape) => EmissiveObjectGeometry::Shape(*shape),
+            Self::Mesh(mesh) => EmissiveObjectGeometry::Mesh { rounding: mesh.max_rounding_error() },
         }
     }
 

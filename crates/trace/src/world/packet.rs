@@ -4,7 +4,7 @@ use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
-use crate::geometry::packet::{HitPacket, RayPacket, active_lanes, lane_indices};
+use crate::geometry::packet::{HitPacket, RayPacket, lane_indices, nonnegative_end_mask};
 use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
@@ -141,7 +141,7 @@ impl SimdKernel for ClosestKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) {
         let (rows, mut ends) = RayPacket::new(self.rays);
-        let traced = active_lanes(&ends, simd);
+        let traced = nonnegative_end_mask(&ends, simd);
         let (hits, object) = self.geometry.closest_hit_packet_simd(&rows, &mut ends, traced, simd);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET_SIZE) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
@@ -385,7 +385,13 @@ pub(super) mod tests {
         #[inline(always)]
         fn run(self, simd: impl Simd) -> u32 {
             let (rows, ends) = RayPacket::new(self.rays);
-            self.geometry.occluded_ray_packet(&rows, &ends, active_lanes(&ends, simd), self.sources, simd)
+            self.geometry.occluded_ray_packet(
+                &rows,
+                &ends,
+                nonnegative_end_mask(&ends, simd),
+                self.sources,
+                simd,
+            )
         }
     }
 

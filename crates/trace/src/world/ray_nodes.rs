@@ -1,7 +1,7 @@
 //! Visits the tree nodes intersected by a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{RayInterval, TreeNode};
+use crate::accel::{RayBoxInterval, TreeNodeSummary};
 use crate::geometry::Ray;
 
 impl Geometry {
@@ -11,7 +11,7 @@ impl Geometry {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool,
+        mut visit: impl FnMut(&Ray, &TreeNodeSummary, &RayBoxInterval) -> bool,
     ) {
         let mut below = Vec::new();
         self.traced_tree().visit_nodes_along_ray(
@@ -27,7 +27,7 @@ impl Geometry {
                     (None, None) => continue,
                 };
             tree.visit_nodes_along_ray(&local, |cell, stretch| {
-                visit(&local, &TreeNode { depth: above + cell.depth, ..*cell }, stretch)
+                visit(&local, &TreeNodeSummary { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }

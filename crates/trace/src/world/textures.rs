@@ -284,7 +284,8 @@ pub fn texture_use(
                     false
                 }
             };
-            let opacity = material.opacity.texture().filter(|(_, number)| is_alpha(*number));
+            let opacity =
+                material.opacity.texture_index_and_channel().filter(|(_, number)| is_alpha(*number));
             let is_cut_out =
                 opacity.is_some_and(|(opacity, _)| have_same_image_and_mapping(scene, opacity, texture));
             if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
@@ -363,7 +364,7 @@ pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> PixelInterpr
         }
     };
     let opacity = own.opacity_texture.as_ref().filter(is_alpha);
-    let is_cut_out = opacity.is_some_and(|opacity| opacity.is_same_image(texture));
+    let is_cut_out = opacity.is_some_and(|opacity| opacity.has_same_image_and_mapping(texture));
     if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
 }
 

@@ -1,7 +1,7 @@
 //! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{F32x16, KdTree, RayInterval, TreeNode, WideBvh};
+use crate::accel::{F32x16, KdTree, RayBoxInterval, TreeNodeSummary, WideBvh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -64,7 +64,11 @@ impl TriangleTree {
     }
 
     /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(
+        &self,
+        ray: &Ray,
+        visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+    ) {
         match self {
             Self::Boxes(tree) => tree.visit_nodes_along_ray(ray, visit),
             Self::Planes(tree) => tree.visit_nodes_along_ray(ray, visit),

@@ -200,7 +200,7 @@ impl TerminalConnection {
     }
 
     /// Round-trip time excluding queueing. `None` if the terminal does not reply.
-    pub(super) fn round_trip(&self) -> Option<Duration> {
+    pub(super) fn min_round_trip_time(&self) -> Option<Duration> {
         self.round_trips.minimum().filter(|_| self.replies == ReplySupport::Answering)
     }
 

@@ -143,8 +143,8 @@ impl CellFill {
     /// Whether this glyph can show these colors.
     pub(super) fn can_show(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.part_layers();
-        pair[0].is_allowed_in(first)
-            && pair[1].is_allowed_in(second)
+        pair[0].is_allowed_in_layer(first)
+            && pair[1].is_allowed_in_layer(second)
             && (first != second || pair[0] == pair[1])
     }
 }

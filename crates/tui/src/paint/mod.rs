@@ -40,7 +40,7 @@ pub use self::frame_pacing::{PacingAdvice, PacingInputs, advise};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::as_text_lines;
-use self::picture::ByteBudget;
+use self::picture::FirstPreviewByteBudget;
 pub use self::rep_support::can_repeat;
 use self::screen::{OutputSlice, ScreenModel, Stroke};
 use self::stable_cells::StableCells;
@@ -58,7 +58,7 @@ pub struct Painter {
     memory: StableCells,
     wanted: TargetScreen,
     links: UrlTable,
-    budget: ByteBudget,
+    budget: FirstPreviewByteBudget,
     /// Remaining drawing steps, in order.
     parts: vec::IntoIter<DrawStep>,
     /// The drawing step in progress.
@@ -108,7 +108,7 @@ impl Painter {
             memory: StableCells::default(),
             wanted: TargetScreen::empty(depth),
             links: UrlTable::default(),
-            budget: ByteBudget::default(),
+            budget: FirstPreviewByteBudget::default(),
             parts: Vec::new().into_iter(),
             part: None,
             strokes: Vec::new().into_iter(),
@@ -174,7 +174,7 @@ impl Painter {
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
-        self.budget = ByteBudget::default();
+        self.budget = FirstPreviewByteBudget::default();
     }
 
     /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the
@@ -193,7 +193,7 @@ impl Painter {
         }
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
         let screen = self.screen.get_or_insert_with(|| {
-            ScreenModel::push_clear(&self.links, &mut slice);
+            ScreenModel::push_clear_sequence(&self.links, &mut slice);
             ScreenModel::cleared(columns, rows)
         });
         loop {
@@ -202,7 +202,7 @@ impl Painter {
                     return slice.bytes;
                 }
                 if let (Some(DrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {
-                    self.memory.record_drawn(*at, *count);
+                    self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }

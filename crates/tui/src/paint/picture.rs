@@ -21,18 +21,18 @@ const DEAREST: f32 = 4000.0;
 
 /// Byte budget for a first preview.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ByteBudget {
+pub(super) struct FirstPreviewByteBudget {
     bytes: u32,
     model: RateDistortion,
 }
 
-impl Default for ByteBudget {
+impl Default for FirstPreviewByteBudget {
     fn default() -> Self {
         Self { bytes: 0, model: RateDistortion::MOVING }
     }
 }
 
-impl ByteBudget {
+impl FirstPreviewByteBudget {
     /// Plans a row with the smallest error that fits into the budget. If the unused bytes exceed one row's
     /// share, first lowers the cost per byte.
     fn plan_row_in_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
@@ -60,7 +60,7 @@ pub(super) fn plan_preview_row(
     memory: &StableCells,
     y: u16,
     can_repeat: bool,
-    budget: &mut ByteBudget,
+    budget: &mut FirstPreviewByteBudget,
 ) -> Vec<Stroke> {
     let columns = wanted.picture.left()..wanted.picture.right();
     let targets: Vec<TargetCell> =

@@ -253,10 +253,10 @@ impl ColorChanges {
                 _ if index < self.second => (CellFill::Second, CellFill::First),
                 _ => (CellFill::Full, CellFill::Blank),
             };
-            if change.shade.is_allowed_in(ColorLayer::Foreground) {
+            if change.shade.is_allowed_in_layer(ColorLayer::Foreground) {
                 ends.try_glyph(pen.with_fg(change), bytes, as_fg);
             }
-            if change.shade.is_allowed_in(ColorLayer::Background) {
+            if change.shade.is_allowed_in_layer(ColorLayer::Background) {
                 ends.try_glyph(pen.with_bg(change), bytes, as_bg);
             }
         }
@@ -269,8 +269,8 @@ impl ColorChanges {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
                 for (fg, bg, glyph) in [(first, second, CellFill::First), (second, first, CellFill::Second)] {
-                    if fg.shade.is_allowed_in(ColorLayer::Foreground)
-                        && bg.shade.is_allowed_in(ColorLayer::Background)
+                    if fg.shade.is_allowed_in_layer(ColorLayer::Foreground)
+                        && bg.shade.is_allowed_in_layer(ColorLayer::Background)
                     {
                         ends.try_glyph(PenWithErrors::from_changes(fg, bg), bytes, glyph);
                     }

@@ -79,7 +79,7 @@ pub(super) struct ScreenModel {
 }
 
 impl ScreenModel {
-    /// The state of the screen after [`ScreenModel::push_clear`].
+    /// The state of the screen after [`ScreenModel::push_clear_sequence`].
     pub(super) fn cleared(columns: u16, rows: u16) -> Self {
         Self {
             columns,
@@ -91,7 +91,7 @@ impl ScreenModel {
     }
 
     /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
-    pub(super) fn push_clear(links: &UrlTable, slice: &mut OutputSlice) {
+    pub(super) fn push_clear_sequence(links: &UrlTable, slice: &mut OutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
         }

@@ -122,7 +122,7 @@ impl StableCells {
     }
 
     /// Records that cells were drawn for the current request.
-    pub(super) fn record_drawn(&mut self, at: CellPosition, count: u16) {
+    pub(super) fn record_drawn_cells(&mut self, at: CellPosition, count: u16) {
         let first = self.index(at);
         for index in first..first + usize::from(count) {
             if let Some(kept) = self.firsts.get_mut(index) {

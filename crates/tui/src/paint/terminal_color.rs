@@ -54,7 +54,7 @@ impl TerminalColor {
     }
 
     /// Whether the color can be used in this layer.
-    pub(super) fn is_allowed_in(self, layer: ColorLayer) -> bool {
+    pub(super) fn is_allowed_in_layer(self, layer: ColorLayer) -> bool {
         match self {
             Self::DefaultBackground => layer == ColorLayer::Background,
             Self::DefaultForeground => layer == ColorLayer::Foreground,

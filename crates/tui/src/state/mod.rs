@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, Pane, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, ImageProvenance, KeyOverrides, RequestState, format_stops};
+pub(super) use self::request::{CameraStepStatus, ImageProvenance, KeyOverrides, RequestState, format_stops};
 pub(super) use self::saving::{SavingState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
 pub(super) use self::work::{AssetProgressBar, RenderState, WorkState, WorkerActivity};
@@ -98,7 +98,7 @@ impl State {
     }
 
     /// Whether nothing is known that would keep `w` from replacing the output files.
-    pub(super) fn can_write_image(&self) -> bool {
+    pub(super) fn can_overwrite_outputs(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
         let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
         !self.overlays.warnings.iter().any(is_conflict) && !self.saving.written.iter().any(is_kept)
@@ -131,15 +131,15 @@ impl State {
     }
 
     /// Pauses or resumes the clock of the current request.
-    pub(super) fn set_paused(&mut self, paused: bool) {
-        self.work.set_paused(paused, self.now);
+    pub(super) fn set_clock_paused(&mut self, paused: bool) {
+        self.work.set_clock_paused(paused, self.now);
     }
 
     /// Time of the next tick that the state needs.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);
-        let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
+        let clock = (self.work.is_request_running() && !self.work.paused).then(|| self.now + CLOCK);
         let bars = self.work.assets.iter().filter_map(AssetProgressBar::disappears_at).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);

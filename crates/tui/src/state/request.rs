@@ -111,7 +111,7 @@ impl ImageProvenance {
     /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
     /// later changes had no effect, but returns `later` if a camera moved with keys has since been written to
     /// the scene.
-    pub(crate) fn merged_with_later(&self, later: Self) -> Self {
+    pub(crate) fn or_later_if_camera_saved(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
@@ -147,7 +147,7 @@ pub(crate) fn format_stops(stops: f32) -> String {
 /// A camera step. Steps can arrive faster than previews, so the newest step waits until the previous one has
 /// a preview.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct CameraStep {
+pub(crate) struct CameraStepStatus {
     /// Generation of the step's request.
     pub generation: Option<u64>,
     /// Whether a newer step is waiting.
@@ -173,7 +173,7 @@ pub(crate) struct RequestState {
     pub resize_due: Option<Instant>,
     /// Section of the image to render first.
     pub first_section: Option<NormalizedRect>,
-    pub camera_step: CameraStep,
+    pub camera_step: CameraStepStatus,
     /// The first request whose camera was moved with keys.
     pub moved_since: Option<u64>,
     /// Values that the moved camera parts had in the scene before the first move.
@@ -205,7 +205,7 @@ impl RequestState {
             preview_size: None,
             resize_due: None,
             first_section: None,
-            camera_step: CameraStep::default(),
+            camera_step: CameraStepStatus::default(),
             moved_since: None,
             moved_from: CameraChange::default(),
             text: None,
@@ -291,7 +291,7 @@ impl RequestState {
 
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
-    pub(crate) fn conflicting_camera_saves(&self) -> Vec<String> {
+    pub(crate) fn describe_camera_conflicts(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {

@@ -96,7 +96,7 @@ impl WorkState {
     }
 
     /// Stores a finished render's curve.
-    pub(crate) fn store_noise_curve(&mut self, origin: ImageProvenance) {
+    pub(crate) fn store_finished_noise_curve(&mut self, origin: ImageProvenance) {
         const MAX: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
         self.curves.push((origin, self.curve.clone()));
@@ -116,7 +116,7 @@ impl WorkState {
         self.rendering == RenderState::UnderWay
     }
 
-    pub(crate) fn is_running(&self) -> bool {
+    pub(crate) fn is_request_running(&self) -> bool {
         matches!(self.activity, WorkerActivity::Running { .. })
     }
 
@@ -142,7 +142,7 @@ impl WorkState {
     }
 
     /// Pauses or resumes the request's clock.
-    pub(crate) fn set_paused(&mut self, paused: bool, now: Instant) {
+    pub(crate) fn set_clock_paused(&mut self, paused: bool, now: Instant) {
         self.paused = paused;
         if paused {
             self.paused_at = Some(now);

@@ -67,7 +67,7 @@ fn fixing_a_typo_is_not_an_edit() {
     ui.press_character('b');
     assert!(cells_of(&mut ui, RED) > 500, "{}", ui.screen_text());
     let text = ui.screen_text();
-    assert!(text.contains(&format!("{}, 0 s ago", messages::render_number_label(1, 2))), "{text}");
+    assert!(text.contains(&format!("{}, 0 s ago", messages::render_number_of_count(1, 2))), "{text}");
     assert!(text.contains(&format!("\n{}, shininess 60 → 6  ", messages::BEFORE_EDIT)), "{text}");
     assert!(text.contains("b newest") && !text.contains("b shows"), "{text}");
 }
@@ -213,7 +213,7 @@ fn render_of_last_valid_scene_is_counted_once() {
     end(&mut ui, false, 1.0, 1.0);
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_label(2, 3))),
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_of_count(2, 3))),
         "{}",
         ui.screen_text()
     );
@@ -252,7 +252,7 @@ fn render_of_last_valid_scene_is_numbered() {
     }
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_label(2, 3))),
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_of_count(2, 3))),
         "{}",
         ui.screen_text()
     );
@@ -311,7 +311,7 @@ fn entries_are_numbered_by_render() {
     );
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_label(1, 2))),
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_of_count(1, 2))),
         "{}",
         ui.screen_text()
     );
@@ -334,7 +334,7 @@ fn age_counts_from_the_last_improvement() {
     ui.advance_clock(2000);
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 5 s ago", messages::render_number_label(1, 2))),
+        ui.screen_text().contains(&format!("{}, 5 s ago", messages::render_number_of_count(1, 2))),
         "{}",
         ui.screen_text()
     );
@@ -412,7 +412,7 @@ fn unreadable_scene_has_no_save_hint() {
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
     assert!(
-        ui.screen_text().contains(&messages::save_to_render("cornell.toml", false)),
+        ui.screen_text().contains(&messages::save_to_render_hint("cornell.toml", false)),
         "{}",
         ui.screen_text()
     );

@@ -119,7 +119,7 @@ fn newest_render_progress_is_shown() {
     });
     ui.worker_event(WorkerEvent::Progress { generation, progress: render_progress(0.25, Some(3.0)) });
     ui.press_character('n');
-    let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_number_label(2, 3));
+    let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_number_of_count(2, 3));
     assert!(line(&mut ui, 0).contains(&words), "{}", ui.screen_text());
     ui.press_character('m');
     ui.press_character('N');
@@ -136,7 +136,7 @@ fn age_is_shown_once_and_updated() {
     let mut ui = older();
     ui.advance_clock(3000);
     assert!(
-        line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_number_label(1, 2))),
+        line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_number_of_count(1, 2))),
         "{}",
         ui.screen_text()
     );

@@ -79,7 +79,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.screen_text().contains("path"), "{}", ui.screen_text());
             assert!(ui.press_character('s').is_empty(), "the path integrator always has soft shadows");
             assert!(
-                ui.screen_text().contains(&messages::only_soft_shadows("path", "whitted")),
+                ui.screen_text().contains(&messages::hard_shadows_unsupported("path", "whitted")),
                 "{}",
                 ui.screen_text()
             );

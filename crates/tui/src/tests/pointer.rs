@@ -234,7 +234,7 @@ fn undo_can_be_repeated_until_nothing_is_left() {
         find_render_request(&undone(&mut ui, Ok("a.toml".into()))).is_some(),
         "the restored file should be rendered"
     );
-    assert!(ui.screen_text().contains(&messages::camera_undone("a.toml")), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::camera_save_undone("a.toml")), "{}", ui.screen_text());
     assert!(asks(&mut ui, "one"));
     undone(&mut ui, Ok("a.toml".into()));
     assert!(ui.press_character('u').is_empty());
@@ -279,7 +279,8 @@ fn command_line_camera_overrides_the_file() {
     assert!(kept(&mut ui, true, false).is_empty());
     let text = ui.screen_text();
     assert!(
-        text.contains(&messages::camera_overridden("scenes/cornell.toml")) && text.contains("reset camera"),
+        text.contains(&messages::saved_camera_overridden("scenes/cornell.toml"))
+            && text.contains("reset camera"),
         "{text}"
     );
 }
@@ -298,7 +299,7 @@ fn older_render_is_shown_until_the_next_render() {
     ui.advance_clock(61_000);
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 61 s ago", messages::render_number_label(1, 2))),
+        ui.screen_text().contains(&format!("{}, 61 s ago", messages::render_number_of_count(1, 2))),
         "{}",
         ui.screen_text()
     );
@@ -428,7 +429,8 @@ fn header_marks_an_older_render() {
     ui.press_character('b');
     let first = |ui: &mut TestUi| ui.screen_text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(
-        first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_number_label(1, 2))
+        first(&mut ui).contains("◂ older")
+            && first(&mut ui).contains(&messages::render_number_of_count(1, 2))
     );
     // A key that has no effect clears the message.
     ui.press_character('y');
@@ -534,13 +536,13 @@ fn exposure_changes_add_no_history_entry() {
     }
     assert_eq!(ui.state.work.renders, 2, "exposure changes should not be counted");
     ui.press_character('n');
-    assert!(ui.screen_text().contains(&messages::render_number_label(1, 2)), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::render_number_of_count(1, 2)), "{}", ui.screen_text());
     ui.press_character('N');
     // Toggling a setting adds an entry.
     ui.press_character('s');
     ui.finish_render(BLUE);
     ui.press_character('n');
-    assert!(ui.screen_text().contains(&messages::render_number_label(2, 3)), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::render_number_of_count(2, 3)), "{}", ui.screen_text());
 }
 
 #[test]
@@ -555,7 +557,7 @@ fn older_render_is_shown_with_its_changes() {
     }
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_label(2, 3)))
+        ui.screen_text().contains(&format!("{}, 0 s ago", messages::render_number_of_count(2, 3)))
             && ui.screen_text().contains(&format!("\nr 1 → 2 · {}", messages::HISTORY_KEYS.join(" · "))),
         "{}",
         ui.screen_text()

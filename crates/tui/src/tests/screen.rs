@@ -389,7 +389,7 @@ fn conflict_opens_the_pane_once() {
         ui.screen_text()
     );
     assert!(ui.state.saving.unwritten.is_some() && ui.screen_text().contains(messages::NOT_WRITTEN));
-    assert!(ui.state.work.is_running(), "the render should continue");
+    assert!(ui.state.work.is_request_running(), "the render should continue");
     ui.press_key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(!ui.screen_text().contains("readonly a.png"));
     ui.worker_event(refused());

@@ -141,7 +141,7 @@ fn history_lists_changes_and_opens_on_click() {
     ui.handle_event(Event::Mouse(MouseEvent { kind: MouseEventKind::Release, ..mouse }));
     assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.screen_text());
     assert!(
-        ui.screen_text().contains(&messages::render_number_label(2, 3)) && panel(&mut ui).contains("▸2"),
+        ui.screen_text().contains(&messages::render_number_of_count(2, 3)) && panel(&mut ui).contains("▸2"),
         "{}",
         ui.screen_text()
     );

@@ -82,7 +82,7 @@ fn image_written_on_request_is_named_until_replaced() {
         assert_eq!(summary_text(&ui.state), part);
         finish_unwritten(&mut ui, BLUE);
         assert_eq!(summary_text(&ui.state), part);
-        assert_shows(&mut ui, &messages::unfinished_image("cornell.png"));
+        assert_shows(&mut ui, &messages::written_image_unfinished("cornell.png"));
         assert!(
             !ui.screen_text().contains("→ cornell.png"),
             "a partial image should not be listed: {}",

@@ -121,7 +121,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
         return notify(state, messages::NOTHING_TO_KEEP);
     }
-    let saved = state.request.conflicting_camera_saves();
+    let saved = state.request.describe_camera_conflicts();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !has_mesh_extension(&state.request.scene) {
         // The message below lists the saved values, so they cause no further conflict.
@@ -154,7 +154,7 @@ pub(super) fn handle_saved_camera(
     let words = match (is_new, is_own) {
         _ if of_model => messages::model_scene_written(&name),
         (true, true) => messages::camera_saved(&name),
-        (true, false) => messages::camera_overridden(&name),
+        (true, false) => messages::saved_camera_overridden(&name),
         (false, _) => messages::camera_already_in_scene(&name),
     };
     let which = if state.saving.is_camera_of_newest { messages::OF_NEWEST_RENDER } else { "" };
@@ -195,7 +195,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
     let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();
-    show_notice(state, messages::camera_undone(&name));
+    show_notice(state, messages::camera_save_undone(&name));
     effects
 }
 

@@ -34,7 +34,7 @@ pub(super) fn record_newest(state: &mut State) {
 /// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_image(state) };
+    let Some(newest) = newest_image(state) else { return report_no_newest_image(state) };
     if state.picture.history.returns_to_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
@@ -63,7 +63,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
     record_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_image(state) };
+    let Some(newest) = newest_image(state) else { return report_no_newest_image(state) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_older_render(state, shown);
@@ -86,7 +86,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 }
 
 /// Explains why the history, which consists of previews, has no image.
-fn report_no_image(state: &mut State) -> Vec<Effect> {
+fn report_no_newest_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
     notify(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }

@@ -4,7 +4,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::notices::{notify, show_notice};
 use super::request::{request_render, request_resized_preview};
-use super::views::choose_view;
+use super::views::select_view_and_open_list;
 use super::{camera, edit_position, history, overlay, pointer, region};
 use crate::ExitStatus;
 use crate::action::Action;
@@ -105,7 +105,7 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
 }
 
 /// Returns the name of an integrator that supports a setting, or `None` if the current integrator does.
-fn find_supporting_integrator(
+fn find_integrator_if_unsupported(
     state: &State,
     supports: impl Fn(IntegratorProperties) -> bool,
 ) -> Option<&'static str> {
@@ -116,8 +116,8 @@ fn find_supporting_integrator(
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = find_supporting_integrator(state, |method| method.honors_shadows) {
-        return notify(state, &messages::only_soft_shadows(state.request.integrator().name(), other));
+    if let Some(other) = find_integrator_if_unsupported(state, |method| method.honors_shadows) {
+        return notify(state, &messages::hard_shadows_unsupported(state.request.integrator().name(), other));
     }
     let next = match state.request.shadows() {
         ShadowMode::Soft => ShadowMode::Hard,
@@ -146,7 +146,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = find_supporting_integrator(state, |method| method.gathers) {
+    if let Some(other) = find_integrator_if_unsupported(state, |method| method.gathers) {
         return notify(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.photons();
@@ -157,7 +157,7 @@ fn toggle_photons(state: &mut State) -> Vec<Effect> {
 
 fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
     let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
-    choose_view(state, ViewMode::ALL[(current + steps) % ViewMode::ALL.len()])
+    select_view_and_open_list(state, ViewMode::ALL[(current + steps) % ViewMode::ALL.len()])
 }
 
 fn toggle_image_only(state: &mut State) -> Vec<Effect> {
@@ -192,10 +192,10 @@ fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
-    if !state.work.is_running() && !state.work.paused {
+    if !state.work.is_request_running() && !state.work.paused {
         return notify(state, messages::NOT_RENDERING);
     }
-    state.set_paused(!state.work.paused);
+    state.set_clock_paused(!state.work.paused);
     state.dirty = true;
     vec![Effect::Send(Command::Pause(state.work.paused))]
 }
@@ -221,7 +221,7 @@ fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.warnings_and_write_failure().is_empty() {
-        let is_read = state.overlays.are_warnings_known || !state.work.is_running();
+        let is_read = state.overlays.are_warnings_known || !state.work.is_request_running();
         return notify(state, if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING });
     }
     change_and_mark_dirty(state, |state| {

@@ -124,7 +124,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
 
 fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
-        && has_all_pixels(&shown.picture)
+        && has_matching_pixel_count(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.update_newest_while_viewing_older(&shown) {
@@ -160,7 +160,7 @@ fn keep_nearly_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> Sho
     shown
 }
 
-fn has_all_pixels(picture: &Srgb8Image) -> bool {
+fn has_matching_pixel_count(picture: &Srgb8Image) -> bool {
     picture.width > 0
         && picture.height > 0
         && u64::try_from(picture.pixels.len())
@@ -184,7 +184,8 @@ fn handle_resize(state: &mut State, window: WindowSize) -> Vec<Effect> {
 }
 
 fn tick(state: &mut State) -> Vec<Effect> {
-    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_viewing_older();
+    state.dirty |=
+        state.work.is_request_running() && !state.work.paused || state.picture.history.is_viewing_older();
     let (now, bars) = (state.now, state.work.assets.len());
     state.work.assets.retain(|asset| asset.disappears_at().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;

@@ -2,7 +2,7 @@
 
 use crossterm::event::KeyCode;
 
-use super::views::{self, choose_view};
+use super::views::{self, select_view_and_open_list};
 use super::{history, region};
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
@@ -19,7 +19,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
     }
     if let Some(view) = view_for_digit(state, key) {
         state.overlays.message = None;
-        return Some(choose_view(state, view));
+        return Some(select_view_and_open_list(state, view));
     }
     let action = keymap::overlay_action_for(key)?;
     if let Some(effects) = views::handle_action(state, action) {
@@ -31,7 +31,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
 /// Performs the action if an open overlay uses it. Returns whether it was performed.
 pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
     match action {
-        OverlayAction::Close => close_topmost(state),
+        OverlayAction::Close => close_or_cancel_topmost(state),
         OverlayAction::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
         OverlayAction::LineDown => scroll(state, |line, _| line + 1),
         OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
@@ -53,7 +53,7 @@ fn view_for_digit(state: &State, key: KeyPress) -> Option<ViewMode> {
 
 /// Closes a pane, cancels a pending click or drag, hides the inspected values, or returns to the newest
 /// render, whichever applies first.
-fn close_topmost(state: &mut State) -> bool {
+fn close_or_cancel_topmost(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;
         true

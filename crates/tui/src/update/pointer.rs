@@ -5,7 +5,7 @@ use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
-use crate::math::decimal::{decimal_step, round_to_step};
+use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
 use crate::messages;
 use crate::pipeline::protocol::{Command, PickResult, PickedObject};
 use crate::scene::has_mesh_extension;
@@ -42,7 +42,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
             Some(press) if !press.has_moved => handle_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
-        MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_on_pane(state, mouse) => {
+        MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_over_help_or_diagnostics(state, mouse) => {
             let line = if mouse.kind == MouseEventKind::WheelUp {
                 OverlayAction::LineUp
             } else {
@@ -56,7 +56,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
     }
 }
 
-fn is_on_pane(state: &State, mouse: MouseEvent) -> bool {
+fn is_over_help_or_diagnostics(state: &State, mouse: MouseEvent) -> bool {
     let is_on_errors = || Layout::for_state(state).pane.contains((mouse.column, mouse.row).into());
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
@@ -160,7 +160,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
 }
 
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = round_to_step(depth, decimal_step(depth));
+    let distance = round_to_step(depth, coordinate_step_at_distance(depth));
     if !(distance > 0.0) {
         return notify(state, messages::NOTHING_TO_FOCUS);
     }

@@ -56,7 +56,7 @@ fn section_around(spot: ImagePosition) -> NormalizedRect {
 fn render_section(state: &mut State, section: NormalizedRect) -> Vec<Effect> {
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
-    let words = if state.work.is_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
+    let words = if state.work.is_request_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
     let effects = restart_render(state);
     show_notice(state, words);
     effects
@@ -65,5 +65,9 @@ fn render_section(state: &mut State, section: NormalizedRect) -> Vec<Effect> {
 /// Restarts a running render to change its rendering order. Samples are kept.
 fn restart_render(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
-    if state.work.is_running() && !state.work.paused { request_render(state, false) } else { Vec::new() }
+    if state.work.is_request_running() && !state.work.paused {
+        request_render(state, false)
+    } else {
+        Vec::new()
+    }
 }

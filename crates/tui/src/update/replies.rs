@@ -144,13 +144,13 @@ mod tests {
     use crate::event::Event;
     use crate::fixtures::{TestUi, state, state_with};
     use crate::pipeline::protocol::Command;
-    use crate::pixel_request::ImageRoute;
+    use crate::pixel_request::MultiplexerPassthrough;
     use crate::terminal_replies::TerminalQueries;
     use crate::terminals::{Capabilities, TerminalBrand};
     use crate::update::request_first_render;
 
     /// A UI whose user has requested kitty images.
-    fn ui_requesting_pixels(route: ImageRoute) -> TestUi {
+    fn ui_requesting_pixels(route: MultiplexerPassthrough) -> TestUi {
         let mut state = state(80, 24);
         let request = ImageProtocolRequest { protocol: ImageProtocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn pixels_are_drawn_once_confirmed() {
-        let mut ui = ui_requesting_pixels(ImageRoute::Direct);
+        let mut ui = ui_requesting_pixels(MultiplexerPassthrough::Direct);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         let effects = ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
         assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn missing_pixel_support_is_reported_once() {
-        let mut ui = ui_requesting_pixels(ImageRoute::Direct);
+        let mut ui = ui_requesting_pixels(MultiplexerPassthrough::Direct);
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.screen_text().contains("kitty images"), "{}", ui.screen_text());
         let refusal = ui.state.display.pixels.map(ImageProtocolRequest::unsupported_message);
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn tmux_without_passthrough_is_reported() {
-        let mut ui = ui_requesting_pixels(ImageRoute::Tmux);
+        let mut ui = ui_requesting_pixels(MultiplexerPassthrough::Tmux);
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         ui.advance_clock(900);
         assert_eq!(ui.state.overlays.message, None);

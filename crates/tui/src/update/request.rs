@@ -3,7 +3,7 @@
 use super::history;
 use crate::event::Effect;
 use crate::pipeline::protocol::{Command, Request, WriteMode};
-use crate::state::{CameraStep, KeyOverrides, RenderState, State, WorkerActivity};
+use crate::state::{CameraStepStatus, KeyOverrides, RenderState, State, WorkerActivity};
 use crate::view::layout::Layout;
 
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
@@ -31,7 +31,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.record_original_camera();
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
-    state.request.camera_step = CameraStep::default();
+    state.request.camera_step = CameraStepStatus::default();
     // Clear these for now. If this request renders a saved change, they are set again later.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
@@ -50,7 +50,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     };
     let mut effects = Vec::new();
     if state.work.paused {
-        state.set_paused(false);
+        state.set_clock_paused(false);
         effects.push(Effect::Send(Command::Pause(false)));
     }
     state.work.activity = WorkerActivity::Running { since: state.now };

@@ -29,7 +29,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
         OverlayAction::PageUp => 0,
         OverlayAction::PageDown => last,
         OverlayAction::Find => {
-            set_search_text(state, String::new());
+            open_list_with_search_text(state, String::new());
             return Some(Vec::new());
         }
         OverlayAction::Take => {
@@ -55,12 +55,12 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
         _ => return None,
     }
     let found = find_view(&name);
-    set_search_text(state, name);
+    open_list_with_search_text(state, name);
     Some(found.map_or_else(Vec::new, |view| select_if_changed(state, view)))
 }
 
 /// Selects a view and opens the list.
-pub(super) fn choose_view(state: &mut State, view: ViewMode) -> Vec<Effect> {
+pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Vec<Effect> {
     state.open_view_list();
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
     let effects = request_render(state, false);
@@ -84,7 +84,7 @@ fn find_view(name: &str) -> Option<ViewMode> {
     all().find(begins).or_else(|| all().find(has)).copied()
 }
 
-fn set_search_text(state: &mut State, name: String) {
+fn open_list_with_search_text(state: &mut State, name: String) {
     state.open_view_list();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);
@@ -103,5 +103,5 @@ fn select_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
         return Vec::new();
     }
     state.overlays.message = None;
-    choose_view(state, view)
+    select_view_and_open_list(state, view)
 }

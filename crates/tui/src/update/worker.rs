@@ -44,7 +44,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
-            update_file_descriptions(state, generation, &report);
+            set_written_file_descriptions(state, generation, &report);
             return Vec::new();
         }
         event => event,
@@ -125,7 +125,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             CheckpointUpdate::SetAside { path } => {
                 show_until_key(
                     state,
-                    messages::checkpoint_kept(&escape_invisible_chars(&path.to_string_lossy())),
+                    messages::other_render_checkpoint_kept(&escape_invisible_chars(&path.to_string_lossy())),
                 );
             }
             CheckpointUpdate::Unused { path, why } => {
@@ -161,7 +161,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
         Event::Cancelled { .. } => {
             (state.work.activity, state.work.rendering) = (WorkerActivity::Cancelled, RenderState::Stopped);
-            state.set_paused(false);
+            state.set_clock_paused(false);
             state.work.assets.clear();
         }
     }
@@ -327,7 +327,7 @@ fn is_scene_image_complete(state: &State, generation: u64) -> bool {
 }
 
 /// Adds a description to the files that contain a finished request's image.
-fn update_file_descriptions(state: &mut State, generation: u64, report: &Report) {
+fn set_written_file_descriptions(state: &mut State, generation: u64, report: &Report) {
     let base = state.request.base_view();
     let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {
@@ -382,7 +382,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     }
     state.request.effective = Some(report.settings.clone());
     (state.work.activity, state.work.rendering) = (WorkerActivity::Done, RenderState::Finished);
-    state.set_paused(false);
+    state.set_clock_paused(false);
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
@@ -391,7 +391,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
         state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
-    update_file_descriptions(state, state.request.generation, &report);
+    set_written_file_descriptions(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
@@ -420,7 +420,7 @@ fn add_earlier_seconds(report: &mut Report) {
 fn count_render(state: &mut State, unchanged: bool) {
     let is_counted = std::mem::replace(&mut state.work.is_counted, true);
     let is_new = !unchanged && !is_counted || state.work.renders == 0;
-    let is_shown = state.picture.history.is_newest(state.request.generation);
+    let is_shown = state.picture.history.is_newest_from_request(state.request.generation);
     if is_new || is_shown && state.picture.history.is_newest_unfinished() {
         state.work.renders += 1;
         if is_shown {
@@ -439,7 +439,7 @@ fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
             if let Some(error) = report.image.error {
                 state.work.curve.record_final(render.seconds, error);
             }
-            state.work.store_noise_curve(origin);
+            state.work.store_finished_noise_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
@@ -465,7 +465,7 @@ fn close_empty_pane(state: &mut State) {
 /// Handles a failure. Errors in a file that may be incomplete are withheld until the file has stopped
 /// changing.
 fn handle_failure(state: &mut State, failure: Failure) {
-    state.set_paused(false);
+    state.set_clock_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
     match failure {

@@ -95,7 +95,7 @@ fn pane_lines(state: &State, area: Rect) -> Vec<StyledLine> {
     };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
-        text.extend(styled_lines(
+        text.extend(wrap_text_in_role(
             &format!("error: {}", escape_invisible_chars(work)),
             width,
             TextRole::Error,
@@ -159,7 +159,7 @@ fn format_diagnostic_group(fault: &[&Diagnostic], width: usize) -> Vec<StyledLin
         };
         let number = format_count(places.len(), "place");
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
-        lines.extend(styled_lines(&text, width, TextRole::Plain));
+        lines.extend(wrap_text_in_role(&text, width, TextRole::Plain));
     }
     lines.push(StyledLine::new());
     lines
@@ -172,6 +172,6 @@ fn format_line_and_column(one: &Diagnostic) -> Option<String> {
     Some(format!("{line}:{column}"))
 }
 
-fn styled_lines(text: &str, width: usize, tone: TextRole) -> Vec<StyledLine> {
+fn wrap_text_in_role(text: &str, width: usize, tone: TextRole) -> Vec<StyledLine> {
     wrap_text(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
 }

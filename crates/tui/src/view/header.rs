@@ -9,8 +9,8 @@ use super::layout::{BLOCK, Layout};
 use super::message;
 use super::stages::running_stage;
 use super::text::{
-    TextRole, floor_percent, format_count, format_number, format_running_time, format_seconds, put_text,
-    put_text_right, right_part, text_columns,
+    TextRole, floor_percent, format_count, format_running_time, format_seconds, format_three_digit_number,
+    put_text, put_text_right, right_part, text_columns,
 };
 use crate::action::Action;
 use crate::choice::Choice;
@@ -34,7 +34,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let used = draw_activity_block(state, area, buffer);
     let mut room = right_part(area, used + 1);
     // If there is no other line, a message takes the whole header.
-    if layout.keys.is_empty() && message::replaces_line(state, layout) {
+    if layout.keys.is_empty() && message::replaces_header_or_key_line(state, layout) {
         return;
     }
     if state.picture.is_alone {
@@ -81,11 +81,11 @@ pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, Text
     if state.picture.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
-        worker_activity_label(state)
+        worker_symbol_word_and_role(state)
     }
 }
 
-fn worker_activity_label(state: &State) -> (&'static str, &'static str, TextRole) {
+fn worker_symbol_word_and_role(state: &State) -> (&'static str, &'static str, TextRole) {
     match state.work.activity {
         _ if state.work.paused => ("‖", "paused", TextRole::Warning),
         WorkerActivity::Running { .. } => ("●", "rendering", TextRole::Working),
@@ -100,7 +100,7 @@ fn worker_activity_label(state: &State) -> (&'static str, &'static str, TextRole
 
 /// Returns a word for the worker's state, regardless of the displayed image.
 pub(super) fn worker_activity_word(state: &State) -> &'static str {
-    worker_activity_label(state).1
+    worker_symbol_word_and_role(state).1
 }
 
 /// Draws the scene path, the view and the image size.
@@ -112,7 +112,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
-    let view = close_up_label(state) + &view_label(state);
+    let view = actual_pixels_label(state) + &view_label(state);
     let view = (&*view, TextRole::Strong);
     let mut pieces =
         vec![(&*folder, TextRole::Faint), (&*file, TextRole::Strong), view, (&*size, TextRole::Faint)];
@@ -139,7 +139,7 @@ fn view_label(state: &State) -> String {
     let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
     let range = range.map_or(String::new(), |[least, most]| {
-        format!(" {} to {}", format_number(least), format_number(most))
+        format!(" {} to {}", format_three_digit_number(least), format_three_digit_number(most))
     });
     format!("  view {}{range}", view.name())
 }
@@ -154,7 +154,7 @@ fn lacks_photons(state: &State) -> bool {
 }
 
 /// Label for a preview that shows actual pixels.
-fn close_up_label(state: &State) -> String {
+fn actual_pixels_label(state: &State) -> String {
     let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
@@ -167,7 +167,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));
-                (place, messages::render_number_label(run, newest_render_number(state)))
+                (place, messages::render_number_of_count(run, newest_render_number(state)))
             }
             None => {
                 let place = if is_unfinished { messages::STOPPED } else { messages::OLDER };
@@ -190,7 +190,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         }
         return figures;
     }
-    if state.work.is_running() && lacks_photons(state) {
+    if state.work.is_request_running() && lacks_photons(state) {
         return [messages::WITHOUT_PHOTONS, "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {
@@ -224,7 +224,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
 fn newest_render_number(state: &State) -> u64 {
     let history = &state.picture.history;
     let is_under_way = state.work.is_rendering()
-        && history.is_newest(state.request.generation)
+        && history.is_newest_from_request(state.request.generation)
         && history.is_newest_unfinished();
     state.work.renders + u64::from(is_under_way)
 }

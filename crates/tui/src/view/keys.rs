@@ -49,7 +49,7 @@ const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.keys;
-    if layout.under.is_empty() && message::replaces_line(state, layout) {
+    if layout.under.is_empty() && message::replaces_header_or_key_line(state, layout) {
         return;
     }
     let ways = [KeyHint::for_action(Action::Quit), KeyHint::for_action(Action::ToggleHelp)];
@@ -206,7 +206,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     };
     let has_picture = state.display.kind != PreviewKind::None;
     let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
-    let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_running();
+    let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
     let is_of_use =
         state.request.toggles != KeyOverrides::default() && state.request.describe_key_changes().is_empty();

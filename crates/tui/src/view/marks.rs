@@ -38,7 +38,7 @@ pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
 
 /// Whether to mark the region. It is marked while it is being selected or rendered.
 fn is_region_marked(state: &State) -> bool {
-    state.selection.is_marking || state.work.is_running()
+    state.selection.is_marking || state.work.is_request_running()
 }
 
 /// The cell at a position in the image, if visible.

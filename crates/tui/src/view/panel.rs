@@ -29,7 +29,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksA
     if area.is_empty() {
         return FileLinksAndDelayedText::default();
     }
-    let PanelLayout { lines, columns, room } = panel_layout(state, area);
+    let PanelTextLayout { lines, columns, room } = lay_out_panel_text(state, area);
     let width = room.width / columns;
     let mut drawn = FileLinksAndDelayedText::default();
     for (index, line) in (0..).zip(lines.iter()) {
@@ -47,18 +47,18 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksA
 
 /// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
-    let PanelLayout { lines, columns, room } = panel_layout(state, area);
+    let PanelTextLayout { lines, columns, room } = lay_out_panel_text(state, area);
     side_panel::history_entry_at(state, area, rows_used(&lines, columns, room), place)
 }
 
 /// The panel's lines, the number of columns, and the area available for them.
-struct PanelLayout {
+struct PanelTextLayout {
     lines: Vec<StyledLine>,
     columns: u16,
     room: Rect,
 }
 
-fn panel_layout(state: &State, area: Rect) -> PanelLayout {
+fn lay_out_panel_text(state: &State, area: Rect) -> PanelTextLayout {
     let room = Rect { width: side_panel::available_line_width(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
     let mut lines = panel_lines(state, (room.width, room.width), true);
@@ -72,7 +72,7 @@ fn panel_layout(state: &State, area: Rect) -> PanelLayout {
     }
     let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
     let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
-    PanelLayout { lines, columns, room }
+    PanelTextLayout { lines, columns, room }
 }
 
 /// Number of rows used by the lines. With several columns, all rows are used.
@@ -91,13 +91,13 @@ fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> 
     }
     // If the scene is broken, its stages have no visible result.
     if !is_done && !is_scene_broken(state) {
-        let of = |stage| if is_in_full { stages::stage_lines } else { stages::stage_line_with_reason }(state, stage, width);
+        let of = |stage| if is_in_full { stages::stage_lines_with_full_reason } else { stages::stage_line_with_reason }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
         lines.extend(result_lines(state, column));
     }
-    lines.extend(save_hint_lines(state, column));
+    lines.extend(wrapped_save_scene_hint(state, column));
     // Progress bars are last because they appear and disappear.
     lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     lines
@@ -214,12 +214,12 @@ fn reached_limit(state: &State) -> Option<RenderLimit> {
 
 /// A wrapped hint for users who have not saved yet. If the scene is broken and there is no image, the status
 /// line shows the hint instead.
-fn save_hint_lines(state: &State, width: u16) -> Vec<StyledLine> {
+fn wrapped_save_scene_hint(state: &State, width: u16) -> Vec<StyledLine> {
     if is_scene_broken(state) && state.picture.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();
-    for word in status_line::save_hint(state).split_whitespace() {
+    for word in status_line::save_scene_hint(state).split_whitespace() {
         match lines.last_mut() {
             Some(line) if text_columns(line) + 1 + text_columns(word) <= width => {
                 *line += &format!(" {word}");

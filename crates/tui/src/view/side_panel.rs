@@ -81,7 +81,7 @@ fn divide_curve_and_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect
     let rows = curve::chart_rows(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };
-    if strip::strip_rows(state, below) > 0 || strip::strip_rows(state, area) == 0 {
+    if strip::rows_used_by_strip(state, below) > 0 || strip::rows_used_by_strip(state, area) == 0 {
         return (Rect { height: rows, ..area }, below);
     }
     (Rect::ZERO, area)

@@ -20,7 +20,7 @@ const MIN_WHY: u16 = 12;
 
 /// Formats a stage's symbol, name, time, time difference and reason. A reason that does not fit follows on
 /// separate lines.
-pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
+pub(super) fn stage_lines_with_full_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let why = stage_reason(state, stage);
     if why.is_empty() {
@@ -62,7 +62,7 @@ fn stage_reason(state: &State, stage: Stage) -> String {
 /// A stage's symbol, name, time and, if it fits, the time difference.
 fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
-    let has_ended = !state.work.is_running();
+    let has_ended = !state.work.is_request_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
         None => ("·", TextRole::Faint, String::new()),
         Some((Status::Running, _)) if has_ended => ("✗", TextRole::Error, "stopped".to_owned()),

@@ -54,7 +54,7 @@ enum StatusContent {
 
 fn status_content(state: &State) -> StatusContent {
     // The results belong to the newest render.
-    if state.picture.history.is_viewing_older() && !state.work.is_running() {
+    if state.picture.history.is_viewing_older() && !state.work.is_request_running() {
         return StatusContent::Nothing;
     }
     match state.work.activity {
@@ -67,7 +67,7 @@ fn status_content(state: &State) -> StatusContent {
         WorkerActivity::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
-        WorkerActivity::Broken => StatusContent::Words(save_hint(state)),
+        WorkerActivity::Broken => StatusContent::Words(save_scene_hint(state)),
     }
 }
 
@@ -187,7 +187,7 @@ fn draw_summary(
     let used = drawn.put_line_with_links(state, area, &pieces, buffer);
     let free = right_part(area, used + 2);
     let short = if has_mesh_extension(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
-    let words = [save_hint(state), short.to_owned()];
+    let words = [save_scene_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| text_columns(words) <= free.width);
         put_text_right(buffer, free, &fitting.unwrap_or_default(), TextRole::Faint, state.display.depth);
@@ -240,9 +240,9 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
         return by_hand.map(words).into_iter().collect();
     }
     if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
-        return vec![messages::unfinished_image(&file.name())];
+        return vec![messages::written_image_unfinished(&file.name())];
     }
-    if !state.can_write_image() {
+    if !state.can_overwrite_outputs() {
         return vec![messages::NOT_SAVED_WITH_CONFLICT.to_owned()];
     }
     let image_name = exit_summary::output_file_names(state);
@@ -273,7 +273,7 @@ pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
 }
 
 /// A hint for users who have not saved yet. Empty if there is nothing to save.
-pub(super) fn save_hint(state: &State) -> String {
+pub(super) fn save_scene_hint(state: &State) -> String {
     if state.saving.edits > 0 || is_scene_unreadable(state) {
         return String::new();
     }
@@ -284,7 +284,7 @@ pub(super) fn save_hint(state: &State) -> String {
     if has_mesh_extension(&state.request.scene) {
         return messages::renders_on_changes(&name);
     }
-    messages::save_to_render(&name, state.picture.shown.is_some() || state.work.renders > 0)
+    messages::save_to_render_hint(&name, state.picture.shown.is_some() || state.work.renders > 0)
 }
 
 /// Whether the scene cannot be read at all, for example because the file does not exist.

@@ -103,7 +103,7 @@ fn thumbnail_width(state: &State, picture: &Srgb8Image, cells: Rect) -> u16 {
 
 /// Returns the number of rows that the strip uses in an area, or 0 if there are too few entries or too little
 /// space.
-pub(super) fn strip_rows(state: &State, area: Rect) -> u16 {
+pub(super) fn rows_used_by_strip(state: &State, area: Rect) -> u16 {
     let items = visible_entries(state, area);
     let top = items.iter().map(|item| item.cells.y).min();
     top.map_or(0, |top| area.bottom() - top + 1)

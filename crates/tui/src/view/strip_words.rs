@@ -3,7 +3,7 @@
 use unicode_width::UnicodeWidthStr;
 
 use crate::messages;
-use crate::scene::{key_parts, shortened_key, split_leading_key};
+use crate::scene::{key_parts, shortened_key, split_at_unquoted_space};
 
 /// Text of a history entry.
 pub(super) struct EntryText {
@@ -109,11 +109,11 @@ fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<Ch
     let words = |text: &str| text.split(' ').map(ChangePiece::from_text).collect::<Vec<_>>();
     let key = |key: &str| ChangePiece { text: format_key(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
-        let (name, value) = split_leading_key(rest).unwrap_or((rest, ""));
+        let (name, value) = split_at_unquoted_space(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
         return [ChangePiece::from_text(sign), key(name)].into_iter().chain(value).collect();
     }
-    let of_key = split_leading_key(change).filter(|_| !change.starts_with("line "));
+    let of_key = split_at_unquoted_space(change).filter(|_| !change.starts_with("line "));
     let Some((name, old, new)) = of_key.and_then(|(name, values)| {
         let (old, new) = values.rsplit_once(" → ")?;
         Some((name, old, new))

@@ -246,7 +246,7 @@ pub(super) fn format_two_digit_percent(part: f64) -> String {
 }
 
 /// Formats a number with about three significant digits.
-pub(super) fn format_number(x: f32) -> String {
+pub(super) fn format_three_digit_number(x: f32) -> String {
     let digits = match x.abs() {
         x if x >= 100.0 => 0,
         x if x >= 10.0 => 1,

@@ -78,7 +78,7 @@ impl ConvergenceChart {
         let styles = MARKERS.iter().cycle().zip(COLORS.iter().cycle());
         let lines = self.methods.iter().zip(&points).zip(styles);
         let (trends, signs): (Vec<_>, Vec<_>) =
-            lines.map(|((line, points), style)| datasets(&line.name, points, style)).unzip();
+            lines.map(|((line, points), style)| line_and_marker_datasets(&line.name, points, style)).unzip();
         let across = axis_bounds(points.iter().flatten().map(|point| point.0));
         let up = axis_bounds(points.iter().flatten().map(|point| point.1));
         // Draw markers on top of all lines.
@@ -94,7 +94,7 @@ impl ConvergenceChart {
 }
 
 /// Returns two datasets: the line through the points, and the markers, which carry the method's name.
-fn datasets<'a>(
+fn line_and_marker_datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
     (sign, color): (&char, &Color),

@@ -166,8 +166,9 @@ impl BenchOutputs {
             .map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.check_path_conflicts(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses =
-            AttributeLossPolicy::Report(&|warning| progress.report_write_warning(&warning.to_string()));
+        let losses = AttributeLossPolicy::Report(&|warning| {
+            progress.report_written_file_warning(&warning.to_string());
+        });
         let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         let written = write::atomic_with_policy(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())

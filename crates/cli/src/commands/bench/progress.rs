@@ -10,7 +10,7 @@ use super::chart::ConvergenceChart;
 use crate::args::ProgressMode;
 use crate::bench::{BenchEvent, Results};
 use crate::console::Console;
-use crate::progress::{bar_style, format_seconds, json_line};
+use crate::progress::{bar_style_from_template, format_seconds, json_line};
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// Maximum time between plain lines.
@@ -47,7 +47,8 @@ impl BenchProgress {
             ProgressMode::Auto if console.is_terminal => {
                 let target = ProgressDrawTarget::stderr_with_hz(FRAMES);
                 let bar = ProgressBar::with_draw_target(Some(STEPS), target);
-                let bar = bar.with_style(bar_style("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
+                let bar =
+                    bar.with_style(bar_style_from_template("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
                 ProgressFormat::Bar(bar, ConvergenceChart::default())
             }
             ProgressMode::Auto | ProgressMode::Plain => ProgressFormat::Plain,
@@ -158,7 +159,7 @@ impl BenchProgress {
     }
 
     /// Reports a warning about a written file.
-    pub(super) fn report_write_warning(&self, message: &str) {
+    pub(super) fn report_written_file_warning(&self, message: &str) {
         if self.is_text() {
             self.console.print_message(&format!("warning: {message}"));
         } else {

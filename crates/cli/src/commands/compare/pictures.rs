@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::path::Path;
 
-use super::format_significant_digits;
+use super::format_six_significant_digits;
 use crate::args::{CompareArgs, ImageVisibility};
 use crate::compare::{self, Pair, PairMeasurements};
 use crate::console::Console;
@@ -26,7 +26,7 @@ pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeas
     if !is_wanted {
         return String::new();
     }
-    let (difference, description) = difference_image(pair, measured);
+    let (difference, description) = flip_or_difference_with_label(pair, measured);
     let pictures = [
         tone_mapped(&file_name(&args.a), pair.a()),
         tone_mapped(&format!("{}, the reference", file_name(&args.b)), pair.b()),
@@ -54,7 +54,7 @@ fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
 }
 
 /// Returns FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
-fn difference_image(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
+fn flip_or_difference_with_label(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {
         return (compare::flip_heat_map(pair, &measured.flip), "FLIP".to_owned());
@@ -62,7 +62,7 @@ fn difference_image(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage,
     let mut image = compare::absolute_difference(pair);
     let scale = (1.0 / errors.max) as f32;
     image.pixels.iter_mut().for_each(|pixel| *pixel *= scale);
-    (image, format!("|a - b|, white is {}", format_significant_digits(errors.max)))
+    (image, format!("|a - b|, white is {}", format_six_significant_digits(errors.max)))
 }
 
 #[cfg(test)]
@@ -74,7 +74,7 @@ mod tests {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::splat(0.5), Vec3::splat(value)] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
-        difference_image(&pair, &compare::measure(&pair))
+        flip_or_difference_with_label(&pair, &compare::measure(&pair))
     }
 
     #[test]

@@ -82,7 +82,7 @@ impl EnvCompleter for BashCompleter {
         let last = words.len().saturating_sub(1);
         for candidate in complete(command, words, last, folder)? {
             let rest = candidate.get_value().to_str().and_then(|value| value.strip_prefix(begun));
-            if let Some(quoted) = rest.and_then(|rest| quote_candidate(rest, kept.quote, keeps_home)) {
+            if let Some(quoted) = rest.and_then(|rest| quote_text_for_bash(rest, kept.quote, keeps_home)) {
                 writeln!(out, "{quoted}")?;
             }
         }
@@ -139,7 +139,7 @@ fn split_command_line(line: &str) -> CommandLine {
 }
 
 /// Quotes a candidate that is inserted after the open quote `quote`. `None` if it cannot be quoted.
-fn quote_candidate(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
+fn quote_text_for_bash(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
         // Control characters cannot be written inside quotes.
@@ -212,7 +212,7 @@ mod tests {
             [("", "", Quote::None), ("'", "'", Quote::Single), ("\"", "\"", Quote::Double)]
         {
             for name in names {
-                let Some(text) = quote_candidate(name, quote, false) else {
+                let Some(text) = quote_text_for_bash(name, quote, false) else {
                     assert!(quote != Quote::None && name.chars().any(char::is_control), "{name:?}");
                     continue;
                 };
@@ -239,6 +239,6 @@ mod tests {
         assert_eq!(line.quote, Quote::Double);
         assert_eq!(split_command_line("glimt ").words, ["glimt", ""]);
         assert_eq!(split_command_line("glimt 'x").quote, Quote::Single);
-        assert_eq!(quote_candidate("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
+        assert_eq!(quote_text_for_bash("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
     }
 }

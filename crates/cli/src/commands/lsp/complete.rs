@@ -94,7 +94,7 @@ fn missing_key_items(of: CursorTable, given: &[String], is_assigned: bool) -> Ve
             key.name,
             CompletionItemKind::PROPERTY,
             &describe_key(key),
-            whole(key.name, &key.example()),
+            whole(key.name, &key.default_or_example()),
         );
         item.detail = Some(key.kind_text().replace('`', ""));
         item

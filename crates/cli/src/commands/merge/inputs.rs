@@ -27,7 +27,7 @@ impl<'a> RenderInputFiles<'a> {
         // The output may be a link into the scene's folder.
         let target = out.canonicalize().ok();
         let outs = [Some(out), target.as_deref()].into_iter().flatten();
-        let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| scene_paths(parts, out)).collect();
+        let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| possible_scene_paths(parts, out)).collect();
         let named = scenes.iter().flat_map(|scene| referenced_files(scene)).collect::<Vec<_>>();
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
@@ -54,12 +54,12 @@ impl<'a> RenderInputFiles<'a> {
             Some(format!("the parts were rendered from it ({name})"))
         };
         match by_name().or_else(|| find(&self.named)).or_else(by_content) {
-            None => Ok(find(self.companions()?)),
+            None => Ok(find(self.files_referenced_by_inputs()?)),
             reason => Ok(reason),
         }
     }
 
-    fn companions(&self) -> Result<&BTreeSet<PathBuf>, Cancelled> {
+    fn files_referenced_by_inputs(&self) -> Result<&BTreeSet<PathBuf>, Cancelled> {
         match self.companions.get() {
             Some(companions) => Ok(companions),
             None => {
@@ -72,7 +72,7 @@ impl<'a> RenderInputFiles<'a> {
 
 /// Returns every path at which a part's scene may be, whether or not it exists: first relative to each part,
 /// then next to the output.
-pub(super) fn scene_paths(parts: &[PartFile], out: &Path) -> impl Iterator<Item = PathBuf> {
+pub(super) fn possible_scene_paths(parts: &[PartFile], out: &Path) -> impl Iterator<Item = PathBuf> {
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
     let named = named.map(|part| part.path.with_file_name(&part.head.scene));
     let metadata = parts.iter().flat_map(|part| &part.head.picture.metadata);

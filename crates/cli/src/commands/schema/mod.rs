@@ -170,7 +170,7 @@ fn all_types_schema(info: &'static TableInfo) -> Value {
         let of_name: Vec<_> = own().filter(|(_, other)| other.name == key.name).collect();
         properties.insert(key.name.to_owned(), shared_key_schema(&of_name));
         if of_name.len() < info.types.len() {
-            dependencies.insert(key.name.to_owned(), type_dependency(info, &of_name));
+            dependencies.insert(key.name.to_owned(), key_type_restriction_schema(info, &of_name));
         }
     }
     let mut table = json!({ "type": "object", "properties": properties, "additionalProperties": false });
@@ -194,7 +194,10 @@ fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Val
 }
 
 /// Returns the dependency that restricts a key to its types.
-fn type_dependency(info: &TableInfo, keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Value {
+fn key_type_restriction_schema(
+    info: &TableInfo,
+    keys: &[(&'static TableTypeInfo, &'static KeyInfo)],
+) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
     let mut schema = json!({ "properties": { "type": { "enum": names } } });

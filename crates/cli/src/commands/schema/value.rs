@@ -30,10 +30,12 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
         ValueKind::File(endings) => path_schema(endings),
         ValueKind::Color(limits) => json!({ "anyOf": color_schemas(limits, draft) }),
-        ValueKind::ColorOrTexture(limits) => any_of(color_schemas(limits, draft), texture_schema(json!({}))),
+        ValueKind::ColorOrTexture(limits) => {
+            any_of(color_schemas(limits, draft), texture_reference_schema(json!({})))
+        }
         ValueKind::Emission(limits) => {
             let scale = json!({ "anyOf": color_schemas(Limits::AtLeast(0.0), draft) });
-            any_of(color_schemas(limits, draft), texture_schema(json!({ "scale": scale })))
+            any_of(color_schemas(limits, draft), texture_reference_schema(json!({ "scale": scale })))
         }
         ValueKind::NumberOrTexture(limits) => any_of(vec![number_schema(limits, draft)], channel_schema()),
         ValueKind::Numbers(count, _, limits) => number_array_schema(count, limits, draft),
@@ -127,7 +129,7 @@ fn path_schema(endings: &[&str]) -> Value {
 }
 
 /// Returns the schema for `{ texture = "name" }` with additional keys.
-fn texture_schema(more: Value) -> Value {
+fn texture_reference_schema(more: Value) -> Value {
     let mut properties = more;
     properties["texture"] =
         json!({ "type": "string", "minLength": 1, "description": "The name of a texture." });
@@ -138,5 +140,5 @@ fn texture_schema(more: Value) -> Value {
 fn channel_schema() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
     let doc = "The channel to read. The default is luminance, or alpha for opacity.";
-    texture_schema(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
+    texture_reference_schema(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
 }

@@ -194,7 +194,7 @@ impl MaterialReader<'_> {
         color: &TexturedValue,
     ) -> Result<Alpha, GltfError> {
         let texture = match &color.texture {
-            Some(texture) if self.may_have_alpha(texture.image) => color.texture.clone(),
+            Some(texture) if self.can_image_have_alpha(texture.image) => color.texture.clone(),
             Some(_) | None => None,
         };
         let value = TexturedValue { factor: DVec3::splat(clamp_to_unit(alpha)), texture };
@@ -214,7 +214,7 @@ impl MaterialReader<'_> {
 
     /// Whether an image may have an alpha channel. Checks the first bytes of embedded images and the names of
     /// image files.
-    fn may_have_alpha(&self, image: usize) -> bool {
+    fn can_image_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.locate_image(image) {
             Ok(ImageLocation::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,

@@ -102,7 +102,7 @@ impl GltfFile {
     /// [`AssetError`], with the location in the JSON.
     pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
         let monitor = Monitor { progress, token };
-        let bytes = read::read_unless_all_zero(path, FILE_LIMIT, monitor)?;
+        let bytes = read::read_unless_zeros_at_start(path, FILE_LIMIT, monitor)?;
         read::refuse_utf16(path, &bytes)?;
         let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
@@ -301,7 +301,7 @@ impl GltfFile {
     ///
     /// # Errors
     /// Same as [`GltfFile::check_image_header`].
-    pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
+    pub fn check_image_decodes(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let texels = match self.locate_image(number)? {
             ImageLocation::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),

@@ -40,13 +40,17 @@ impl GltfFile {
         let SceneWalk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
-        self.measure_bounds(&mut scene, token)?;
+        self.measure_bounds_and_outline(&mut scene, token)?;
         Ok(scene)
     }
 
     /// Computes the bounds and outline of the instances. Skips invalid parts unless all parts are invalid.
     /// Their errors are reported when the parts are loaded.
-    fn measure_bounds(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
+    fn measure_bounds_and_outline(
+        &self,
+        scene: &mut ModelScene,
+        token: &CancelToken,
+    ) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
         let (mut vertices, mut first_wrong) = (0, None);
         for instance in &scene.instances {

@@ -34,7 +34,7 @@ impl Primitive {
 
 impl GltfFile {
     /// Returns a part's location in the file and its primitive.
-    pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
+    pub(super) fn part_location_and_primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;
         for (mesh, json) in self.root.meshes.iter().enumerate() {
             if let Some(primitive) = part.checked_sub(first).and_then(|index| json.primitives.get(index)) {
@@ -60,7 +60,7 @@ impl GltfFile {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
-        let Some((place, primitive)) = self.primitive(part) else {
+        let Some((place, primitive)) = self.part_location_and_primitive(part) else {
             return Err(self.malformed_error(GltfError::index_out_of_range("part", part, self.part_count())));
         };
         let parsed = self

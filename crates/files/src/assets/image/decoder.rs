@@ -12,7 +12,7 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Lim
 
 use super::exr::ExrDecoder;
 use super::hdr::HdrDecoder;
-use super::metadata::{AlphaUsage, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
 use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
@@ -49,7 +49,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::Tga) => {
-            let (decoder, alpha) = tga::open(reader.into_inner())?;
+            let (decoder, alpha) = tga::open_with_alpha_usage(reader.into_inner())?;
             Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
         }
         Some(ImageFormat::Jpeg) => {
@@ -61,7 +61,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
         Some(ImageFormat::Bmp) => {
             let (decoder, mut metadata) =
                 decoder_with_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
-            metadata.alpha = AlphaUsage::UnusedIfZero;
+            metadata.alpha = AlphaInterpretation::UnusedIfZero;
             Ok((decoder, metadata))
         }
         Some(ImageFormat::WebP) => {
@@ -115,7 +115,7 @@ pub(super) fn bytes_per_texel(color: ColorType, encoding: ImageEncoding, metadat
     let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
     match encoding {
         ImageEncoding::CutOut(_) if color.has_alpha() => {
-            if is_packed && metadata.alpha != AlphaUsage::Premultiplied { 4 } else { 16 }
+            if is_packed && metadata.alpha != AlphaInterpretation::Premultiplied { 4 } else { 16 }
         }
         _ if is_packed => 3,
         _ => 12,

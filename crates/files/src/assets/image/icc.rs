@@ -15,7 +15,10 @@ pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<Color
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb_color_space(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
             let curve = profile.curve(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
-            Ok(ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), DMat3::IDENTITY))
+            Ok(ColorSpace::from_curves_and_matrix(
+                Some([curve.clone(), curve.clone(), curve]),
+                DMat3::IDENTITY,
+            ))
         }
         (Some(b"RGB "), Some(b"Lab ")) if !is_gray => Err(LOOKUP_TABLES.to_owned()),
         (Some(space), _) => {
@@ -77,7 +80,7 @@ impl<'a> IccProfile<'a> {
             return Err(DEGENERATE_PRIMARIES.to_owned());
         }
         let matrix = colorants_to_rec_709(colorants).ok_or(DEGENERATE_PRIMARIES)?;
-        Ok(ColorSpace::new(Some([r, g, b]), matrix))
+        Ok(ColorSpace::from_curves_and_matrix(Some([r, g, b]), matrix))
     }
 
     fn read_xyz_tag(&self, name: &[u8; 4]) -> Option<DVec3> {

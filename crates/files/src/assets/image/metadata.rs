@@ -5,7 +5,7 @@ use super::space::ColorSpace;
 
 /// Meaning of the alpha sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum AlphaUsage {
+pub(super) enum AlphaInterpretation {
     /// Straight alpha: colors are not multiplied by alpha.
     #[default]
     Straight,
@@ -33,7 +33,7 @@ pub(super) struct ImageMetadata {
     /// Color space.
     pub(super) space: ColorSpace,
     /// Meaning of the alpha sample.
-    pub(super) alpha: AlphaUsage,
+    pub(super) alpha: AlphaInterpretation,
     /// Warnings about ignored parts of the file.
     pub(super) warnings: Vec<ImageWarning>,
 }

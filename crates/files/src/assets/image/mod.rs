@@ -217,14 +217,14 @@ pub fn size(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(
+    source_size_and_texel_bytes(
         ImageSource::open(path, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
     )
 }
 
-fn size_of_source(
+fn source_size_and_texel_bytes(
     file: ImageSource,
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
@@ -269,7 +269,7 @@ pub fn size_embedded(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(
+    source_size_and_texel_bytes(
         ImageSource::from_embedded(image, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },

@@ -69,11 +69,11 @@ pub(super) fn read_without_text_chunks(
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,
-    profile: Option<ProfileChunk>,
+    profile: Option<DecompressedProfile>,
 }
 
 /// A color profile, or `None` if it cannot be decompressed.
-type ProfileChunk = Option<Vec<u8>>;
+type DecompressedProfile = Option<Vec<u8>>;
 
 impl<R: BufRead + Seek> PngDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
@@ -134,7 +134,10 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         if matrix.is_none() {
             metadata.warn("a degenerate cHRM chunk is ignored");
         }
-        ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), matrix.unwrap_or(DMat3::IDENTITY))
+        ColorSpace::from_curves_and_matrix(
+            Some([curve.clone(), curve.clone(), curve]),
+            matrix.unwrap_or(DMat3::IDENTITY),
+        )
     }
 }
 
@@ -207,7 +210,7 @@ fn color_space_from_cicp(points: png::CodingIndependentCodePoints) -> Option<Col
     };
     let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
     let curves = [curve.clone(), curve.clone(), curve];
-    is_plain.then(|| Some(ColorSpace::new(Some(curves), primaries.to_rec_709()?)))?
+    is_plain.then(|| Some(ColorSpace::from_curves_and_matrix(Some(curves), primaries.to_rec_709()?)))?
 }
 
 /// Warning about unsupported code points.
@@ -225,7 +228,7 @@ fn unsupported_cicp_warning(points: png::CodingIndependentCodePoints) -> String 
 }
 
 /// Reads a file's color profile, then rewinds the file.
-fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
+fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
     let profile = find_profile(file);
     file.seek(SeekFrom::Start(0))?;
     match profile {
@@ -235,7 +238,7 @@ fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk
     }
 }
 
-fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
+fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
     const SIGNATURE: u64 = 8;
     const CHECKSUM: i64 = 4;
     file.seek(SeekFrom::Start(SIGNATURE))?;

@@ -39,15 +39,15 @@ impl Primaries {
 
     /// XYZ of the white point, with Y = 1.
     fn white_xyz(&self) -> DVec3 {
-        chromaticity_to_xyz(self.white) / self.white[1]
+        chromaticity_to_unit_sum_xyz(self.white) / self.white[1]
     }
 
     /// Matrix to XYZ, scaled to map (1, 1, 1) to white. `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(
-            chromaticity_to_xyz(self.red),
-            chromaticity_to_xyz(self.green),
-            chromaticity_to_xyz(self.blue),
+            chromaticity_to_unit_sum_xyz(self.red),
+            chromaticity_to_unit_sum_xyz(self.green),
+            chromaticity_to_unit_sum_xyz(self.blue),
         );
         let scales = inverse(primaries)? * self.white_xyz();
         let matrix = primaries * DMat3::from_diagonal(scales);
@@ -77,7 +77,7 @@ pub(super) fn is_identity(matrix: &DMat3) -> bool {
 
 /// Matrix from XYZ with this white point to linear Rec. 709.
 fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
-    let to_cones = bradford_cone_response();
+    let to_cones = bradford_cone_response_matrix();
     let [from, to] = [white, Primaries::REC_709.white_xyz()].map(|white| to_cones * white);
     let adapted = inverse(to_cones)? * DMat3::from_diagonal(to / from) * to_cones;
     let matrix = inverse(Primaries::REC_709.to_xyz()?)? * adapted;
@@ -85,11 +85,11 @@ fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
 }
 
 /// Bradford cone response matrix (Lam, *Metamerism and Colour Constancy*, University of Bradford, 1985).
-fn bradford_cone_response() -> DMat3 {
+fn bradford_cone_response_matrix() -> DMat3 {
     DMat3::from_cols_array(&[0.8951, -0.7502, 0.0389, 0.2664, 1.7135, -0.0685, -0.1614, 0.0367, 1.0296])
 }
 
-fn chromaticity_to_xyz([x, y]: [f64; 2]) -> DVec3 {
+fn chromaticity_to_unit_sum_xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 

@@ -131,7 +131,7 @@ pub(super) struct ColorSpace {
 
 impl ColorSpace {
     /// Creates a color space from its curves (`None` for the default) and its matrix to linear Rec. 709.
-    pub(super) fn new(curves: Option<[TransferFunction; 3]>, matrix: DMat3) -> Self {
+    pub(super) fn from_curves_and_matrix(curves: Option<[TransferFunction; 3]>, matrix: DMat3) -> Self {
         Self {
             curves: curves.filter(|curves| !curves.iter().all(TransferFunction::is_srgb)),
             matrix: (!is_identity(&matrix)).then_some(matrix),
@@ -140,7 +140,7 @@ impl ColorSpace {
 
     /// Creates a color space that differs from the default only in its primaries.
     pub(super) fn with_matrix_to_rec_709(matrix: DMat3) -> Self {
-        Self::new(None, matrix)
+        Self::from_curves_and_matrix(None, matrix)
     }
 
     pub(super) fn is_default(&self) -> bool {
@@ -160,7 +160,7 @@ impl ColorSpace {
     }
 
     /// Converts linear light in this space to linear Rec. 709.
-    pub(super) fn to_rec_709_color(&self, linear: [f32; 3]) -> [f32; 3] {
+    pub(super) fn linear_to_rec_709(&self, linear: [f32; 3]) -> [f32; 3] {
         let Some(matrix) = &self.matrix else { return linear };
         (*matrix * DVec3::from_array(linear.map(f64::from))).as_vec3().to_array()
     }
@@ -217,10 +217,13 @@ mod tests {
     #[test]
     fn the_default_space_is_recognized() {
         let srgb = || Some([TransferFunction::Srgb, TransferFunction::Srgb, TransferFunction::Srgb]);
-        assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_default());
-        assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_default());
+        assert!(ColorSpace::from_curves_and_matrix(srgb(), DMat3::IDENTITY).is_default());
         assert!(
-            !ColorSpace::new(
+            !ColorSpace::from_curves_and_matrix(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0)))
+                .is_default()
+        );
+        assert!(
+            !ColorSpace::from_curves_and_matrix(
                 Some([TransferFunction::Srgb, TransferFunction::LINEAR, TransferFunction::Srgb]),
                 DMat3::IDENTITY
             )

@@ -7,7 +7,7 @@ use ::image::codecs::tga::TgaDecoder;
 use ::image::error::{DecodingError, ImageFormatHint};
 use ::image::{ImageError, ImageFormat, ImageResult};
 
-use super::metadata::AlphaUsage;
+use super::metadata::AlphaInterpretation;
 
 /// Size of the TGA header in bytes.
 const HEADER: usize = 18;
@@ -26,20 +26,22 @@ type PatchedTga<R> = Chain<Cursor<[u8; HEADER]>, R>;
 
 /// Creates a decoder and determines the meaning of alpha. `image` requires the header to declare exactly as
 /// many alpha bits as the pixel format can store, but many files declare too many or none at all.
-pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<PatchedTga<R>>, AlphaUsage)> {
+pub(super) fn open_with_alpha_usage<R: Read + Seek>(
+    mut file: R,
+) -> ImageResult<(TgaDecoder<PatchedTga<R>>, AlphaInterpretation)> {
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
     let alpha_bits = header[DESCRIPTOR] & ALPHA_BITS;
     let alpha = match attribute_type(&mut file) {
-        Ok(Some(0..=2)) => AlphaUsage::Unused,
-        Ok(Some(4)) => AlphaUsage::Premultiplied,
-        Ok(Some(3)) => AlphaUsage::Straight,
-        Ok(_) | Err(_) if alpha_bits == 0 => AlphaUsage::Unused,
-        Ok(_) | Err(_) => AlphaUsage::Straight,
+        Ok(Some(0..=2)) => AlphaInterpretation::Unused,
+        Ok(Some(4)) => AlphaInterpretation::Premultiplied,
+        Ok(Some(3)) => AlphaInterpretation::Straight,
+        Ok(_) | Err(_) if alpha_bits == 0 => AlphaInterpretation::Unused,
+        Ok(_) | Err(_) => AlphaInterpretation::Straight,
     };
     // `image` does not decode the alpha bit of 16-bit colors.
-    let has_alpha_bit = color_bits(&header) == Some(16) && alpha != AlphaUsage::Unused;
-    let alpha = if has_alpha_bit { AlphaUsage::Dropped } else { alpha };
+    let has_alpha_bit = color_bits(&header) == Some(16) && alpha != AlphaInterpretation::Unused;
+    let alpha = if has_alpha_bit { AlphaInterpretation::Dropped } else { alpha };
     header[DESCRIPTOR] =
         header[DESCRIPTOR] & !ALPHA_BITS | possible_alpha_bits(&header).map_err(decoding_error)?;
     file.seek(SeekFrom::Start(HEADER as u64))?;

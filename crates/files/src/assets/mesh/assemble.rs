@@ -63,8 +63,8 @@ pub(super) fn assemble_text_mesh(
     }
     let bad_uvs = [&uvs, &second_uvs].map(|uvs| non_finite_vertices(uvs, |uv| uv.is_finite()));
     let bad_normals = non_finite_vertices(&normals, |normal| normal.is_finite());
-    warnings.extend(non_finite_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
-    warnings.extend(non_finite_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
+    warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
+    warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
     let materials_of = triangle_materials;
     let mut mesh = TriangleMesh {
         origin,
@@ -128,7 +128,7 @@ fn non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u
 }
 
 /// Warns about the first face that uses any of the vertices.
-fn non_finite_warning(
+fn first_non_finite_face_warning(
     faces: &Faces,
     line_of: impl Fn(usize) -> Option<usize>,
     vertices: &[u32],

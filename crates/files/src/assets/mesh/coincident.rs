@@ -17,7 +17,7 @@ type HashedVertex = (u32, u32);
 
 /// Finds sets of coincident vertices, each in ascending order. The order of the sets is arbitrary but
 /// deterministic.
-pub(super) fn find_coincident_vertices(
+pub(super) fn find_coincident_vertex_sets(
     positions: &[Vec3],
     token: &CancelToken,
 ) -> Result<Vec<Vec<u32>>, Cancelled> {
@@ -108,12 +108,12 @@ mod tests {
         // Positions repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
-        let mut found = find_coincident_vertices(&positions, &CancelToken::new()).expect("not cancelled");
+        let mut found = find_coincident_vertex_sets(&positions, &CancelToken::new()).expect("not cancelled");
         found.sort_unstable();
         let expected: Vec<Vec<u32>> =
             (0..5000).map(|i| (0..4).map(|turn| i + 5000 * turn).collect()).collect();
         assert_eq!(found, expected);
-        assert_eq!(find_coincident_vertices(&[], &CancelToken::new()), Ok(Vec::new()));
+        assert_eq!(find_coincident_vertex_sets(&[], &CancelToken::new()), Ok(Vec::new()));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::math::Vec2;
 const BATCH: usize = 1 << 14;
 
 /// A corner's vertex index, texture coordinates (as bit patterns) and color.
-type CornerKey = (u32, [u32; 2], [u8; 3]);
+type VertexUvColorKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates one vertex for each combination of vertex, texture coordinates and color that occurs at a corner.
 /// New vertices keep the normal of the original vertex.
@@ -25,7 +25,7 @@ pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Re
     }
     let mut sources = Vec::new();
     let (mut new_uvs, mut new_colors) = (Vec::new(), Vec::new());
-    let mut known: HashMap<CornerKey, u32> = HashMap::new();
+    let mut known: HashMap<VertexUvColorKey, u32> = HashMap::new();
     for (place, corner) in parsed.faces.corners.iter_mut().enumerate() {
         if place % BATCH == 0 {
             token.check()?;

@@ -49,7 +49,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         "obj" => (obj::parse, read::read_text),
         "off" => (off::parse, read::read_text_or_binary),
         "ply" => (ply::parse, read::read_text_or_binary),
-        "stl" => (stl::parse, read::read_unless_all_zero),
+        "stl" => (stl::parse, read::read_unless_zeros_at_start),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
     let monitor = Monitor { progress, token };

@@ -38,7 +38,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
     }
-    let places = coincident::find_coincident_vertices(&mesh.positions, token)?;
+    let places = coincident::find_coincident_vertex_sets(&mesh.positions, token)?;
     let mut joined = sums.clone();
     for place in &places {
         token.check()?;
@@ -85,7 +85,7 @@ fn first_vertex_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
 
 /// Whether a mesh without normals consists of flat faces, like a box. In a faceted mesh, the face normals
 /// around most vertices partly cancel out.
-pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
+pub(crate) fn is_faceted_without_normals(mesh: &TriangleMesh) -> bool {
     /// Minimum length of the mean unit normal around a vertex on a smooth surface. It corresponds to normals
     /// that form a cone with a half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
@@ -351,9 +351,9 @@ mod tests {
         let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
         let mut cube =
             TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() };
-        assert!(is_faceted(&cube));
+        assert!(is_faceted_without_normals(&cube));
         cube.normals = vec![Vec3::Y; 8];
-        assert!(!is_faceted(&cube), "the mesh has normals");
-        assert!(!is_faceted(&sphere(8)) && !is_faceted(&sphere(60)));
+        assert!(!is_faceted_without_normals(&cube), "the mesh has normals");
+        assert!(!is_faceted_without_normals(&sphere(8)) && !is_faceted_without_normals(&sphere(60)));
     }
 }

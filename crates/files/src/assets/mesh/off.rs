@@ -14,7 +14,7 @@ const BATCH: u64 = 1 << 13;
 
 /// Vertex columns declared by the header keyword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct OffHeader {
+struct OffVertexColumns {
     uvs: bool,
     normals: bool,
     colors: bool,
@@ -156,7 +156,7 @@ impl OffColors {
 
 impl OffReader<'_> {
     fn read(mut self) -> Result<LoadedMesh, AssetError> {
-        let header = self.header()?;
+        let header = self.read_header_keyword()?;
         let vertices = self.read_count("vertices")?;
         let faces = self.read_count("faces")?;
         self.skip_edge_count()?;
@@ -194,7 +194,7 @@ impl OffReader<'_> {
     }
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
-    fn header(&mut self) -> Result<OffHeader, AssetError> {
+    fn read_header_keyword(&mut self) -> Result<OffVertexColumns, AssetError> {
         if !self.cursor.skip_to_word() {
             return self.fail(EMPTY_FILE);
         }
@@ -202,7 +202,7 @@ impl OffReader<'_> {
         let word = self.cursor.word();
         if word[0].is_ascii_digit() && !word.ends_with(b"OFF") {
             self.cursor = start;
-            return Ok(OffHeader::default());
+            return Ok(OffVertexColumns::default());
         }
         let Some(end) = word.windows(3).position(|part| part == b"OFF") else {
             self.cursor = start;
@@ -216,7 +216,7 @@ impl OffReader<'_> {
         self.cursor = Cursor::new(self.source.bytes, self.cursor.offset() - digits.len());
         self.refuse_binary()?;
         let has = |letter| flags.contains(&letter);
-        Ok(OffHeader { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
+        Ok(OffVertexColumns { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
     }
 
     fn refuse_binary(&mut self) -> Result<(), AssetError> {
@@ -255,7 +255,7 @@ impl OffReader<'_> {
             let mut ahead = self.cursor;
             return self.fail(words_after_counts_message(ahead.word()));
         }
-        self.cursor.end_line();
+        self.cursor.move_to_next_line();
         Ok(())
     }
 
@@ -272,7 +272,12 @@ impl OffReader<'_> {
         Ok(())
     }
 
-    fn vertices(&mut self, header: OffHeader, count: u64, parsed: &mut ParsedMesh) -> Result<(), AssetError> {
+    fn vertices(
+        &mut self,
+        header: OffVertexColumns,
+        count: u64,
+        parsed: &mut ParsedMesh,
+    ) -> Result<(), AssetError> {
         parsed.positions.reserve(count as usize);
         let mut colors = OffColors::default();
         for index in 0..count {
@@ -289,7 +294,7 @@ impl OffReader<'_> {
                 parsed.normals.push(self.read_vec3("a normal")?.as_vec3());
             }
             if header.colors {
-                let rest = self.rest_of_line()?;
+                let rest = self.read_numbers_to_line_end()?;
                 let (color, uv) = rest.split_at(rest.len().saturating_sub(if header.uvs { 2 } else { 0 }));
                 if header.uvs {
                     let [u, v] = *uv else {
@@ -297,20 +302,20 @@ impl OffReader<'_> {
                     };
                     parsed.uvs.push(DVec2::new(u, v).as_vec2());
                 }
-                self.add_color(color, 1, &mut colors);
+                self.add_color_repeatedly(color, 1, &mut colors);
             } else if header.uvs {
                 parsed.uvs.push(self.read_uv()?);
             } else if self.cursor.skip_to_word_in_line() {
                 self.excess.add(self.cursor.offset());
             }
-            self.cursor.end_line();
+            self.cursor.move_to_next_line();
         }
         parsed.colors = colors.finish(&self.source, &mut parsed.warnings);
         Ok(())
     }
 
     /// Adds a color from the end of a line to `times` vertices or corners.
-    fn add_color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
+    fn add_color_repeatedly(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
         colors.push(color, times, self.cursor.offset());
         match color {
             [_, _, _, alpha] => colors.track_lowest_alpha(*alpha, self.cursor.offset()),
@@ -336,7 +341,7 @@ impl OffReader<'_> {
 
     /// Reads the remaining numbers on the line: a color with any number of components, and texture
     /// coordinates.
-    fn rest_of_line(&mut self) -> Result<Vec<f64>, AssetError> {
+    fn read_numbers_to_line_end(&mut self) -> Result<Vec<f64>, AssetError> {
         let mut rest = Vec::new();
         while self.cursor.skip_to_word_in_line() {
             rest.push(self.float("a number")?);
@@ -401,8 +406,8 @@ impl OffReader<'_> {
             color[count] = number;
             count += 1;
         }
-        self.add_color(&color[..count], arity, colors);
-        self.cursor.end_line();
+        self.add_color_repeatedly(&color[..count], arity, colors);
+        self.cursor.move_to_next_line();
         Ok(())
     }
 }

@@ -57,7 +57,7 @@ impl Faces {
         token: &CancelToken,
     ) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-        for place in coincident::find_coincident_vertices(positions, token)? {
+        for place in coincident::find_coincident_vertex_sets(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
         }
         self.corners.par_iter_mut().for_each(|corner| *corner = first[*corner as usize]);
@@ -149,7 +149,7 @@ impl ComponentExtremes {
     }
 
     /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
-    pub(super) fn fraction_warning(&self) -> Option<(usize, String)> {
+    pub(super) fn fraction_in_integers_warning(&self) -> Option<(usize, String)> {
         self.fraction.map(|(value, at)| (at, fractional_color_warning(value)))
     }
 }
@@ -189,12 +189,12 @@ impl ColorRange {
 
     /// Converts a color in this range to bytes.
     pub(crate) fn color_to_bytes(&self, parts: [f64; 3]) -> [u8; 3] {
-        color_bytes(parts.map(|part| part / self.full_intensity()))
+        unit_color_to_bytes(parts.map(|part| part / self.full_intensity()))
     }
 }
 
 /// Converts an sRGB color with components in [0, 1] to bytes. NaN becomes 0.
-pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
+pub(crate) fn unit_color_to_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 

@@ -61,14 +61,14 @@ impl Lines {
     }
 
     /// Reads the next line, including its line end.
-    pub(super) fn next(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Cancelled> {
+    pub(super) fn read_next_line(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Cancelled> {
         self.line.clear();
-        Ok(self.append(token)?.then_some(&self.line))
+        Ok(self.append_next_line(token)?.then_some(&self.line))
     }
 
     /// Skips buffered lines that do not contain `letter` in upper or lower case. This is much faster than
     /// reading them.
-    pub(super) fn skip_lines_without(&mut self, letter: u8) {
+    pub(super) fn skip_lines_without_letter(&mut self, letter: u8) {
         let Ok(buffer) = self.reader.fill_buf() else { return };
         let (lower, upper) = (letter.to_ascii_lowercase(), letter.to_ascii_uppercase());
         let found = memchr::memchr2(lower, upper, buffer).unwrap_or(buffer.len());
@@ -77,13 +77,16 @@ impl Lines {
     }
 
     /// Appends the next line as long as the current one ends with a backslash. Returns the joined lines.
-    pub(super) fn join_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
+    pub(super) fn append_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
         let is_continued = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
-        while is_continued(&self.line) && self.line.len() < Self::MAX_LENGTH && self.append(token)? {}
+        while is_continued(&self.line)
+            && self.line.len() < Self::MAX_LENGTH
+            && self.append_next_line(token)?
+        {}
         Ok(&self.line)
     }
 
-    fn append(&mut self, token: &CancelToken) -> Result<bool, Cancelled> {
+    fn append_next_line(&mut self, token: &CancelToken) -> Result<bool, Cancelled> {
         token.check()?;
         let mut rest = (&mut self.reader).take(Self::MAX_LENGTH as u64);
         Ok(rest.read_until(self.end, &mut self.line).is_ok_and(|length| length > 0))
@@ -116,7 +119,7 @@ impl<'a> Cursor<'a> {
         loop {
             match self.bytes.get(self.at) {
                 None => return false,
-                Some(b'#') => self.end_line(),
+                Some(b'#') => self.move_to_next_line(),
                 Some(byte) if byte.is_ascii_whitespace() => self.at += 1,
                 Some(_) => return true,
             }
@@ -135,7 +138,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Moves past the end of this line.
-    pub(super) fn end_line(&mut self) {
+    pub(super) fn move_to_next_line(&mut self) {
         let rest = &self.bytes[self.at..];
         self.at += rest.iter().position(|&byte| byte == b'\n').map_or(rest.len(), |end| end + 1);
     }
@@ -152,7 +155,7 @@ impl<'a> Cursor<'a> {
     /// Consumes the number at the cursor. `nan` and `inf` are accepted. Overflow results in infinity.
     pub(super) fn float(&mut self) -> Option<f64> {
         let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
-        self.skip_number(length).then_some(value)
+        self.skip_number_if_word_ends(length).then_some(value)
     }
 
     /// Consumes the integer at the cursor.
@@ -168,12 +171,12 @@ impl<'a> Cursor<'a> {
             value = value.checked_mul(10)?.checked_add(i64::from(digit))?;
             length += 1;
         }
-        let whole = length > 0 && self.skip_number(length + usize::from(negative));
+        let whole = length > 0 && self.skip_number_if_word_ends(length + usize::from(negative));
         whole.then_some(if negative { -value } else { value })
     }
 
     /// Moves past a number that is `length` bytes long, if a word ends there.
-    fn skip_number(&mut self, length: usize) -> bool {
+    fn skip_number_if_word_ends(&mut self, length: usize) -> bool {
         let ends =
             self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
         self.at += if ends { length } else { 0 };

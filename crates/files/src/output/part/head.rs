@@ -247,7 +247,7 @@ pub fn dependency_differences(
     names.extend(b.iter().map(|input| input.name.as_str()).filter(|name| value_of(a, name).is_none()));
     let differing = names.into_iter().filter(|name| value_of(a, name) != value_of(b, name));
     let differing: Vec<&str> = differing.collect();
-    let is_named = differing.iter().any(|name| !is_content_hash(name));
+    let is_named = differing.iter().any(|name| !is_content_hash_name(name));
     differing
         .iter()
         // The total hash is only useful if nothing else differs.
@@ -255,10 +255,10 @@ pub fn dependency_differences(
         .filter(|name| !is_named || **name != EVERYTHING)
         .map(|name| match (value_of(a, name), value_of(b, name)) {
             _ if *name == EVERYTHING => "the scene's shapes, materials, lights or camera differ".to_owned(),
-            (Some(_), Some(_)) if is_content_hash(name) => {
+            (Some(_), Some(_)) if is_content_hash_name(name) => {
                 format!("{} has different content", strip_file_prefix(name))
             }
-            (a, b) if is_content_hash(name) => {
+            (a, b) if is_content_hash_name(name) => {
                 let place = if a.is_some() { here } else { there };
                 debug_assert!(a.is_some() != b.is_some());
                 format!("{} is only used {place}", strip_file_prefix(name))
@@ -277,7 +277,7 @@ const PROGRAM: &str = "glimt";
 /// Name of the input that contains the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
-fn is_content_hash(name: &str) -> bool {
+fn is_content_hash_name(name: &str) -> bool {
     name.starts_with(FILE) || name == EVERYTHING
 }
 

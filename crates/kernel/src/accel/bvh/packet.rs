@@ -7,7 +7,7 @@
 use arrayvec::ArrayVec;
 use glimt_base::reduce;
 
-use super::top_node::PacketBounds;
+use super::top_node::RayCoordinateBounds;
 use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
@@ -154,7 +154,10 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.hit_subtrees(&PacketBounds::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
+        self.top.hit_subtrees(
+            &RayCoordinateBounds::around(slabs.origin, &slabs.inverse, (ends, traced), simd),
+            simd,
+        )
     }
 
     /// Tests the primitives outside the tree, then visits the leaves that any ray in the packet may hit,

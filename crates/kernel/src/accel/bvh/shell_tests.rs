@@ -40,7 +40,7 @@ fn rays(count: usize) -> Vec<Ray> {
 }
 
 /// The nearest hit and the number of spheres tested.
-fn closest(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
+fn closest_hit_and_test_count(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
     let (mut best, mut tests) = (None, 0);
     tree.closest_hit(ray, |id, t_max| {
         tests += 1;
@@ -64,7 +64,7 @@ fn nested_hits_match_brute_force() {
         assert!(tree.shells.is_some(), "{spread}");
         for ray in &rays(800) {
             let expected = brute(&spheres, ray);
-            assert_eq!(closest(&tree, &spheres, ray).0, expected, "{ray:?}");
+            assert_eq!(closest_hit_and_test_count(&tree, &spheres, ray).0, expected, "{ray:?}");
             let is_hit = |id: u32| spheres[id as usize].intersect(&ray.to_f64()).is_some();
             assert_eq!(tree.any_hit(ray, is_hit), expected.is_some(), "{ray:?}");
         }
@@ -99,7 +99,7 @@ fn nested_box_queries_match_brute_force() {
                 }
             }
             // The last three enclosing primitives must have been visited.
-            let encloses = |id: &u32| spheres[*id as usize].contains(at.as_dvec3()) && id.is_multiple_of(2);
+            let encloses = |id: &u32| spheres[*id as usize].encloses(at.as_dvec3()) && id.is_multiple_of(2);
             let all = (0..spheres.len() as u32).rev().filter(encloses);
             let found: Vec<_> = visited.iter().chain(&enclosing).copied().filter(encloses).collect();
             assert!(all.take(3).all(|id| found.contains(&id)), "{at}: {found:?}");
@@ -113,7 +113,8 @@ fn nested_sphere_traversal_is_logarithmic() {
     let work = |count: u32| {
         let spheres = spheres(count, 0.0);
         let tree = tree(&spheres[..count as usize]);
-        let most = rays(600).iter().map(|ray| closest(&tree, &spheres, ray).1).max().unwrap_or(0);
+        let most =
+            rays(600).iter().map(|ray| closest_hit_and_test_count(&tree, &spheres, ray).1).max().unwrap_or(0);
         let mut most_met = 0;
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };

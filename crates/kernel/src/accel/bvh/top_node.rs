@@ -87,7 +87,7 @@ impl TopNode {
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn hit_subtrees(&self, beam: &PacketBounds, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn hit_subtrees(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -130,7 +130,7 @@ fn largest_openable_child(
 }
 
 /// Bounds on the coordinates of several rays.
-pub(super) struct PacketBounds {
+pub(super) struct RayCoordinateBounds {
     /// Minimum and maximum coordinates of the origins.
     origin: [[f32; 2]; 3],
     /// Minimum and maximum coordinates of the inverse directions.
@@ -139,7 +139,7 @@ pub(super) struct PacketBounds {
     end: f32,
 }
 
-impl PacketBounds {
+impl RayCoordinateBounds {
     /// Bounds the rays in the mask `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn around(
@@ -171,7 +171,7 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::packet::{RayPacket, active_lanes, lane_indices};
+    use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
     use crate::math::random::signed_generator as random;
 
     /// Records which primitives are tested against which rays.
@@ -224,7 +224,7 @@ mod tests {
                     ends[lane] = -1.0;
                 }
                 let (mut closest, mut any) = (TestLog(vec![0; count]), TestLog(vec![0; count]));
-                let traced = active_lanes(&ends, PortableSimd);
+                let traced = nonnegative_end_mask(&ends, PortableSimd);
                 tree.closest_hit_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
                 tree.any_hit_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
                 for (id, bounds) in boxes.iter().enumerate() {

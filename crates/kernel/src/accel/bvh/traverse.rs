@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
-use crate::accel::{RayInterval, TreeNode};
+use crate::accel::{RayBoxInterval, TreeNodeSummary};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::packet::lane_indices;
 use crate::geometry::{Aabb, Ray};
@@ -99,14 +99,14 @@ impl Bvh {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool,
+        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
         mut own: impl FnMut(u32, u32),
     ) {
         let root = (self.bounds, ChildRef { first: 0, count: 0 }, 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
-            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
-            if !visit(&TreeNode { bounds, depth, shapes: child.count }, &stretch) {
+            let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
+            if !visit(&TreeNodeSummary { bounds, depth, shapes: child.count }, &stretch) {
                 continue;
             }
             if child.count > 0 {

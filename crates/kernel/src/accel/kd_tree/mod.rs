@@ -10,7 +10,7 @@ mod node;
 mod traverse;
 mod validate;
 
-use crate::accel::{RayInterval, TreeNode};
+use crate::accel::{RayBoxInterval, TreeNodeSummary};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
@@ -62,7 +62,7 @@ impl KdTree {
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (0.0, 0.0);
-        self.walk(|cell, kind| {
+        self.visit_cells_and_node_kinds(|cell, kind| {
             let share = f64::from(cell.half_area()) / whole;
             visits.0 += share;
             if let NodeKind::Leaf { count, .. } = kind {
@@ -113,16 +113,20 @@ impl KdTree {
 
     /// Visits the nodes whose cells the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(
+        &self,
+        ray: &Ray,
+        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+    ) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
-            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
+            let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
             let kind = self.nodes[place as usize].kind();
             let shapes = match kind {
                 NodeKind::Inner { .. } => 0,
                 NodeKind::Leaf { count, .. } => count,
             };
-            if !visit(&TreeNode { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNodeSummary { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let NodeKind::Inner { axis, at, right } = kind {
@@ -133,7 +137,7 @@ impl KdTree {
     }
 
     /// Visits every node with its cell, parents first.
-    fn walk(&self, mut visit: impl FnMut(Aabb, NodeKind)) {
+    fn visit_cells_and_node_kinds(&self, mut visit: impl FnMut(Aabb, NodeKind)) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };
         while let Some((place, cell)) = pending.pop() {
             let kind = self.nodes[place as usize].kind();

@@ -48,7 +48,7 @@ impl PlaneRay {
     /// the bounds include all distances. For other parallel rays, both are −∞ or both are ∞. NaN means
     /// unbounded.
     #[inline(always)]
-    fn plane_distance(&self, axis: usize, at: f32) -> (f32, f32) {
+    fn plane_distance_bounds(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];
         let low = (distance - self.pad) * self.inverse[axis];
         let high = (distance + self.pad) * self.inverse[axis];
@@ -57,10 +57,12 @@ impl PlaneRay {
 
     /// Interval of the ray inside a box.
     fn box_interval(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
-        let (mut near, mut far) = (0.0_f32, self.scale_ray_end(t_max));
+        let (mut near, mut far) = (0.0_f32, self.ray_end_in_scaled_parameter(t_max));
         for axis in 0..3 {
-            let (low, high) =
-                (self.plane_distance(axis, bounds.min[axis]), self.plane_distance(axis, bounds.max[axis]));
+            let (low, high) = (
+                self.plane_distance_bounds(axis, bounds.min[axis]),
+                self.plane_distance_bounds(axis, bounds.max[axis]),
+            );
             let (enter, leave) = if self.backward[axis] { (high.0, low.1) } else { (low.0, high.1) };
             near = if enter > near { enter } else { near };
             far = if leave < far { leave } else { far };
@@ -70,7 +72,7 @@ impl PlaneRay {
 
     /// Scaled ray parameter at which a ray with end `t_max` ends.
     #[inline(always)]
-    fn scale_ray_end(&self, t_max: f32) -> f32 {
+    fn ray_end_in_scaled_parameter(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
@@ -131,7 +133,7 @@ impl KdTree {
         loop {
             match self.nodes[place as usize].kind() {
                 NodeKind::Inner { axis, at, right } => {
-                    let (low, high) = planes.plane_distance(axis, at);
+                    let (low, high) = planes.plane_distance_bounds(axis, at);
                     let (first, second) =
                         if planes.backward[axis] { (right, place + 1) } else { (place + 1, right) };
                     if low > far {
@@ -149,7 +151,7 @@ impl KdTree {
                 NodeKind::Leaf { first, count } => {
                     let references = &self.references[first as usize..][..count as usize];
                     let Some(t_max) = test(references) else { return };
-                    let end = planes.scale_ray_end(t_max);
+                    let end = planes.ray_end_in_scaled_parameter(t_max);
                     loop {
                         if size == 0 {
                             return;

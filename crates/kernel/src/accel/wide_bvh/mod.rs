@@ -14,7 +14,7 @@ use crate::math::Vec3;
 
 pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{F32x16, PACKET_SIZE, RayInterval, TreeNode};
+use crate::accel::{F32x16, PACKET_SIZE, RayBoxInterval, TreeNodeSummary};
 
 use node::{TrianglePack, WideNode};
 
@@ -108,11 +108,15 @@ impl WideBvh {
 
     /// Visits the nodes whose boxes the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_nodes_along_ray(
+        &self,
+        ray: &Ray,
+        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+    ) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
-            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
+            let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
             let shapes = match child {
                 node::Child::Inner(_) => 0,
                 node::Child::Leaf { first, count } => {
@@ -120,7 +124,7 @@ impl WideBvh {
                     packs.iter().map(|pack| pack.ids().count() as u32).sum()
                 }
             };
-            if !visit(&TreeNode { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNodeSummary { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let node::Child::Inner(place) = child {

@@ -99,7 +99,7 @@ impl Torus {
     }
 
     /// Mean curvature at a point on the surface.
-    pub fn curvature(&self, point: DVec3) -> f64 {
+    pub fn mean_curvature(&self, point: DVec3) -> f64 {
         let across = self.circle_directions(point).1.x;
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
@@ -132,7 +132,7 @@ impl Torus {
     }
 
     /// Point and unit normal at the given texture coordinates.
-    pub fn point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn point_and_normal_at_uv(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, from_circle) = (direction_at_u(u), direction_at_u(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
         (
@@ -153,9 +153,9 @@ impl Torus {
         // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
         let (point, normal) = if x < share {
-            self.point_and_normal(x / share, y)
+            self.point_and_normal_at_uv(x / share, y)
         } else {
-            self.point_and_normal((x - share) / (1.0 - share), 1.5 - y)
+            self.point_and_normal_at_uv((x - share) / (1.0 - share), 1.5 - y)
         };
         AreaPoint { point, normal }
     }
@@ -189,7 +189,7 @@ impl Torus {
     }
 
     /// Whether a point is inside.
-    pub fn contains(&self, point: DVec3) -> bool {
+    pub fn encloses(&self, point: DVec3) -> bool {
         self.signed_distance(point) < 0.0
     }
 
@@ -285,7 +285,7 @@ mod tests {
         assert_eq!(surface.uv.as_vec2(), Vec2::splat(0.5));
         assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);
         assert!((surface.dpdv - Vec3::Y * pi).length() < 1e-5);
-        let (point, normal) = ring().point_and_normal(0.5, 0.75);
+        let (point, normal) = ring().point_and_normal_at_uv(0.5, 0.75);
         assert!((point - DVec3::new(2.0, 0.5, 0.0)).length() < 1e-14 && (normal - DVec3::Y).length() < 1e-14);
     }
 

@@ -49,7 +49,7 @@ impl ShapeEmitter for BoxEmitter {
             if is_first { values[0] } else { rest }
         };
         let face = BoxFace {
-            rectangle: SphericalRectangle::zip_fields(faces.map(|face| face.rectangle), of),
+            rectangle: SphericalRectangle::combine_three_by_field(faces.map(|face| face.rectangle), of),
             solid_angle: of([a, b, c]),
         };
         let rest = (target - of([0.0, a, a + b])) / face.solid_angle;

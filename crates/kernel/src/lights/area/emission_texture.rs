@@ -84,7 +84,7 @@ impl EmissionTexture {
 
     /// Number of texels per unit of u and v. If there is both a color texture and an opacity texture, returns
     /// the larger number.
-    pub fn texels_per_unit(&self) -> [f64; 2] {
+    pub fn texels_per_uv_unit(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
             [self.texture.as_ref(), of_opacity].map(|texture| texture.map(|one| one.texels_per_unit()));

@@ -84,7 +84,7 @@ impl MeshEmitter {
         });
         let center = center.sum::<DVec3>() / by_area.total();
         let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::from_triangle(corners)).collect();
-        let Some(bounds) = LightBounds::union(all.iter().flatten()) else { return Ok(None) };
+        let Some(bounds) = LightBounds::union_of_all(all.iter().flatten()) else { return Ok(None) };
         let tree = if all.len() > MAX_WITHOUT_TREE { LightTree::new(&all, token)? } else { None };
         let sampling = match (tree, TrianglePairQuad::from_triangles(&triangles)) {
             (Some(tree), _) => MeshSampling::Tree(tree),
@@ -101,7 +101,7 @@ impl MeshEmitter {
 
     /// Samples a point uniformly on the triangle at `index`. Returns the point, the triangle's area, and its
     /// primitive index.
-    pub fn sample_triangle(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
+    pub fn sample_point_on_triangle(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
         let point = *a * weights.x + *b * weights.y + *c * weights.z;

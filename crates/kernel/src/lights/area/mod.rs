@@ -38,7 +38,7 @@ use disk::DiskEmitter;
 use inside::InwardEmitter;
 use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
-use see_through::SeeThroughEmitter;
+use see_through::SeeThroughSideEmitter;
 use sphere::SphereEmitter;
 use surface_of_revolution::{ConeSide, CylinderSide, RevolutionEmitter};
 use textured_quad::TexturedQuadEmitter;
@@ -118,7 +118,7 @@ pub enum Emitter {
     /// The inside of a shape.
     Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
-    SeeThrough(Box<SeeThroughEmitter>),
+    SeeThrough(Box<SeeThroughSideEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -191,7 +191,12 @@ pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Ar
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
 /// area.
-pub fn see_through_area_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn see_through_side_area_light(
+    shape: &Shape,
+    side: Side,
+    radiance: Vec3,
+    object: u32,
+) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
         // Seen from outside, the front is hit at most once in each direction.
@@ -203,7 +208,7 @@ pub fn see_through_area_light(shape: &Shape, side: Side, radiance: Vec3, object:
         Side::Front => front_area_light(shape, radiance, object)?,
         Side::Back => back_area_light(shape, radiance, object)?,
     };
-    let see_through = if hides_itself { SeeThroughEmitter::new(shape, side) } else { None };
+    let see_through = if hides_itself { SeeThroughSideEmitter::new(shape, side) } else { None };
     Some(match see_through {
         Some(see_through) => AreaLight { shape: Emitter::SeeThrough(Box::new(see_through)), ..light },
         None => light,
@@ -260,7 +265,7 @@ impl AreaLight {
                 Side::Back => [v, u],
             };
             let color = |at: [f64; 2]| texture.lookup(DVec2::from_array(ordered(at)));
-            let across = ordered(texture.texels_per_unit());
+            let across = ordered(texture.texels_per_uv_unit());
             let picture = TexturedQuadEmitter::new(*quad, across, color);
             if let Some(picture) = picture {
                 self.shape = Emitter::TexturedQuad(Box::new(picture));

@@ -169,7 +169,7 @@ impl PlanarRectangle {
 /// Sine of the angle at which a side appears. `side` is the side's coordinate, and `d2` is the squared
 /// distance perpendicular to the coordinate axis.
 #[inline(always)]
-fn side_sine(side: f32, d2: f32) -> f32 {
+fn side_plane_sine(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
@@ -184,8 +184,8 @@ impl SphericalRectangle {
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
-        let (lower, right) = (-side_sine(y0, z2), side_sine(x1, z2));
-        let (upper, left) = (side_sine(y1, z2), -side_sine(x0, z2));
+        let (lower, right) = (-side_plane_sine(y0, z2), side_plane_sine(x1, z2));
+        let (upper, left) = (side_plane_sine(y1, z2), -side_plane_sine(x0, z2));
         let (g0, g1) = (dihedral_angle(lower, right), dihedral_angle(right, upper));
         let (g2, g3) = (dihedral_angle(upper, left), dihedral_angle(left, lower));
         Self {
@@ -201,7 +201,7 @@ impl SphericalRectangle {
 
     /// Combines three rectangles field by field. `of` maps the three values to one.
     #[inline(always)]
-    pub fn zip_fields(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
+    pub fn combine_three_by_field(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
             x: [of(three.map(|one| one.x[0])), of(three.map(|one| one.x[1]))],
             y: [of(three.map(|one| one.y[0])), of(three.map(|one| one.y[1]))],
@@ -254,7 +254,7 @@ impl SphericalRectangle {
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
         // At this x, the heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
-        let (h0, h1) = (side_sine(self.y[0], d2), side_sine(self.y[1], d2));
+        let (h0, h1) = (side_plane_sine(self.y[0], d2), side_plane_sine(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);
         let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
         let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);

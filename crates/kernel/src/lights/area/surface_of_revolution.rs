@@ -38,7 +38,7 @@ pub trait RevolutionSideView {
 
     /// The point at a fraction `share` of the cosine interval. Returns the point's angle from the pole and
     /// its distance.
-    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
+    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
 /// The visible part of a light.
@@ -59,7 +59,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (Some((side, meridians)), _) if u[0] < share => {
                 let (angle, density) = meridians.sample(u[1]);
                 let around = SinCos::from_radians(angle);
-                let (from_pole, distance) = side.point_at(around, f64::from(u[0] / share));
+                let (from_pole, distance) = side.polar_angle_and_distance_at(around, f64::from(u[0] / share));
                 let factor = side.cosine_extent(around) / (density * f64::from(share));
                 (side.pole().direction(from_pole, around), distance, factor)
             }
@@ -198,7 +198,7 @@ impl RevolutionSideView for CylinderView {
         high - low
     }
 
-    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let to_circle = self.distance_to_circle(SinCos { sin: around.sin.abs(), ..around });
         let [low, high] = self.end_cosines(to_circle);
         let cos = low + (high - low) * share;
@@ -307,7 +307,7 @@ impl RevolutionSideView for ConeView {
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
-    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let at_tip = self.angle_at_tip(around);
         let versine = share * self.cosine_extent(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };

@@ -101,7 +101,7 @@ impl ShapeEmitter for TorusEmitter {
         if !(own > 0.0) {
             return LightSamplePoint::NOTHING;
         }
-        let offset = view.offset(&slice, &place);
+        let offset = view.offset_to_slice_point(&slice, &place);
         let direction = offset.normalize();
         let (densities, first) = view.sum_entry_pdfs(&self.torus, &slices, direction);
         // A grazing ray may miss the torus because of rounding.
@@ -217,7 +217,7 @@ impl TorusView {
     }
 
     /// Offset from the view point to a point on a slice.
-    fn offset(&self, slice: &TorusSlice, place: &SlicePoint) -> DVec3 {
+    fn offset_to_slice_point(&self, slice: &TorusSlice, place: &SlicePoint) -> DVec3 {
         let SinCos { sin, cos } = slice.turn;
         let outwards = self.out * cos + self.across * sin;
         let along = self.across * cos - self.out * sin;

@@ -88,7 +88,7 @@ impl DirectionalLight {
 }
 
 impl InfiniteLight for DirectionalLight {
-    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    fn sample_direction_and_weight(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         self.sample_direction_and_irradiance(u)
     }
 

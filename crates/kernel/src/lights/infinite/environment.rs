@@ -45,7 +45,7 @@ impl Environment {
         match self {
             Self::Constant(radiance) => (*radiance, HEMISPHERE_PDF),
             Self::Map { sky, factor, turn } => {
-                let (color, pdf) = sky.lookup(direction, *turn);
+                let (color, pdf) = sky.lookup_color_and_pdf(direction, *turn);
                 (color * *factor, pdf)
             }
         }
@@ -59,7 +59,7 @@ impl Environment {
                 ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
             }
             Self::Map { sky, factor, turn } => {
-                let (mut colors, pdfs) = sky.lookup_packet(directions, *turn);
+                let (mut colors, pdfs) = sky.lookup_color_and_pdf_packet(directions, *turn);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -146,7 +146,7 @@ impl Environment {
 }
 
 impl InfiniteLight for Environment {
-    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    fn sample_direction_and_weight(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, turn } => {

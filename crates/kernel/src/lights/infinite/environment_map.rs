@@ -99,7 +99,7 @@ impl EnvironmentMap {
     /// Color and sampling pdf in sr⁻¹ for a unit direction. `turn` is the map's rotation about +y, as a
     /// fraction of 360°, counterclockwise when seen from above.
     #[inline(always)]
-    pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
+    pub fn lookup_color_and_pdf(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.texel_position(direction, turn);
         let corners = self.corner_texels(place.column, place.row);
         let density = self.cell_pdf(place.column, place.row);
@@ -109,7 +109,7 @@ impl EnvironmentMap {
         )
     }
 
-    /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup`]
+    /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup_color_and_pdf`]
     /// would return for it.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
@@ -183,14 +183,14 @@ impl EnvironmentMap {
         (directions, colors, pdfs)
     }
 
-    /// [`EnvironmentMap::lookup`] for a packet.
+    /// [`EnvironmentMap::lookup_color_and_pdf`] for a packet.
     #[inline(always)]
-    pub fn lookup_packet(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
+    pub fn lookup_color_and_pdf_packet(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
         let (mut columns, mut rows) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let (x, y) = self.cell_coordinates(lane(directions, i), turn);
-            (columns[i], rows[i]) = self.cell(x, y);
+            (columns[i], rows[i]) = self.cell_column_and_row(x, y);
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
@@ -212,7 +212,7 @@ impl EnvironmentMap {
     #[inline(always)]
     fn texel_position(&self, direction: Vec3, turn: f32) -> TexelPosition {
         let (x, y) = self.cell_coordinates(direction, turn);
-        let (column, row) = self.cell(x, y);
+        let (column, row) = self.cell_column_and_row(x, y);
         let between = [x - column as f32, y - row as f32];
         TexelPosition { column, row, between, along: [between[0], self.height_fraction(row, direction.y)] }
     }
@@ -230,7 +230,7 @@ impl EnvironmentMap {
 
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
-    fn cell(&self, x: f32, y: f32) -> (u32, u32) {
+    fn cell_column_and_row(&self, x: f32, y: f32) -> (u32, u32) {
         // Rounding may have moved a coordinate just below 0 to the full width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
@@ -276,7 +276,7 @@ impl EnvironmentMap {
             }
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        self.texels.gather_packets(&places, &mut corners);
+        self.texels.write_color_packets_at_indices(&places, &mut corners);
         corners
     }
 

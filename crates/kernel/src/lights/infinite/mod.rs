@@ -17,10 +17,10 @@ use crate::math::Vec3;
 pub trait InfiniteLight {
     /// Samples a unit direction to the light, independently of a surface. Returns the direction and the
     /// radiance divided by the pdf, or the irradiance if the light has no extent. `u` is in [0, 1)².
-    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3);
+    fn sample_direction_and_weight(&self, u: [f32; 2]) -> (Vec3, Vec3);
 
     /// Power in W that passes through a disk of the given area. For each direction, the disk is perpendicular
-    /// to the direction. Equals the mean weight of [`InfiniteLight::sample_direction`] times the area.
+    /// to the direction. Equals the mean weight of [`InfiniteLight::sample_direction_and_weight`] times the area.
     fn power_through(&self, area: f64) -> Vec3;
 
     /// Bounds on the light's directions and irradiance.

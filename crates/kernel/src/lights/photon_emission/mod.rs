@@ -43,7 +43,7 @@ pub struct BoundingSphere {
 
 impl BoundingSphere {
     /// A sphere that contains all spheres in `balls`. Its center is the center of their bounding box.
-    pub fn enclosing(balls: &[Self]) -> Self {
+    pub fn enclosing_spheres(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
             (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
@@ -56,7 +56,7 @@ impl BoundingSphere {
 
 /// The geometry of an emitting object.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum EmitterGeometry {
+pub enum EmissiveObjectGeometry {
     /// A shape.
     Shape(Shape),
     /// A mesh.
@@ -168,7 +168,7 @@ impl PhotonSource {
     /// without falloff do not emit photons.
     pub fn new(
         lights: &Arc<Lights>,
-        emitter_geometry: impl Fn(u32) -> Option<EmitterGeometry>,
+        emitter_geometry: impl Fn(u32) -> Option<EmissiveObjectGeometry>,
         around: BoundingSphere,
     ) -> Option<Self> {
         let source = |(_, light): (u32, &Light)| LightEmission::new(light, &emitter_geometry, around);
@@ -223,7 +223,7 @@ impl PhotonSource {
         let (number, _) = by_light.sample(u.light[0]);
         let targets = aim.map(|aim| &aim.targets);
         let sample_photon = self
-            .sample_photon(number, targets, u)
+            .sample_photon_from_light(number, targets, u)
             .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
         let (all, of_light) =
             (f64::from(self.aimed_share()), |by: &DiscreteDistribution| by.probability(number));
@@ -237,7 +237,7 @@ impl PhotonSource {
     }
 
     /// Generates a photon from one light. The photon is aimed if there are `targets`.
-    fn sample_photon(
+    fn sample_photon_from_light(
         &self,
         number: usize,
         targets: Option<&PhotonTargets>,
@@ -255,7 +255,7 @@ impl PhotonSource {
                 Some(PhotonSample { start: PhotonOrigin::Point(position.as_vec3()), direction, flux, ratio })
             }
             LightFamily::Infinite(light) => {
-                let (to_light, irradiance) = light.sample_direction(u.direction);
+                let (to_light, irradiance) = light.sample_direction_and_weight(u.direction);
                 self.photon_from_infinity(to_light, irradiance, targets, u)
             }
             LightFamily::Area(light) => {
@@ -395,7 +395,7 @@ fn low_discrepancy_point(i: u32) -> Vec2 {
 impl LightEmission {
     fn new(
         light: &Light,
-        emitter_geometry: &impl Fn(u32) -> Option<EmitterGeometry>,
+        emitter_geometry: &impl Fn(u32) -> Option<EmissiveObjectGeometry>,
         around: BoundingSphere,
     ) -> Self {
         let disk = PI * around.radius * around.radius;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::EmitterGeometry;
+use super::EmissiveObjectGeometry;
 use crate::geometry::surface::point_error_bound;
 use crate::geometry::{AreaPoint, Shape};
 use crate::lights::area::{AreaLight, Side};
@@ -14,14 +14,14 @@ use crate::sampling::distribution::DiscreteDistribution;
 #[derive(Clone, Debug)]
 pub struct EmissiveSurface {
     pieces: DiscreteDistribution,
-    on: PieceGeometry,
+    on: DividedSurfaceGeometry,
     /// Power in W.
     power: Vec3,
 }
 
 /// Geometry of the pieces.
 #[derive(Clone, Debug)]
-enum PieceGeometry {
+enum DividedSurfaceGeometry {
     /// An analytic shape. Each part is divided into side × side pieces of equal area.
     Shape {
         shape: Shape,
@@ -72,15 +72,15 @@ const BY_AREA: f64 = 0.05;
 
 impl EmissiveSurface {
     /// Divides a light's surface into pieces. Returns `None` if the surface has no area or emits nothing.
-    pub fn new(light: &AreaLight, emitter_geometry: &EmitterGeometry) -> Option<Self> {
+    pub fn new(light: &AreaLight, emitter_geometry: &EmissiveObjectGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
-            EmitterGeometry::Shape(shape) => {
+            EmissiveObjectGeometry::Shape(shape) => {
                 let areas = shape.areas();
                 let most = if light.texture.is_some() { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (
-                    PieceGeometry::Shape {
+                    DividedSurfaceGeometry::Shape {
                         shape: *shape,
                         side: side as u32,
                         areas,
@@ -89,9 +89,9 @@ impl EmissiveSurface {
                     count,
                 )
             }
-            EmitterGeometry::Mesh { rounding } => {
+            EmissiveObjectGeometry::Mesh { rounding } => {
                 let mesh = light.shape.as_mesh()?;
-                (PieceGeometry::Mesh { rounding: *rounding }, mesh.primitives().count())
+                (DividedSurfaceGeometry::Mesh { rounding: *rounding }, mesh.primitives().count())
             }
         };
         let per_side = if light.texture.is_some() { LOOKUPS_PER_SIDE } else { 1 };
@@ -102,7 +102,7 @@ impl EmissiveSurface {
                 let u = Vec2::new((i % per_side) as f32 + 0.5, (i / per_side) as f32 + 0.5) / per_side as f32;
                 let place = on.sample_piece(light, index, u);
                 area = place.area;
-                sum += radiance(light, &place).as_dvec3();
+                sum += radiance_without_coat(light, &place).as_dvec3();
             }
             (area, sum * (area * PI / f64::from(per_side * per_side)))
         };
@@ -128,17 +128,19 @@ impl EmissiveSurface {
         let place = self.on.sample_piece(light, index, u);
         let PiecePoint { point, normal, area, .. } = place;
         let factor = PI * area / self.pieces.probability(index);
-        let flux = (radiance(light, &place).as_dvec3() * factor).as_vec3();
+        let flux = (radiance_without_coat(light, &place).as_dvec3() * factor).as_vec3();
         let rounded = point.as_vec3();
         let error = match self.on {
-            PieceGeometry::Shape { reach, .. } => point_error_bound(rounded, reach),
-            PieceGeometry::Mesh { rounding } => point_error_bound(rounded, 0.0) + Vec3::splat(rounding),
+            DividedSurfaceGeometry::Shape { reach, .. } => point_error_bound(rounded, reach),
+            DividedSurfaceGeometry::Mesh { rounding } => {
+                point_error_bound(rounded, 0.0) + Vec3::splat(rounding)
+            }
         };
         EmissionPoint { point: rounded, from: point, normal, error, flux, primitive: place.primitive }
     }
 }
 
-impl PieceGeometry {
+impl DividedSurfaceGeometry {
     /// A uniformly distributed point on a piece.
     fn sample_piece(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
         match (self, light.shape.as_mesh()) {
@@ -155,7 +157,7 @@ impl PieceGeometry {
                 PiecePoint { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {
-                let (place, area, primitive) = mesh.sample_triangle(index, u);
+                let (place, area, primitive) = mesh.sample_point_on_triangle(index, u);
                 PiecePoint { point: place.point, normal: place.normal, area, primitive }
             }
             (Self::Mesh { .. }, None) => {
@@ -166,7 +168,7 @@ impl PieceGeometry {
 }
 
 /// Radiance at a point in W·sr⁻¹·m⁻², without a clear coat.
-fn radiance(light: &AreaLight, place: &PiecePoint) -> Vec3 {
+fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
     let texture = light.texture.as_ref();
     light.radiance
         * texture.map_or(Vec3::ONE, |texture| {

@@ -97,7 +97,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
 
 fn source_of(light: Light, shape: Option<Shape>) -> PhotonSource {
     let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("never canceled"));
-    PhotonSource::new(&lights, |_| shape.map(EmitterGeometry::Shape), SCENE).expect("power")
+    PhotonSource::new(&lights, |_| shape.map(EmissiveObjectGeometry::Shape), SCENE).expect("power")
 }
 
 /// A mean and its standard error.

@@ -67,7 +67,7 @@ impl EmissionCone {
     }
 
     /// A cone that contains all given cones, around the mean of their axes.
-    fn union<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
+    fn union_of_all<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeFalloff::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
         let Some(axis) = sum.try_normalize() else { return Self { edge, ..Self::ALL } };
@@ -114,7 +114,7 @@ impl LightBounds {
     }
 
     /// The union of all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
-    pub fn union<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+    pub fn union_of_all<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for one in all.clone() {
@@ -127,7 +127,7 @@ impl LightBounds {
             center,
             radius: reaches.fold(0.0, f64::max).min((max - min).length() * 0.5),
             power: expected_intensity(all.clone()),
-            cone: EmissionCone::union(all.map(|one| &one.cone)),
+            cone: EmissionCone::union_of_all(all.map(|one| &one.cone)),
         })
     }
 }

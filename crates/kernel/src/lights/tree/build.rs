@@ -72,7 +72,9 @@ impl LightTreeBuilder<'_> {
         for (i, count) in groups.into_iter().enumerate() {
             let (own, others) = rest.split_at_mut(count);
             rest = others;
-            let Some(bounds) = LightBounds::union(own.iter().map(|leaf| &leaf.bounds)) else { continue };
+            let Some(bounds) = LightBounds::union_of_all(own.iter().map(|leaf| &leaf.bounds)) else {
+                continue;
+            };
             node.set_child(i, &bounds, self.unit);
             node.first[i] = first;
             node.children[i] = match own {

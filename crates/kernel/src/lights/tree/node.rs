@@ -197,7 +197,7 @@ impl LobePacket {
     /// A lobe's response to light within an angle δ of a direction. Serves as an upper bound and as an
     /// estimate: cosⁿ δ is at most (1 + n(1 − cos δ)/8)⁻⁸, which is never 0.
     #[inline(always)]
-    fn value(&self, i: usize, cos: f32, sin: f32) -> f32 {
+    fn response_bound_in_lane(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;
         let short = if short > 0.0 { short } else { 0.0 };
         let root = 1.0 / (1.0 + 0.125 * self.shininess[i] * short);
@@ -319,7 +319,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     for i in 0..PACKET_SIZE {
         inverse[i] = clamp_min(square[i], least[i]);
     }
-    inverse_sqrt_packet(&mut inverse);
+    replace_by_inverse_sqrt(&mut inverse);
     // Let θ be the angle between the normal and the sphere's center, and β half the angle that the sphere
     // subtends. `towards` is positive if θ − β < 90°. Inside the sphere, light arrives from every direction.
     let [mut sin, mut towards, mut mean] = [[0.0; PACKET_SIZE]; 3];
@@ -337,7 +337,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
     if IS_PLAIN {
         for i in 0..PACKET_SIZE {
-            value[i] = bounds.power[i] * clamp_cosine(mean[i]) * (inverse[i] * inverse[i]);
+            value[i] = bounds.power[i] * clamp_to_min_cosine(mean[i]) * (inverse[i] * inverse[i]);
         }
     } else {
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
@@ -346,18 +346,23 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             without[i] = clamp_min(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
         }
         let rest = without;
-        inverse_sqrt_packet(&mut without);
+        replace_by_inverse_sqrt(&mut without);
         for i in 0..PACKET_SIZE {
             let beyond = cos[i] * bounds.cos[i] + rest[i] * without[i] * bounds.sin[i];
             let is_within = (cos[i] >= bounds.cos[i]) | (square[i] <= least[i]);
             away[i] = (if is_within { 1.0 } else { beyond }) + sin[i];
             let weakened = if bounds.weakens[i] > 0.0 { inverse[i] * inverse[i] } else { 1.0 };
-            value[i] = bounds.power[i] * clamp_cosine(mean[i]) * weakened * clamp_cosine(away[i]);
+            value[i] =
+                bounds.power[i] * clamp_to_min_cosine(mean[i]) * weakened * clamp_to_min_cosine(away[i]);
         }
     }
     if HAS_LOBE {
         for i in 0..PACKET_SIZE {
-            value[i] *= lobes.value(i, lane(&lobes.axis, i).dot(lane(&offset, i)) * inverse[i], sin[i]);
+            value[i] *= lobes.response_bound_in_lane(
+                i,
+                lane(&lobes.axis, i).dot(lane(&offset, i)) * inverse[i],
+                sin[i],
+            );
         }
     }
     let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
@@ -374,7 +379,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
 /// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
 /// divisions would take longer than the rest of the node test.
 #[inline(always)]
-fn inverse_sqrt_packet(x: &mut F32x16) {
+fn replace_by_inverse_sqrt(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {
         let x = &mut x[i];
         let square = clamp_max(*x, MAX_SQUARED_DISTANCE);
@@ -388,7 +393,7 @@ fn inverse_sqrt_packet(x: &mut F32x16) {
 
 /// Clamps a bound on a cosine.
 #[inline(always)]
-fn clamp_cosine(bound: f32) -> f32 {
+fn clamp_to_min_cosine(bound: f32) -> f32 {
     clamp_max(clamp_min(bound, MIN_COSINE), 1.0)
 }
 
@@ -411,7 +416,7 @@ mod tests {
         for exponent in -35..37 {
             let mut x: F32x16 = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
             let expected = x.map(|x| (1.0 / f64::from(clamp_max(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
-            inverse_sqrt_packet(&mut x);
+            replace_by_inverse_sqrt(&mut x);
             for (root, expected) in x.iter().zip(expected) {
                 assert!((root / expected - 1.0).abs() < 4.0 * f32::EPSILON, "{root} {expected}");
             }

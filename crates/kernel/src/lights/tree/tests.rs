@@ -320,7 +320,7 @@ fn joint_bounds_contain_all_lights() {
         let bounds: Vec<LightBounds> = lights_of(20, &mut next).iter().filter_map(Light::bounds).collect();
         for space in [DistanceFalloff::InverseSquare, DistanceFalloff::Constant, DistanceFalloff::Beyond] {
             let own: Vec<_> = bounds.iter().filter(|one| one.space == space).copied().collect();
-            let Some(all) = LightBounds::union(own.iter()) else { continue };
+            let Some(all) = LightBounds::union_of_all(own.iter()) else { continue };
             for one in &own {
                 let reach = (one.center - all.center).length() + one.radius;
                 assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
@@ -331,7 +331,7 @@ fn joint_bounds_contain_all_lights() {
             }
         }
     }
-    assert_eq!(LightBounds::union([].iter()), None);
+    assert_eq!(LightBounds::union_of_all([].iter()), None);
     assert!(ConeFalloff::Cosine > ConeFalloff::Sharp);
 }
 

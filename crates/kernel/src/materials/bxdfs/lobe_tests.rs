@@ -122,7 +122,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// Normals on the lit side.
-    fn normals(&self) -> Vec3x16 {
+    fn lit_side_normals(&self) -> Vec3x16 {
         [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.light_side_sign() as f32; PACKET_SIZE]]
     }
 
@@ -140,7 +140,7 @@ impl<B: Bxdf> TestSurface<B> {
                 set_lane(&mut rows, i, direction.as_vec3());
             }
             let values = self.row.f(&rows);
-            let pdf = self.row.pdf(lobes, &self.normals(), &rows, &values);
+            let pdf = self.row.pdf(lobes, &self.lit_side_normals(), &rows, &values);
             for i in 0..some.len() {
                 let (wide, narrow) = (lane(&values.wide, i).as_dvec3(), lane(&values.narrow, i).as_dvec3());
                 let f = lane(&values.f(), i).as_dvec3();
@@ -161,7 +161,7 @@ impl<B: Bxdf> TestSurface<B> {
     /// Directions sampled with `side` × `side` stratified random numbers.
     pub fn sample_directions(&self, lobes: SampledLobes, side: u32) -> Vec<DVec3> {
         let rows = stratified_packets(side)
-            .map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
+            .map(|(choices, u)| self.row.sample(lobes, &self.lit_side_normals(), &choices, &u));
         let mut all: Vec<DVec3> =
             rows.flat_map(|row| (0..PACKET_SIZE).map(move |i| lane(&row, i).as_dvec3())).collect();
         all.truncate((side * side) as usize);
@@ -202,7 +202,7 @@ impl<B: Bxdf> TestSurface<B> {
             let choices =
                 std::array::from_fn(|i| ((i as f32 + next()) / PACKET_SIZE as f32).min(0.999_999_9));
             let u = [[x; PACKET_SIZE], [y; PACKET_SIZE]];
-            let directions = self.row.sample(SampledLobes::All, &self.normals(), &choices, &u);
+            let directions = self.row.sample(SampledLobes::All, &self.lit_side_normals(), &choices, &u);
             samples.extend((0..PACKET_SIZE).map(|i| lane(&directions, i).as_dvec3()));
         }
         self.mean_sample_weight(&samples)
@@ -233,13 +233,13 @@ impl<B: Bxdf> TestSurface<B> {
     /// Albedo by quadrature of f, over half vectors for the narrow lobe and over directions for the wide
     /// lobes.
     pub fn albedo(&self) -> DVec3 {
-        self.albedo_by_rings(192)
+        self.albedo_with_ring_count(192)
     }
 
     /// [`TestSurface::albedo`] with a given number of rings of half vectors.
-    pub fn albedo_by_rings(&self, rings: u32) -> DVec3 {
+    pub fn albedo_with_ring_count(&self, rings: u32) -> DVec3 {
         let narrow: DVec3 = self
-            .half_vectors(rings, 192)
+            .directions_from_half_vectors(rings, 192)
             .map(|(direction, weight)| (direction, weight * self.height(direction)))
             .collect::<Vec<_>>()
             .chunks(PACKET_SIZE)
@@ -263,7 +263,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Directions above the surface and their solid angles, computed from half vectors with equal steps in y
     /// and azimuth. (1 − y)² is the fraction of D outside a given angle, so the steps also cover the tail.
-    fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
+    fn directions_from_half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
         (0..rings * steps).filter_map(move |i| {
             let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
             let phi = (f64::from(i % steps) + 0.5) / f64::from(steps) * TAU;
@@ -326,7 +326,8 @@ impl<B: Bxdf> TestSurface<B> {
         let total = 400 * 400;
         for _ in 0..total / PACKET_SIZE {
             let mut numbers = || std::array::from_fn(|_| next());
-            let directions = self.row.sample(lobes, &self.normals(), &numbers(), &[numbers(), numbers()]);
+            let directions =
+                self.row.sample(lobes, &self.lit_side_normals(), &numbers(), &[numbers(), numbers()]);
             for i in 0..PACKET_SIZE {
                 let direction = lane(&directions, i).as_dvec3();
                 let [y, turn] = self.direction_to_map(direction);

@@ -59,7 +59,7 @@ impl CheckpointLock {
     }
 
     /// Records a file as reported. Returns whether it had not been reported before.
-    pub(super) fn mark_reported(&mut self, path: &Path) -> bool {
+    pub(super) fn record_first_report_of_file(&mut self, path: &Path) -> bool {
         let identity = FileIdentity::from_path(path);
         let is_news = self.told != identity;
         self.told = identity;
@@ -104,11 +104,14 @@ mod tests {
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
         let mut lock = CheckpointLock::default();
-        assert!(lock.mark_reported(&path) && !lock.mark_reported(&path));
+        assert!(lock.record_first_report_of_file(&path) && !lock.record_first_report_of_file(&path));
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
-        assert!(lock.mark_reported(&path) && !lock.mark_reported(&path));
+        assert!(lock.record_first_report_of_file(&path) && !lock.record_first_report_of_file(&path));
         lock.keep_open(&path, None);
-        assert!(!lock.mark_reported(&path), "a file written by this process should not be reported");
+        assert!(
+            !lock.record_first_report_of_file(&path),
+            "a file written by this process should not be reported"
+        );
     }
 }

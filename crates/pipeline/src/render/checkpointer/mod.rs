@@ -158,7 +158,7 @@ impl<'a> Checkpointer<'a> {
                 "remove --resume to start over, or name another file with -o",
             ));
         }
-        if self.around.lock.borrow_mut().mark_reported(&self.path) {
+        if self.around.lock.borrow_mut().record_first_report_of_file(&self.path) {
             self.send_update(CheckpointUpdate::Unused {
                 path: self.path.clone(),
                 why: rejection_reason(&error),
@@ -224,7 +224,7 @@ impl<'a> Checkpointer<'a> {
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::read_header(&self.path) {
                 Err(PartError::Version { .. }) => self.move_aside(|_| false),
-                Ok(head) if head.kind == PartKind::Part => Err(finished_part_message(&self.path)),
+                Ok(head) if head.kind == PartKind::Part => Err(finished_part_conflict_message(&self.path)),
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
@@ -241,7 +241,7 @@ impl<'a> Checkpointer<'a> {
                 ) => Ok(()),
             };
         };
-        if self.is_superseded(&head, &there, state, rays) {
+        if self.is_superseded_by_this_render(&head, &there, state, rays) {
             return Ok(());
         }
         let is_longer = |aside: &Path| {
@@ -273,7 +273,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Whether a checkpoint belongs to this image and contains no more work than this render.
-    fn is_superseded(
+    fn is_superseded_by_this_render(
         &self,
         head: &PartHeader,
         there: &SavedRenderState,
@@ -384,7 +384,7 @@ impl<'a> Checkpointer<'a> {
         }
         // Keep the checkpoint if it belongs to another image or to another running process, or if it has more
         // samples.
-        let is_done = |(head, there)| self.is_superseded(&head, &there, state, rays);
+        let is_done = |(head, there)| self.is_superseded_by_this_render(&head, &there, state, rays);
         let mut lock = self.around.lock.borrow_mut();
         let is_own = self.is_own.get() && lock.is_held_by_this_process(&self.path);
         if is_own
@@ -445,7 +445,7 @@ impl<'a> Checkpointer<'a> {
                     messages::NOT_A_CHECKPOINT
                 )),
                 Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartKind::Part) => {
-                    Err(OutputError::Refused { reason: finished_part_message(path) })
+                    Err(OutputError::Refused { reason: finished_part_conflict_message(path) })
                 }
                 // Another process may have locked the file since the last check.
                 Ok(_) if lock.borrow().is_held_by_another_process(at) => {
@@ -478,7 +478,7 @@ impl<'a> Checkpointer<'a> {
     }
 }
 
-fn finished_part_message(path: &Path) -> String {
+fn finished_part_conflict_message(path: &Path) -> String {
     format!("{} is a finished part; name another file with -o", path.display())
 }
 

@@ -43,8 +43,8 @@ impl CellCost {
     }
 
     /// The cell's cost as an equivalent number of samples, including the pixel overhead.
-    pub(crate) fn equivalent_samples(&self, share: PixelOverhead) -> f64 {
-        share.equivalent_samples(self.units, self.pixels)
+    pub(crate) fn samples_including_overhead(&self, share: PixelOverhead) -> f64 {
+        share.samples_including_overhead(self.units, self.pixels)
     }
 }
 
@@ -74,7 +74,7 @@ impl PixelOverhead {
 
     /// Converts the cost of `units` samples plus the overhead of `pixels` pixels to an equivalent number of
     /// samples.
-    pub(crate) fn equivalent_samples(self, units: f64, pixels: f64) -> f64 {
+    pub(crate) fn samples_including_overhead(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
         units + share.clamp(0.0, Self::MOST) * pixels
     }
@@ -95,8 +95,8 @@ mod tests {
             }
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
-            assert!((share.equivalent_samples(800.0, 100.0) - 850.0).abs() < 1e-9);
-            assert!((cell.seconds() / cell.equivalent_samples(share) - rate).abs() < 1e-9);
+            assert!((share.samples_including_overhead(800.0, 100.0) - 850.0).abs() < 1e-9);
+            assert!((cell.seconds() / cell.samples_including_overhead(share) - rate).abs() < 1e-9);
         }
     }
 
@@ -107,7 +107,7 @@ mod tests {
             for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
                 cell.record(JobCost { seconds, pixels: 1.0, samples }, &mut share);
             }
-            share.equivalent_samples(0.0, 1.0)
+            share.samples_including_overhead(0.0, 1.0)
         };
         assert_eq!(of([1.0, 2.0]), 0.0);
         assert_eq!(of([1.0, 4.0]), 0.0, "the overhead should not be negative");
@@ -122,7 +122,7 @@ mod tests {
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
             cell.record(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
         }
-        assert_eq!(share.equivalent_samples(0.0, 1.0), 0.0);
+        assert_eq!(share.samples_including_overhead(0.0, 1.0), 0.0);
     }
 
     #[test]

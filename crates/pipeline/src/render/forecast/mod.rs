@@ -27,7 +27,7 @@ use crate::plan::RenderPlan;
 use crate::protocol::RenderProgress;
 use crate::scene::description::RenderOptions;
 use crate::stages::photons::PhotonStore;
-use crate::trace::remaining_jobs;
+use crate::trace::estimate_remaining_job_count;
 
 /// Estimating the remaining work requires a sum over all cells, which may take at most `1/EXPECTATION_SHARE`
 /// of the time.
@@ -150,7 +150,7 @@ impl Forecast {
         }
         let WorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
         let done = moment.state.cpu_seconds();
-        let of_pass = moment.photons.map_or(0.0, PhotonStore::seconds_of_pass);
+        let of_pass = moment.photons.map_or(0.0, PhotonStore::mean_seconds_per_pass);
         let of_this = self.photons_since.map_or(0.0, |since| moment.elapsed_seconds - since);
         let to_come = f64::from(all_passes.saturating_sub(passes)) * of_pass - of_this;
         WorkAmount {
@@ -188,7 +188,7 @@ fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let is_known = !(error > 0.0) || state.can_predict_samples();
     let pixels = state.film.crop().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
-    let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
+    let jobs = |done, end| estimate_remaining_job_count(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
     let passes = photons.map_or([0; 2], |_| state.current_and_final_photon_passes(most));
     WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }

@@ -8,7 +8,7 @@ use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
-use super::super::value::{TomlValue, Value, number_within, parse_integer, report_wrong_type};
+use super::super::value::{TomlValue, Value, number_within, parse_integer_in_radix, report_wrong_type};
 use super::TableKey;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec3};
@@ -40,14 +40,14 @@ impl TableKey<'_> {
         limits: Limits,
     ) -> Option<ColorSource> {
         if self.is_table() {
-            return self.texture_reference(textures).map(ColorSource::Texture);
+            return self.inline_table_texture_index(textures).map(ColorSource::Texture);
         }
         self.reject_texture_name(textures, COLOR_OR_TEXTURE)?;
         self.color_in_limits(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// Reads the texture in `{ texture = "name" }`.
-    fn texture_reference(&self, textures: &DefinedNames) -> Option<usize> {
+    fn inline_table_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
         table.report_invalid_keys();
@@ -92,7 +92,7 @@ impl TableKey<'_> {
             return None;
         }
         match value.decode() {
-            TomlValue::String(text) => return self.parse_color(text).map(Vec3::as_dvec3),
+            TomlValue::String(text) => return self.parse_hex_or_named_color(text).map(Vec3::as_dvec3),
             TomlValue::Integer { .. } | TomlValue::Float(_) => {
                 return number_within(self.context, self.name, value, limits, expected).map(DVec3::splat);
             }
@@ -119,7 +119,7 @@ impl TableKey<'_> {
     /// component.
     fn byte_color_to_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.decode() {
-            TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),
+            TomlValue::Integer { digits, radix } => u8::try_from(parse_integer_in_radix(digits, radix)?).ok(),
             TomlValue::String(_)
             | TomlValue::Float(_)
             | TomlValue::Boolean(_)
@@ -137,7 +137,7 @@ impl TableKey<'_> {
     }
 
     /// Converts `#rrggbb` or a case-insensitive color name from sRGB to linear.
-    fn parse_color(&self, text: &str) -> Option<Vec3> {
+    fn parse_hex_or_named_color(&self, text: &str) -> Option<Vec3> {
         if let Some(bytes) = parse_color_bytes(text) {
             return Some(srgb8_to_linear(bytes));
         }

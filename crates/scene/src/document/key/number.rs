@@ -36,7 +36,7 @@ impl TableKey<'_> {
     }
 
     /// Reads the name of a texture, or `{ texture = "name", channel = "r" }`.
-    pub(in super::super) fn number_texture(
+    pub(in super::super) fn texture_with_optional_channel(
         &self,
         textures: &DefinedNames,
     ) -> Option<(usize, Option<Channel>)> {

@@ -14,12 +14,12 @@ use crate::math::limits::{SHORTEST, is_too_short, robust_length};
 
 /// The mesh files referenced so far. A file referenced through different paths is listed once.
 #[derive(Default)]
-pub(super) struct MeshFiles {
+pub(super) struct MeshFileRegistry {
     list: Vec<MeshFile>,
     indices: HashMap<(PathBuf, Option<u32>), usize>,
 }
 
-impl MeshFiles {
+impl MeshFileRegistry {
     fn add_file(&mut self, file: Spanned<PathBuf>, part: Option<u32>) -> usize {
         let identity = file.value.canonicalize().unwrap_or_else(|_| file.value.clone());
         *self.indices.entry((identity, part)).or_insert_with(|| {
@@ -34,7 +34,7 @@ impl MeshFiles {
     }
 }
 
-pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Option<Shape> {
     let file = table.required_key("file", "\"mesh.obj\"").existing_file(MESHES);
     let part = read_part_index(table, file.as_ref());
     let placed = read_placement(table);

@@ -20,10 +20,10 @@ use super::limits::Limits;
 use super::materials::MaterialList;
 use super::table::TableReader;
 use crate::math::DVec3;
-use mesh::MeshFiles;
+use mesh::MeshFileRegistry;
 
 /// A function that reads a shape's table. Only meshes use the list of mesh files.
-type ShapeReader = fn(&TableReader<'_>, &mut MeshFiles) -> Option<Shape>;
+type ShapeReader = fn(&TableReader<'_>, &mut MeshFileRegistry) -> Option<Shape>;
 
 /// Table name and reader for each kind of shape. [`read`] sorts the objects into file order.
 const KINDS: [(&str, ShapeReader); 10] = [
@@ -40,13 +40,13 @@ const KINDS: [(&str, ShapeReader); 10] = [
 ];
 
 /// Whether `[[name]]` tables define shapes.
-pub(super) fn is_shape_table(name: &str) -> bool {
+pub(super) fn is_shape_table_name(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
 
 /// Reads all shapes and the mesh files they reference. Returns no shapes if any is invalid.
 pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<Vec<Object>>, Vec<MeshFile>) {
-    let mut files = MeshFiles::default();
+    let mut files = MeshFileRegistry::default();
     let mut objects = Vec::new();
     let mut is_valid = true;
     for (kind, reader) in KINDS {
@@ -66,7 +66,7 @@ fn read_object(
     table: &TableReader<'_>,
     reader: ShapeReader,
     materials: &MaterialList,
-    files: &mut MeshFiles,
+    files: &mut MeshFileRegistry,
 ) -> Option<Object> {
     let shape = reader(table, files);
     let key = match kind {
@@ -74,7 +74,7 @@ fn read_object(
         _ => table.required_key("material", "\"name\""),
     };
     let material = key.index_by_name(&materials.names);
-    let name = table.optional_key("name").shape_name();
+    let name = table.optional_key("name").optional_object_name();
     table.report_invalid_keys();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
         let issue = Issue::error(key.span()?, "an infinite plane cannot emit light")

@@ -34,7 +34,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
 
 /// Ray and texture lookup counts for direct lighting.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LightRayCounts {
+pub struct DirectLightCounters {
     /// Shadow rays.
     pub shadow: u64,
     /// Rays in narrow lobes.
@@ -43,7 +43,7 @@ pub struct LightRayCounts {
     pub lookups: u64,
 }
 
-impl std::ops::AddAssign for LightRayCounts {
+impl std::ops::AddAssign for DirectLightCounters {
     fn add_assign(&mut self, other: Self) {
         self.shadow += other.shadow;
         self.scattered += other.scattered;
@@ -56,7 +56,7 @@ impl std::ops::AddAssign for LightRayCounts {
 pub struct ReflectedLight {
     /// Reflected radiance, before multiplication by the path throughput.
     pub light: Vec3x16,
-    pub rays: LightRayCounts,
+    pub rays: DirectLightCounters,
 }
 
 /// Sums over all light samples.
@@ -66,19 +66,19 @@ pub struct LightSums {
     pub light: Vec3x16,
     /// Reflected light, ignoring occlusion.
     pub total: F32x16,
-    pub rays: LightRayCounts,
+    pub rays: DirectLightCounters,
 }
 
 impl LightSums {
     pub const ZERO: Self = Self {
         light: [[0.0; PACKET_SIZE]; 3],
         total: [0.0; PACKET_SIZE],
-        rays: LightRayCounts { shadow: 0, scattered: 0, lookups: 0 },
+        rays: DirectLightCounters { shadow: 0, scattered: 0, lookups: 0 },
     };
 
     /// Converts the sums to the reflected light.
     #[inline(always)]
-    pub fn into_reflected(mut self, aov: LightAov) -> ReflectedLight {
+    pub fn into_reflected_or_lit_fraction(mut self, aov: LightAov) -> ReflectedLight {
         if aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
@@ -165,7 +165,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         simd,
                     );
                 }
-                self.add_light_samples(
+                self.trace_or_defer_light_samples(
                     &samples,
                     &values,
                     active,
@@ -229,7 +229,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the contributions of one light's samples. With `pending`, defers them until the light's shadow
     /// ray is traced.
     #[inline(always)]
-    fn add_light_samples(
+    fn trace_or_defer_light_samples(
         &self,
         samples: &LightSamplePacket,
         values: &Vec3x16,
@@ -251,7 +251,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         } else {
             let traced = active & !self.row.below_horizon_mask(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.trace_shadow_rays((&rays, &ends, traced), &samples.sources, values, sums, simd);
+            self.add_light_along_shadow_rays((&rays, &ends, traced), &samples.sources, values, sums, simd);
         }
     }
 
@@ -289,7 +289,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         let rays = RayPacket::from_soa(self.row.from, direction)
             .with_start_triangle(self.row.start_triangles(&direction));
-        self.trace_shadow_rays(
+        self.add_light_along_shadow_rays(
             (&rays, &ends, traced),
             &LightGeometryPacket::splat(source),
             &pending.light,
@@ -301,7 +301,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Traces the shadow rays in `traced` and adds the light that arrives along the unoccluded rays. Rays
     /// that are not traced have a `t_max` below 0.
     #[inline(always)]
-    pub fn trace_shadow_rays(
+    pub fn add_light_along_shadow_rays(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,
@@ -320,7 +320,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
     }
 
-    /// Like [`SampleAllLights::trace_shadow_rays`], for scenes with null interactions, where shadow rays have a
+    /// Like [`SampleAllLights::add_light_along_shadow_rays`], for scenes with null interactions, where shadow rays have a
     /// transmittance.
     #[cold]
     #[inline(never)]
@@ -336,7 +336,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
         for i in lane_indices(arriving) {
-            let value = lane(&values, i) * transmittance_for_aov(lane(&weakened.left, i), self.aov);
+            let value = lane(&values, i) * convert_transmittance_for_aov(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
         add_masked_lanes(arriving, &values, &mut sums.light);
@@ -425,7 +425,7 @@ pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
 }
 
 /// Transmittance of null interactions for a light AOV.
-pub fn transmittance_for_aov(left: Vec3, aov: LightAov) -> Vec3 {
+pub fn convert_transmittance_for_aov(left: Vec3, aov: LightAov) -> Vec3 {
     match aov {
         LightAov::Radiance(_) | LightAov::TraversalCost => left,
         LightAov::LitFraction => Vec3::splat(luminance(left)),

@@ -65,7 +65,8 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
             let picks =
                 lighting.pick_lights(selection, &sampler, first..(first + PICK_BLOCK).min(samples), simd);
             for (k, pick) in (first * each..).zip(&picks) {
-                let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
+                let mut sink =
+                    SampledLightSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
                 lighting.sample_picked_lights(pick, &sampler, (k, samples * each), &mut sink, simd);
             }
         }
@@ -74,7 +75,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
 }
 
 /// Destination for the sampled light or the pending shadow rays.
-struct PickSink<'a> {
+struct SampledLightSink<'a> {
     tree: &'a LightTree,
     row: u32,
     /// Pool for the shadow rays. `None` to trace them immediately.
@@ -101,7 +102,7 @@ impl LightPicks {
     /// Returns the lights and the mask of vertices that picked a light. Lights in the other lanes are
     /// arbitrary and have no effect.
     #[inline(always)]
-    fn lights(&self) -> ([u32; PACKET_SIZE], u32) {
+    fn lights_and_pick_mask(&self) -> ([u32; PACKET_SIZE], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
         for i in 0..PACKET_SIZE {
             used |= u32::from(shares[i] > 0.0) << i;
@@ -153,7 +154,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Pick lights with these numbers.
         let mut picks = vec![LightPicks::EMPTY; numbers.len()];
         if tree.is_single_node() {
-            self.pick_from_single_node(tree, &numbers, &mut picks, simd);
+            self.pick_from_single_node_tree(tree, &numbers, &mut picks, simd);
         } else {
             self.pick_with_tree_cuts(tree, way, &numbers, &mut picks);
         }
@@ -165,7 +166,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks lights from a tree with a single node, for all vertices at once.
     #[inline(always)]
-    fn pick_from_single_node(
+    fn pick_from_single_node_tree(
         &self,
         tree: &LightTree,
         numbers: &[[f64; PACKET_SIZE]],
@@ -256,12 +257,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         pick: &LightPicks,
         sampler: &SamplerPacket<PACKET_SIZE>,
         (number, count): (u32, u32),
-        sink: &mut PickSink<'_>,
+        sink: &mut SampledLightSink<'_>,
         simd: impl Simd,
     ) {
-        let PickSink { tree, row: row_number, pool, sums } = sink;
+        let SampledLightSink { tree, row: row_number, pool, sums } = sink;
         let (row, render) = (self.row, &self.tile.settings.render);
-        let (lights, used) = pick.lights();
+        let (lights, used) = pick.lights_and_pick_mask();
         // Sample a point on each picked light.
         let u = sampler.pairs(&row.path, Dimension::ChosenLight, number, count);
         let at = (&row.from, &row.normal);
@@ -299,7 +300,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             // Nothing is traced, so there is no traversal cost.
             ShadowMode::Off if self.aov == LightAov::TraversalCost => return,
             ShadowMode::Off => return add_masked_lanes(active, &values, &mut sums.light),
-            ShadowMode::Hard => self.aim_at_centers(&mut samples, &lights, active),
+            ShadowMode::Hard => self.aim_samples_at_light_centers(&mut samples, &lights, active),
             ShadowMode::Soft => {}
         }
         // Trace the shadow rays, or queue them with other rays to the same lights.
@@ -315,13 +316,24 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
             Some(_) | None => {
-                self.trace_shadow_rays((&rays, &ends, traced), &samples.sources, &values, sums, simd);
+                self.add_light_along_shadow_rays(
+                    (&rays, &ends, traced),
+                    &samples.sources,
+                    &values,
+                    sums,
+                    simd,
+                );
             }
         }
     }
 
     /// Aims rays at the centers of all lights that have a center.
-    fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
+    fn aim_samples_at_light_centers(
+        &self,
+        samples: &mut LightSamplePacket,
+        lights: &[u32; PACKET_SIZE],
+        active: u32,
+    ) {
         for i in lane_indices(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center_and_geometry() else {
                 continue;

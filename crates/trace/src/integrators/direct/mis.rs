@@ -85,7 +85,7 @@ impl CompetingTechnique {
             SampledLobes::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = mean_mis_weight_of_lobes(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -98,7 +98,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn mean_mis_weight_of_lobes(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
@@ -125,7 +125,7 @@ impl TileContext<'_> {
     }
 
     /// MIS-weighted radiance of infinite lights along a path. Light samples contribute the rest.
-    pub fn infinite_light(&self, path: &PathRay) -> Vec3 {
+    pub fn mis_weighted_infinite_light(&self, path: &PathRay) -> Vec3 {
         let environment = self.world.lights.environment();
         self.infinite_light_with_sky(
             environment.map(|environment| environment.radiance_and_pdf(path.ray.direction)),
@@ -133,7 +133,7 @@ impl TileContext<'_> {
         )
     }
 
-    /// Like [`TileContext::infinite_light`], with the environment's radiance and light-sampling pdf already
+    /// Like [`TileContext::mis_weighted_infinite_light`], with the environment's radiance and light-sampling pdf already
     /// evaluated.
     pub fn infinite_light_with_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);

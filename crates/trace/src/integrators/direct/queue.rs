@@ -2,14 +2,14 @@
 
 use arrayvec::ArrayVec;
 
-use super::all_lights::{LightRayCounts, LightSums, ReflectedLight, SampleAllLights, add_masked_lanes};
+use super::all_lights::{DirectLightCounters, LightSums, ReflectedLight, SampleAllLights, add_masked_lanes};
 use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, active_lanes, lane_indices};
+use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -100,14 +100,18 @@ impl DirectLightQueue {
 
     /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
     /// for a queue index and whether the camera sees the vertex.
-    pub fn flush(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
+    pub fn flush_to_accumulator(
+        &mut self,
+        path: impl Fn(usize) -> (u32, bool),
+        accumulator: &mut Accumulator<'_>,
+    ) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, only_specular_before) = path(place);
             accumulator.add_clamped_direct(slot, *light, only_specular_before);
         }
     }
 
-    /// Like [`DirectLightQueue::flush`], for paths with consecutive slots.
+    /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
     pub fn flush_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_consecutive(first, &self.arrived);
     }
@@ -212,8 +216,8 @@ impl DirectLightQueue {
         (continuation, depth): (Option<Continuation>, u32),
         gather: impl Fn(&VertexBatch) -> Option<Vec3x16>,
         next: &mut Vec<PathRay>,
-    ) -> Result<LightRayCounts, Cancelled> {
-        let mut rays = LightRayCounts::default();
+    ) -> Result<DirectLightCounters, Cancelled> {
+        let mut rays = DirectLightCounters::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
         let together = if tile.world.lights.sampler(tile.behavior.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are computed only with light samples.
@@ -240,7 +244,7 @@ impl DirectLightQueue {
                         .instruction_set()
                         .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
                 }
-                let request = DirectLightRequest {
+                let request = DirectLightPacketRequest {
                     number,
                     used: row.used & contributing_vertex_mask(row, aov),
                     shares_with_paths,
@@ -256,7 +260,7 @@ impl DirectLightQueue {
             // Add light from lobe rays and photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
-                let request = DirectLightRequest {
+                let request = DirectLightPacketRequest {
                     number,
                     used: row.used & contributing_vertex_mask(row, aov),
                     shares_with_paths,
@@ -286,7 +290,7 @@ impl DirectLightQueue {
     /// The technique that competes with light samples at a packet.
     fn competing_technique(
         &self,
-        request: DirectLightRequest,
+        request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
     ) -> CompetingTechnique {
@@ -312,7 +316,7 @@ impl DirectLightQueue {
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
     fn sample_lights(
         &mut self,
-        request: DirectLightRequest,
+        request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
         number: u32,
@@ -354,13 +358,13 @@ impl DirectLightQueue {
     /// Reflected light, including the light found by lobe rays.
     fn reflected_light_with_lobe_rays(
         &self,
-        request: DirectLightRequest,
+        request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
         sums: LightSums,
     ) -> ReflectedLight {
         let row = &self.rows[request.number];
-        let arrived = sums.into_reflected(aov);
+        let arrived = sums.into_reflected_or_lit_fraction(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let interior_lists = self.interiors_of(row);
@@ -408,7 +412,7 @@ fn contributing_vertex_mask(row: &VertexBatch, aov: LightAov) -> u32 {
 
 /// Request to compute direct lighting at a packet of vertices.
 #[derive(Clone, Copy)]
-struct DirectLightRequest {
+struct DirectLightPacketRequest {
     /// Index of the packet.
     number: usize,
     /// Mask of vertices for which to compute direct lighting.
@@ -444,7 +448,7 @@ impl SimdKernel for LiftShadowOrigins<'_> {
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) =
-                (active_lanes(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
+                (nonnegative_end_mask(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
             geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.

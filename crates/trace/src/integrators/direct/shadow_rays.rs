@@ -1,7 +1,7 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_masked_lanes, transmittance_for_aov};
+use super::all_lights::{LightSums, add_masked_lanes, convert_transmittance_for_aov};
 use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -72,7 +72,7 @@ impl ShadowRayQueue {
         if self.rows.is_empty() {
             return;
         }
-        self.group_by_tree_position();
+        self.group_by_light_tree_position();
         let Self { rows, sorted, .. } = self;
         let world = tile.world;
         world.geometry.instruction_set().run(TraceShadowRays { world, aov, rows, rays: sorted });
@@ -83,7 +83,7 @@ impl ShadowRayQueue {
     }
 
     /// Groups rays by ranges of tree positions with a counting sort. Rays within a group keep their order.
-    fn group_by_tree_position(&mut self) {
+    fn group_by_light_tree_position(&mut self) {
         let Self { order, sorted, .. } = self;
         let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
         let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(GROUP_BITS);
@@ -165,7 +165,7 @@ fn attenuate(
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);
     for from in lane_indices(traced & !weakened.occluded) {
-        let left = transmittance_for_aov(lane(&weakened.left, from), aov);
+        let left = convert_transmittance_for_aov(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;
         set_lane(&mut row.values, to, value);

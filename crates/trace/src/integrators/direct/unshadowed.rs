@@ -11,7 +11,7 @@ use crate::math::lanes::lane;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
-use super::all_lights::LightRayCounts;
+use super::all_lights::DirectLightCounters;
 
 /// A ray in a vertex's narrow lobe, and the pdf of its direction.
 pub struct UnshadowedLobeRay<'a> {
@@ -28,7 +28,7 @@ impl UnshadowedLobeRay<'_> {
     /// rays. `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
     #[inline(never)]
-    pub fn radiance(&self, transmittance: impl Fn(f32) -> Vec3, rays: &mut LightRayCounts) -> Vec3 {
+    pub fn radiance(&self, transmittance: impl Fn(f32) -> Vec3, rays: &mut DirectLightCounters) -> Vec3 {
         let Self { tile, row, lane: i, ray, pdf } = self;
         let (world, normal) = (tile.world, lane(&row.normal, *i));
         let (mut sum, mut along, mut passed) = (Vec3::ZERO, *ray, 0.0);
@@ -46,7 +46,7 @@ impl UnshadowedLobeRay<'_> {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
                 let light = world.lights.light_at(hit.object, hit.shape.primitive, side);
-                let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.unoccluded_fraction(light, rays));
+                let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.visibility_of_light(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
             (along, passed) = (world.continue_past(&along, &hit, &mut 0).1, distance);
@@ -55,14 +55,14 @@ impl UnshadowedLobeRay<'_> {
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
             let radiance = tile.lobe_ray_radiance_from_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
-                sum += radiance * transmittance(f32::MAX) * self.unoccluded_fraction(light, rays);
+                sum += radiance * transmittance(f32::MAX) * self.visibility_of_light(light, rays);
             }
         }
         sum
     }
 
     /// Unoccluded fraction of a light.
-    fn unoccluded_fraction(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
+    fn visibility_of_light(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
         match self.tile.settings.render.shadows {
             ShadowMode::Off => return Vec3::ONE,
             ShadowMode::Hard | ShadowMode::Soft => {}

@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 
 use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::local_geometry::{FlatPolygon, LocalSurfaceShape, NearestSurface};
+use crate::geometry::local_geometry::{FlatPolygon, NearestSurface, SurfaceExtent};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, NonSpecular};
 use crate::math::frame::Frame;
@@ -176,8 +176,8 @@ impl KernelNeighborhood {
     /// false.
     fn add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
-            LocalSurfaceShape::Flat(reach) => reach > FAR * self.radius,
-            LocalSurfaceShape::Round(radius) => radius > WIDE * self.radius,
+            SurfaceExtent::Flat(reach) => reach > FAR * self.radius,
+            SurfaceExtent::Round(radius) => radius > WIDE * self.radius,
         };
         let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
         self.whole += u32::from(is_wide && is_same && receives());

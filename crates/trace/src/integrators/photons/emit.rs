@@ -234,7 +234,7 @@ impl PhotonWavefront<'_> {
         let has_planes = tile.world.geometry.has_unbounded();
         for begin in (0..count).step_by(PACKET_SIZE) {
             let numbers =
-                tile.world.geometry.instruction_set().run(EmissionSampleKernel { tile, first: begin });
+                tile.world.geometry.instruction_set().run(EmissionRandomKernel { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it in front of all infinite planes it may pass through.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
@@ -315,8 +315,12 @@ impl PhotonWavefront<'_> {
         match &vertex.material.bsdf {
             // Direct light is found by light samples.
             Bsdf::NonSpecular(_) if lacks_photons => {}
-            Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
-            Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, (far, lacks_photons)),
+            Bsdf::NonSpecular(rough) => {
+                self.store_and_scatter_at_rough(path, vertex, rough, (far, Some(1.0)));
+            }
+            Bsdf::Coated(coated) => {
+                self.store_and_reflect_at_coat(path, vertex, coated, (far, lacks_photons));
+            }
             Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.shading_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
@@ -330,7 +334,7 @@ impl PhotonWavefront<'_> {
     /// Stores a photon at the base of a smooth coat and reflects it from the coat. Caustic photons are
     /// reflected with a probability equal to the coat's Fresnel reflectance, and otherwise scattered at the
     /// base. Other photons never scatter at the base, so all of them are reflected.
-    fn shade_coated(
+    fn store_and_reflect_at_coat(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -343,7 +347,7 @@ impl PhotonWavefront<'_> {
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
         if !lacks_photons {
             let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - fresnel));
-            self.shade_rough(path, vertex, &coated.base, (far, by_chance));
+            self.store_and_scatter_at_rough(path, vertex, &coated.base, (far, by_chance));
         }
         if is_reflected && self.may_scatter() {
             let specular = coated.specular_factor(&vertex.texture_point, &mut self.counters.texture_lookups);
@@ -354,7 +358,7 @@ impl PhotonWavefront<'_> {
 
     /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is
     /// `Some(factor)`, a caustic photon is also scattered, with its flux multiplied by the factor.
-    fn shade_rough(
+    fn store_and_scatter_at_rough(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -368,7 +372,7 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Like [`PhotonWavefront::shade_rough`], with the BSDF already evaluated.
+    /// Like [`PhotonWavefront::store_and_scatter_at_rough`], with the BSDF already evaluated.
     fn store_and_scatter(
         &mut self,
         path: &PathRay,
@@ -546,12 +550,12 @@ fn is_from_infinite_light(emitted: &EmittedPhoton) -> bool {
 }
 
 /// Draws the random numbers for photon emission.
-struct EmissionSampleKernel<'a> {
+struct EmissionRandomKernel<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
 }
 
-impl SimdKernel for EmissionSampleKernel<'_> {
+impl SimdKernel for EmissionRandomKernel<'_> {
     type Output = [PhotonRandomNumbers; PACKET_SIZE];
 
     #[inline(always)]

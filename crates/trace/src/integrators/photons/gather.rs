@@ -4,7 +4,7 @@ use super::PhotonMaps;
 use super::coverage::{KernelCoverage, kernel_coverage};
 use super::map::{GatherPoint, PhotonMap};
 use super::occlusion::is_occluded;
-use super::reservoir::PhotonPosition;
+use super::reservoir::PhotonPositionAndNormal;
 use super::trials::inverse_coverage;
 use crate::geometry::packet::lane_indices;
 use crate::integrators::PACKET_SIZE;
@@ -95,7 +95,7 @@ fn coverage_factor(
     tile: &TileContext<'_>,
     (row, i): (&VertexBatch, usize),
     look: &GatherPoint,
-    photon: Option<PhotonPosition>,
+    photon: Option<PhotonPositionAndNormal>,
     radius: f32,
 ) -> f32 {
     let Some(photon) = photon else { return 1.0 };
@@ -122,7 +122,7 @@ fn gather_reflected_light(
     aov: LightAov,
     random: [f32; 2],
     simd: impl Simd,
-) -> (Vec3, Option<PhotonPosition>) {
+) -> (Vec3, Option<PhotonPositionAndNormal>) {
     if aov == LightAov::TraversalCost {
         return (Vec3::splat(map.count_near(look, simd) as f32), None);
     }
@@ -143,7 +143,7 @@ fn gather_with_bsdf_per_photon(
     (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
     simd: impl Simd,
-) -> (Vec3, Option<PhotonPosition>) {
+) -> (Vec3, Option<PhotonPositionAndNormal>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit_photons(look, simd, |photon, density| {
         let [shown, all] = row.bsdf.lane_f(i, photon.direction);
@@ -156,7 +156,7 @@ fn gather_with_bsdf_per_photon(
         let part = if weight > 0.0 { weight / total } else { 0.0 };
         if left < part {
             left /= part;
-            chosen = Some(PhotonPosition { point: photon.point, normal: photon.normal });
+            chosen = Some(PhotonPositionAndNormal { point: photon.point, normal: photon.normal });
         } else {
             left = (left - part) / (1.0 - part);
         }

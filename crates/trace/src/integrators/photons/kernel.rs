@@ -41,18 +41,18 @@ fn edge_triangle_weight(a: DVec2, b: DVec2) -> f64 {
     let half_chord = (1.0 - distance * distance).max(0.0).sqrt();
     let (enter, leave) = (start.max(-half_chord), end.min(half_chord));
     if enter >= leave {
-        return 0.25 * counterclockwise_angle(a, b);
+        return 0.25 * signed_angle(a, b);
     }
     let (p, q) = (a + along * (enter - start), a + along * (leave - start));
     let cubes = (leave * leave * leave - enter * enter * enter) / 12.0;
     let inside = distance * ((0.5 - 0.25 * distance * distance) * (leave - enter) - cubes);
-    let before = if start < enter { counterclockwise_angle(a, p) } else { 0.0 };
-    let after = if leave < end { counterclockwise_angle(q, b) } else { 0.0 };
+    let before = if start < enter { signed_angle(a, p) } else { 0.0 };
+    let after = if leave < end { signed_angle(q, b) } else { 0.0 };
     inside + 0.25 * (before + after)
 }
 
 /// The counterclockwise angle from one direction to another.
-fn counterclockwise_angle(from: DVec2, to: DVec2) -> f64 {
+fn signed_angle(from: DVec2, to: DVec2) -> f64 {
     f64::from(atan2(from.perp_dot(to) as f32, from.dot(to) as f32))
 }
 

@@ -2,7 +2,7 @@
 //! small as the radius requires. Lookups weight sixteen photons at a time.
 
 use super::packed::{self, PackedDirections};
-use super::reservoir::{LaneReservoirs, PhotonPosition};
+use super::reservoir::{LaneReservoirs, PhotonPositionAndNormal};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::packet::lane_indices;
@@ -173,7 +173,7 @@ impl PhotonMap {
             for order in order.chunks(PACKET_SIZE) {
                 let (mut block, mut depth) = (EMPTY, [0; PACKET_SIZE]);
                 for (i, &number) in order.iter().enumerate() {
-                    depth[i] = block.put(i, &photons[number as usize]);
+                    depth[i] = block.put_photon_returning_depth(i, &photons[number as usize]);
                 }
                 blocks.push(block);
                 depths.push(depth);
@@ -229,7 +229,7 @@ impl PhotonMap {
         look: &GatherPoint,
         random: [f32; 2],
         simd: impl Simd,
-    ) -> (Vec3, Option<PhotonPosition>) {
+    ) -> (Vec3, Option<PhotonPositionAndNormal>) {
         let mut sums = [[0.0; PACKET_SIZE]; 3];
         let mut choices = LaneReservoirs::new(random[0]);
         let ranges = self.candidate_ranges(look);
@@ -248,16 +248,17 @@ impl PhotonMap {
                 choices.add_item(block as u32, &brought);
             }
         }
-        let chosen =
-            choices.choose_lane(random[1]).map(|(block, i)| self.position_and_normal(block as usize, i));
+        let chosen = choices
+            .sample_lane_by_weight(random[1])
+            .map(|(block, i)| self.position_and_normal(block as usize, i));
         (Vec3::from(sums.map(sum_lanes)) * self.peak_weight(), chosen)
     }
 
     /// Position and normal of a photon.
     #[inline(always)]
-    fn position_and_normal(&self, block: usize, i: usize) -> PhotonPosition {
+    fn position_and_normal(&self, block: usize, i: usize) -> PhotonPositionAndNormal {
         let PhotonBlock { point, normal, .. } = &self.blocks[block];
-        PhotonPosition { point: lane(point, i), normal: packed::unpack_unit(normal[i]) }
+        PhotonPositionAndNormal { point: lane(point, i), normal: packed::unpack_unit(normal[i]) }
     }
 
     /// Number of photons in the kernel around a point.
@@ -358,7 +359,10 @@ impl PhotonMap {
             return None;
         }
         // Reject photons on other surfaces and photons from behind.
-        let (own, from) = (packed::unpack_lanes(&block.normal), packed::unpack_lanes(&block.direction));
+        let (own, from) = (
+            packed::unpack_unnormalized_lanes(&block.normal),
+            packed::unpack_unnormalized_lanes(&block.direction),
+        );
         for i in 0..PACKET_SIZE {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
             let squared = own[0][i] * own[0][i] + own[1][i] * own[1][i] + own[2][i] * own[2][i];
@@ -385,7 +389,7 @@ impl PhotonMap {
 
 impl PhotonBlock {
     /// Stores a photon in a lane and returns its depth.
-    fn put(&mut self, i: usize, photon: &Photon) -> u32 {
+    fn put_photon_returning_depth(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
         self.normal[i] = packed::pack_direction(photon.normal);

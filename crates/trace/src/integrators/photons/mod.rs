@@ -139,7 +139,7 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
-    pub fn new(
+    pub fn new_with_first_pass(
         world: &World,
         settings: &RenderSettings,
         photons: PhotonSettings,
@@ -377,9 +377,9 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
 }
 
 /// Glass objects with their bounding boxes and indices of refraction.
-struct GlassObjects(Vec<(u32, Option<Aabb>, f32)>);
+struct GlassObjectBoundsList(Vec<(u32, Option<Aabb>, f32)>);
 
-impl GlassObjects {
+impl GlassObjectBoundsList {
     fn from_world(world: &World) -> Self {
         let each = (0..).zip(world.geometry.objects()).flat_map(|(id, object)| {
             let glasses = world.materials_of(id).filter_map(|material| material.bsdf.as_dielectric());
@@ -414,7 +414,7 @@ struct SpecularObjects {
 impl SpecularObjects {
     fn from_world(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
-        let glasses = GlassObjects::from_world(world);
+        let glasses = GlassObjectBoundsList::from_world(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
             // Between equal indices of refraction, light passes through rough glass unchanged, but shadow
             // rays are blocked.

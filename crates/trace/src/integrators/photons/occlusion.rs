@@ -1,7 +1,7 @@
 //! Occlusion between a point and a photon in its kernel.
 
 use super::map::GatherPoint;
-use super::reservoir::PhotonPosition;
+use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::Ray;
 use crate::lights::LightGeometry;
 use crate::world::Geometry;
@@ -18,7 +18,12 @@ const NEAR: f32 = 1e-3;
 
 /// Whether a photon is occluded from the kernel's center. Tests a segment above the surface, or a segment
 /// close to the surface if there is not enough room above either end.
-pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &PhotonPosition, radius: f32) -> bool {
+pub fn is_occluded(
+    geometry: &Geometry,
+    look: &GatherPoint,
+    photon: &PhotonPositionAndNormal,
+    radius: f32,
+) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;
     }

@@ -21,23 +21,23 @@ pub fn pack_direction(direction: Vec3) -> u32 {
 /// Decodes a unit vector.
 #[inline(always)]
 pub fn unpack_unit(packed: u32) -> Vec3 {
-    let [x, y, z] = unpack_vector(packed);
+    let [x, y, z] = unpack_unnormalized_vector(packed);
     Vec3::new(x, y, z).normalize()
 }
 
 /// Decodes vectors without normalizing them. Their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
-pub fn unpack_lanes(packed: &PackedDirections) -> Vec3x16 {
+pub fn unpack_unnormalized_lanes(packed: &PackedDirections) -> Vec3x16 {
     let mut vectors = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
-        let [x, y, z] = unpack_vector(packed[i]);
+        let [x, y, z] = unpack_unnormalized_vector(packed[i]);
         (vectors[0][i], vectors[1][i], vectors[2][i]) = (x, y, z);
     }
     vectors
 }
 
 #[inline(always)]
-fn unpack_vector(packed: u32) -> [f32; 3] {
+fn unpack_unnormalized_vector(packed: u32) -> [f32; 3] {
     let u = ((packed << 16) as i32 >> 16) as f32;
     let v = (packed as i32 >> 16) as f32;
     let z = SIDE - u.abs() - v.abs();
@@ -66,7 +66,7 @@ mod tests {
                 "{direction}: {}",
                 unpack_unit(packed)
             );
-            let long = unpack_lanes(&[packed; PACKET_SIZE]);
+            let long = unpack_unnormalized_lanes(&[packed; PACKET_SIZE]);
             let first = Vec3::new(long[0][0], long[1][0], long[2][0]);
             assert!((first.normalize() - direction).length() < 7e-5, "{direction}: {first}");
         }

@@ -9,7 +9,7 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Position and normal of a photon.
 #[derive(Clone, Copy, Debug)]
-pub struct PhotonPosition {
+pub struct PhotonPositionAndNormal {
     /// Position of the photon.
     pub point: Vec3,
     /// Unit geometric normal on the side of the surface that the photon hit.
@@ -58,7 +58,7 @@ impl LaneReservoirs {
     /// Chooses a lane in proportion to its total weight and returns the lane's item and index. `None` if all
     /// weights are 0.
     #[inline(always)]
-    pub fn choose_lane(&self, random: f32) -> Option<(u32, usize)> {
+    pub fn sample_lane_by_weight(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
         let mut last = None;
         for i in 0..PACKET_SIZE {
@@ -92,7 +92,8 @@ mod tests {
         for _ in 0..DRAWS {
             let mut choices = LaneReservoirs::new(next());
             (0..ITEMS).for_each(|number| choices.add_item(number as u32, &weights[number]));
-            let (number, lane) = choices.choose_lane(next()).expect("some weights should be positive");
+            let (number, lane) =
+                choices.sample_lane_by_weight(next()).expect("some weights should be positive");
             counts[number as usize][lane] += 1;
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
@@ -100,6 +101,6 @@ mod tests {
             let difference = (f64::from(*count) - expected).abs();
             assert!(difference <= 5.0 * expected.sqrt(), "got {count}, expected {expected}");
         }
-        assert_eq!(LaneReservoirs::new(0.3).choose_lane(0.5), None);
+        assert_eq!(LaneReservoirs::new(0.3).sample_lane_by_weight(0.5), None);
     }
 }

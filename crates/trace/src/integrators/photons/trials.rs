@@ -4,7 +4,7 @@ use super::coverage::{KernelCoverage, can_store_photons, primitive_material};
 use super::kernel::sample;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
 use super::occlusion::is_occluded;
-use super::reservoir::PhotonPosition;
+use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::frame::Frame;
@@ -83,7 +83,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         // Succeed if the surface receives photons, has about the same normal, and is not occluded.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
-        let photon = PhotonPosition { point: surface.point, normal };
+        let photon = PhotonPositionAndNormal { point: surface.point, normal };
         if cosine.abs() > MIN_COSINE
             && can_store_photons(primitive_material(world, hit.object, hit.shape.primitive))
             && !is_occluded(&world.geometry, look, &photon, radius)

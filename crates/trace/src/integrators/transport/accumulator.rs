@@ -27,7 +27,7 @@ pub struct Accumulator<'a> {
 impl Accumulator<'_> {
     /// Adds emission or ambient light.
     pub fn add_non_reflected(&mut self, slot: u32, part: NonReflectedTerm, radiance: Vec3) {
-        let parts = self.components();
+        let parts = self.components_to_accumulate();
         let is_taken = match part {
             NonReflectedTerm::Emitted => parts.emitted,
             NonReflectedTerm::Ambient => parts.ambient,
@@ -53,7 +53,7 @@ impl Accumulator<'_> {
     }
 
     /// Radiance components to accumulate.
-    fn components(&self) -> RadianceComponents {
+    fn components_to_accumulate(&self) -> RadianceComponents {
         match self.aov {
             LightAov::Radiance(parts) => parts,
             LightAov::LitFraction | LightAov::TraversalCost => RadianceComponents::NONE,
@@ -71,7 +71,7 @@ impl Accumulator<'_> {
     /// Whether the ambient term of a surface hit by a path is accumulated. After a diffuse or glossy surface,
     /// it is treated as light reflected by that surface.
     pub fn accepts_ambient(&self, path: &PathRay) -> bool {
-        let parts = self.components();
+        let parts = self.components_to_accumulate();
         if path.state.only_specular_before {
             parts.ambient
         } else {

@@ -99,8 +99,9 @@ impl VertexBatch {
             return 0;
         }
         // A lobe's solid angle is about 2π/(α + 1) sr.
-        let filled =
-            Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.infinite_solid_angle() - 1.0;
+        let filled = Self::MIN_WIDTH_RATIO * std::f32::consts::TAU
+            / tile.world.lights.max_infinite_light_solid_angle()
+            - 1.0;
         let least = filled.min(Self::MIN_SHARP_EXPONENT);
         self.bsdf.mask_narrower_than(self.used, least)
     }

@@ -213,7 +213,7 @@ impl SimdKernel for PacketIntersection<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
-                traced = packet::active_lanes(&ends, simd);
+                traced = packet::nonnegative_end_mask(&ends, simd);
                 of_paths = RayPacket::from_soa(origin, direction).with_start_triangle(start);
                 &of_paths
             }

@@ -85,7 +85,7 @@ impl SampleBlock {
     pub fn sample_of(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
-        let (x, y) = self.pixels.position(pixel);
+        let (x, y) = self.pixels.image_position(pixel);
         (x, y, self.samples.start + sample)
     }
 

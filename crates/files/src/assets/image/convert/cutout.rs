@@ -2,8 +2,8 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha_sample_index, is_channel_constant, linearize_pixel, rgb, sanitize, with_samples};
-use crate::assets::image::metadata::{AlphaUsage, ImageMetadata};
+use super::{Sample, alpha_sample_index, is_channel_equal_to, linearize_pixel, rgb, sanitize, with_samples};
+use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorCurve, ImageEncoding};
 use crate::materials::texels::{TexelData, Texels};
@@ -17,13 +17,13 @@ pub(super) fn alpha_weighted_texels(
     metadata: &ImageMetadata,
 ) -> Texels {
     let Some(alpha) =
-        alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_constant(&image, *alpha, 1.0))
+        alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_equal_to(&image, *alpha, 1.0))
     else {
         return super::texels(image, curve.encoding(), metadata);
     };
     let (width, height) = (image.width(), image.height());
     let space = ImageEncoding::CutOut(curve).color_space(metadata);
-    let is_direct = space.is_default() && metadata.alpha != AlphaUsage::Premultiplied;
+    let is_direct = space.is_default() && metadata.alpha != AlphaInterpretation::Premultiplied;
     let mut unusable = 0;
     let data = match &image {
         DynamicImage::ImageLumaA8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
@@ -33,7 +33,7 @@ pub(super) fn alpha_weighted_texels(
                 alpha,
                 curve,
                 space,
-                is_premultiplied: metadata.alpha == AlphaUsage::Premultiplied,
+                is_premultiplied: metadata.alpha == AlphaInterpretation::Premultiplied,
             };
             with_samples!(image, samples => alpha_weighted_floats(samples, &options, &mut unusable))
         }
@@ -99,7 +99,7 @@ fn alpha_weighted_floats<T: Sample>(
             Linearization::Srgb => encoded.map(|value| srgb_to_linear(sanitize(value / divisor))),
             Linearization::Tables(tables) => linearize_pixel(pixel, Some(tables)),
         };
-        let color = Vec3::from_array(options.space.to_rec_709_color(linear).map(sanitize));
+        let color = Vec3::from_array(options.space.linear_to_rec_709(linear).map(sanitize));
         (color * alpha).extend(alpha)
     };
     TexelData::FloatAlpha(samples.chunks_exact(options.alpha + 1).map(texel).collect())

@@ -6,7 +6,7 @@ mod scalars;
 use ::image::{ColorType, DynamicImage};
 
 use super::ImageEncoding;
-use super::metadata::{AlphaUsage, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::space::ColorSpace;
 use crate::materials::ChannelSelector;
 use crate::materials::texels::{TexelData, Texels};
@@ -101,18 +101,22 @@ fn alpha_sample_index(image: &DynamicImage, metadata: &ImageMetadata) -> Option<
         _ => return None,
     };
     match metadata.alpha {
-        AlphaUsage::Straight | AlphaUsage::Premultiplied => Some(index),
-        AlphaUsage::Unused | AlphaUsage::Dropped => None,
-        AlphaUsage::UnusedIfZero => (!is_channel_constant(image, index, 0.0)).then_some(index),
+        AlphaInterpretation::Straight | AlphaInterpretation::Premultiplied => Some(index),
+        AlphaInterpretation::Unused | AlphaInterpretation::Dropped => None,
+        AlphaInterpretation::UnusedIfZero => (!is_channel_equal_to(image, index, 0.0)).then_some(index),
     }
 }
 
 /// Whether channel `index` equals `value` in every pixel.
-fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
-    fn all_samples_equal<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
+fn is_channel_equal_to(image: &DynamicImage, index: usize, value: f32) -> bool {
+    fn are_channel_samples_equal_to<T: Sample>(
+        samples: &[T],
+        (channels, index): (usize, usize),
+        value: f32,
+    ) -> bool {
         samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)
     }
-    with_samples!(image, samples => all_samples_equal(samples, (channel_count(image), index), value))
+    with_samples!(image, samples => are_channel_samples_equal_to(samples, (channel_count(image), index), value))
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
@@ -125,16 +129,16 @@ pub(super) fn constant_alpha_warning(
     else {
         return None;
     };
-    if metadata.alpha == AlphaUsage::Dropped {
+    if metadata.alpha == AlphaInterpretation::Dropped {
         return Some(ALPHA_BIT_IGNORED);
     }
     let alpha = alpha_sample_index(image, metadata)?;
-    if is_channel_constant(image, alpha, 0.0) {
+    if is_channel_equal_to(image, alpha, 0.0) {
         return Some(INVISIBLE);
     }
     match encoding {
         ImageEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
-            if is_channel_constant(image, alpha, 1.0) =>
+            if is_channel_equal_to(image, alpha, 1.0) =>
         {
             Some(if scalars::uses_luminance_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
         }
@@ -259,7 +263,7 @@ fn convert_color_space(
         let tables = T::linearization_tables(space);
         let mut texel = |pixel| {
             let linear = linearize_pixel(pixel, tables.as_ref());
-            let color = space.to_rec_709_color(linear);
+            let color = space.linear_to_rec_709(linear);
             if is_raw {
                 return Vec3::from_array(color);
             }

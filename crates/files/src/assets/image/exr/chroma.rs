@@ -5,7 +5,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
 use super::channels::ChannelIndex;
-use super::{ChannelRow, SAMPLE_BYTES, channel_header};
+use super::{ChannelRow, SAMPLE_BYTES, channel_description};
 use crate::math::DVec3;
 
 /// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
@@ -27,7 +27,7 @@ pub(super) struct LuminanceChroma {
 impl LuminanceChroma {
     pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
-        let (size, step) = (headers[ry.part].layer_size, channel_header(headers, ry).sampling);
+        let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
@@ -35,7 +35,7 @@ impl LuminanceChroma {
     /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
-        let rows = size.height() / channel_header(headers, ry).sampling.y();
+        let rows = size.height() / channel_description(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
@@ -58,7 +58,7 @@ impl LuminanceChroma {
     pub(super) fn for_each_color(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
         let (width, height) = (self.size.width(), self.size.height());
         let is_filtered = self.step == Vec2(2, 2);
-        self.interpolate_rows();
+        self.interpolate_chroma_along_rows();
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
@@ -77,12 +77,14 @@ impl LuminanceChroma {
     }
 
     /// Interpolates chroma along the rows that have samples.
-    fn interpolate_rows(&mut self) {
+    fn interpolate_chroma_along_rows(&mut self) {
         let (width, step) = (self.size.width(), self.step.x());
         let interpolated = |plane: &Vec<f32>| -> Vec<f32> {
             let rows = plane.chunks_exact(width / step);
-            rows.flat_map(|row| (0..width).map(|x| interpolate_in_row(x, self.step, row.len(), |at| row[at])))
-                .collect()
+            rows.flat_map(|row| {
+                (0..width).map(|x| interpolate_chroma_at_column(x, self.step, row.len(), |at| row[at]))
+            })
+            .collect()
         };
         let chroma = [interpolated(&self.chroma[0]), interpolated(&self.chroma[1])];
         self.chroma = chroma;
@@ -120,7 +122,12 @@ impl LuminanceChroma {
 
 /// Interpolates chroma at a column, using the filter for 2 × 2 subsampling and linear interpolation for other
 /// factors.
-fn interpolate_in_row(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+fn interpolate_chroma_at_column(
+    x: usize,
+    step: Vec2<usize>,
+    count: usize,
+    sample: impl Fn(usize) -> f32,
+) -> f32 {
     if step != Vec2(2, 2) {
         return interpolate_linearly(x, step.x(), count, sample);
     }

@@ -17,7 +17,7 @@ use ::exr::prelude::{Vec2, f16};
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::metadata::{AlphaUsage, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
 use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_missing_channels};
@@ -59,7 +59,8 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
 
     /// Color space, alpha usage and warnings.
     pub(super) fn metadata(&self) -> ImageMetadata {
-        let mut metadata = ImageMetadata { alpha: AlphaUsage::Premultiplied, ..ImageMetadata::default() };
+        let mut metadata =
+            ImageMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
                 Some(matrix) => metadata.space = ColorSpace::with_matrix_to_rec_709(matrix),
@@ -104,13 +105,13 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_header(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| channel_header(headers, channel).sampling;
+    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -120,7 +121,9 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     }
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
-        Some(channel) => Err(subsampled_channel_message(&channel_header(headers, channel).name.to_string())),
+        Some(channel) => {
+            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
+        }
         None => match channels.luminance_chroma_channels() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
@@ -212,7 +215,7 @@ impl PartialImage<'_> {
         let window = header.shared_attributes.display_window;
         let offset = header.own_attributes.layer_position - window.position;
         let slots = self.channels.component_channels();
-        let pixel_bytes = bytes_per_pixel(self.channels);
+        let pixel_bytes = decoded_bytes_per_pixel(self.channels);
         let Ok(row) = usize::try_from(row as i64 + i64::from(offset.y())) else { return };
         let width = window.size.width() * pixel_bytes;
         let Some(row) = samples.chunks_exact_mut(width).nth(row) else { return };
@@ -238,7 +241,7 @@ impl PartialImage<'_> {
         let Some(weights) = weights.or(Primaries::REC_709.luminance_weights()) else { return };
         let offset = header.own_attributes.layer_position - window.position;
         let (width, height) = (window.size.width() as i64, window.size.height() as i64);
-        let bytes = bytes_per_pixel(self.channels);
+        let bytes = decoded_bytes_per_pixel(self.channels);
         planes.for_each_color(weights, |[x, y], color| {
             let (x, y) = (x as i64 + i64::from(offset.x()), y as i64 + i64::from(offset.y()));
             if !(0..width).contains(&x) || !(0..height).contains(&y) {
@@ -252,7 +255,7 @@ impl PartialImage<'_> {
 }
 
 /// Size of a decoded pixel in bytes.
-fn bytes_per_pixel(channels: ChosenChannels) -> usize {
+fn decoded_bytes_per_pixel(channels: ChosenChannels) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
 }
 

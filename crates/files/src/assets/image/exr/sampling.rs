@@ -151,7 +151,7 @@ impl BlockDecompressor {
     /// Decompresses a block.
     pub(super) fn decompress(&mut self, chunk: Chunk) -> Result<UncompressedBlock, Error> {
         let part = chunk.layer_index;
-        let Some(header) = self.0.headers.get(part).filter(|header| is_subsampled(header)) else {
+        let Some(header) = self.0.headers.get(part).filter(|header| has_subsampled_channels(header)) else {
             return UncompressedBlock::decompress_chunk(chunk, &self.0, false);
         };
         let tile = header.get_block_data_indices(&chunk.compressed_block)?;
@@ -178,7 +178,7 @@ impl BlockDecompressor {
     }
 }
 
-fn is_subsampled(header: &Header) -> bool {
+fn has_subsampled_channels(header: &Header) -> bool {
     header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1))
 }
 

@@ -4,7 +4,7 @@ use ::image::{DynamicImage, ImageBuffer, Rgba};
 
 use super::*;
 use crate::assets::image::convert;
-use crate::assets::image::metadata::AlphaUsage;
+use crate::assets::image::metadata::AlphaInterpretation;
 use crate::materials::Channel;
 use crate::math::Vec4;
 
@@ -13,7 +13,7 @@ fn bytes(pixels: &[[u8; 4]]) -> DynamicImage {
     ImageBuffer::from_raw(pixels.len() as u32, 1, samples).map(DynamicImage::ImageRgba8).expect("whole")
 }
 
-fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaUsage) -> Texels {
+fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaInterpretation) -> Texels {
     convert::texels(image, encoding, &ImageMetadata { alpha, ..ImageMetadata::default() })
 }
 
@@ -21,7 +21,7 @@ fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaUsage) -> Te
 fn colors_are_alpha_weighted_unless_opaque() {
     let cut = [[255, 0, 0, 51], [0, 255, 0, 255]];
     let data = |pixels: &[[u8; 4]], curve| {
-        texels(bytes(pixels), ImageEncoding::CutOut(curve), AlphaUsage::Straight).data
+        texels(bytes(pixels), ImageEncoding::CutOut(curve), AlphaInterpretation::Straight).data
     };
     assert_eq!(data(&cut, ColorCurve::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
     assert_eq!(data(&cut, ColorCurve::Linear), TexelData::LinearAlpha8(cut.to_vec()));
@@ -38,7 +38,7 @@ fn premultiplied_colors_are_unmultiplied_once() {
         let pixels = vec![0.5, 0.25, 0.0, 0.5, 3.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         ImageBuffer::<Rgba<f32>, _>::from_raw(3, 1, pixels).map(DynamicImage::ImageRgba32F).expect("whole")
     };
-    let loaded = |curve| texels(image(), ImageEncoding::CutOut(curve), AlphaUsage::Premultiplied);
+    let loaded = |curve| texels(image(), ImageEncoding::CutOut(curve), AlphaInterpretation::Premultiplied);
     for curve in [ColorCurve::Auto, ColorCurve::Linear] {
         let texels = loaded(curve);
         assert_eq!([0, 2].map(|x| texels.get(x, 0)), [Vec3::new(1.0, 0.5, 0.0), Vec3::ONE]);
@@ -46,14 +46,14 @@ fn premultiplied_colors_are_unmultiplied_once() {
     }
     assert!((loaded(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
     // Without a cutout, the color is composited over black.
-    let plain = texels(image(), ImageEncoding::Color, AlphaUsage::Premultiplied);
+    let plain = texels(image(), ImageEncoding::Color, AlphaInterpretation::Premultiplied);
     assert_eq!(plain.get(0, 0), Vec3::new(0.5, 0.25, 0.0));
 }
 
 #[test]
 fn masks_without_alpha_use_the_luminance() {
     let number = |image: DynamicImage, of| {
-        texels(image, ImageEncoding::Number { of, is_srgb: false }, AlphaUsage::Straight).get(0, 0).x
+        texels(image, ImageEncoding::Number { of, is_srgb: false }, AlphaInterpretation::Straight).get(0, 0).x
     };
     let mask = |of_any_color| ChannelSelector::Mask { of_any_color };
     let gray = || bytes(&[[51, 51, 51, 255], [0, 0, 0, 255]]);

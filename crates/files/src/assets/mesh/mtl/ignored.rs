@@ -90,7 +90,7 @@ pub(super) fn unsupported_map_warning(keyword: &str) -> String {
     format!("`{keyword}` is not supported")
 }
 
-fn no_effect_warning(keyword: &str, kind: FileMaterialKind<'_>) -> String {
+fn no_effect_on_material_warning(keyword: &str, kind: FileMaterialKind<'_>) -> String {
     let kind = match kind {
         FileMaterialKind::Phong => "Phong materials",
         FileMaterialKind::Principled(_) => "materials with PBR statements",
@@ -142,7 +142,7 @@ fn warn_about_illumination(
     if converted.emission != Vec3::ZERO && !converted.emits() {
         let emission = found.color(MtlColor::Emission);
         if emission.is_some() {
-            add(line_of_value(emission), &no_effect_warning("Ke", converted.kind()));
+            add(line_of_value(emission), &no_effect_on_material_warning("Ke", converted.kind()));
         }
     }
 }
@@ -189,7 +189,7 @@ fn warn_about_reflectance(
     };
     let ks = converted.specular.max_element();
     match converted.kind() {
-        FileMaterialKind::Phong => warn_about_phong(found, converted, add),
+        FileMaterialKind::Phong => warn_about_phong_reflectance(found, converted, add),
         FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_above_one(kd) => {
             add(line_of_value(diffuse), BRIGHT_DIFFUSE);
         }
@@ -204,7 +204,7 @@ fn warn_about_reflectance(
 }
 
 /// Warns about missing highlights and about surfaces that reflect more light than they receive.
-fn warn_about_phong(
+fn warn_about_phong_reflectance(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
@@ -237,7 +237,7 @@ fn warn_about_pbr(found: &MtlMaterial, converted: &FileMaterial, add: &mut impl 
     }
     for number in [MtlNumber::Metallic, MtlNumber::Coat] {
         if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
-            add(Some(at.line), &no_effect_warning(number.keyword(), converted.kind()));
+            add(Some(at.line), &no_effect_on_material_warning(number.keyword(), converted.kind()));
         }
     }
 }
@@ -278,7 +278,9 @@ fn warn_about_map(
             FileMaterialKind::Principled(_)
             | FileMaterialKind::Coated
             | FileMaterialKind::Mirror
-            | FileMaterialKind::Glass => add(line, &no_effect_warning(kind.keyword(), converted.kind())),
+            | FileMaterialKind::Glass => {
+                add(line, &no_effect_on_material_warning(kind.keyword(), converted.kind()));
+            }
         }
         return;
     }

@@ -175,7 +175,7 @@ impl Map {
                 false
             }
             _ => {
-                while rest.next_is_value() {
+                while rest.is_next_number_or_switch() {
                     rest.next_unless_last();
                 }
                 false
@@ -195,7 +195,7 @@ impl Map {
     /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
     /// name without what may be a comment.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
-        without_trailing_comments(&self.name).flat_map(|name| utf8_and_latin1_paths(&name.replace('\\', "/")))
+        with_and_without_comments(&self.name).flat_map(|name| utf8_and_latin1_paths(&name.replace('\\', "/")))
     }
 
     /// Returns the texture for this map in the MTL file at `library`. Its path is the first candidate that
@@ -282,7 +282,8 @@ impl<'a> MapArguments<'a> {
         ];
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         let (option, rest) = (word.to_ascii_lowercase(), Self(rest.trim_start()));
-        let is_option = OPTIONS.contains(&option.as_str()) || is_like_option(word) && rest.next_is_value();
+        let is_option =
+            OPTIONS.contains(&option.as_str()) || is_like_option(word) && rest.is_next_number_or_switch();
         is_option.then(|| {
             *self = rest;
             option
@@ -290,21 +291,22 @@ impl<'a> MapArguments<'a> {
     }
 
     /// Returns the next word and the text after it. `None` if the next word is the last one.
-    fn peek(&self) -> Option<(&'a str, &'a str)> {
+    fn peek_unless_last(&self) -> Option<(&'a str, &'a str)> {
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         Some((word, rest.trim_start()))
     }
 
     /// Consumes the next word unless it is the last one.
     fn next_unless_last(&mut self) -> Option<&'a str> {
-        let (word, rest) = self.peek()?;
+        let (word, rest) = self.peek_unless_last()?;
         self.0 = rest;
         Some(word)
     }
 
     /// Whether the next word is a number or a switch but not the last word.
-    fn next_is_value(&self) -> bool {
-        self.peek().is_some_and(|(word, _)| word.parse::<f32>().is_ok() || parse_switch(word).is_some())
+    fn is_next_number_or_switch(&self) -> bool {
+        self.peek_unless_last()
+            .is_some_and(|(word, _)| word.parse::<f32>().is_ok() || parse_switch(word).is_some())
     }
 
     /// Consumes up to `N` numbers. Missing numbers keep their defaults. Returns `None` if there are no
@@ -313,7 +315,9 @@ impl<'a> MapArguments<'a> {
         let mut numbers = default;
         let mut are_usable = false;
         for (index, number) in numbers.iter_mut().enumerate() {
-            let Some(value) = self.peek().and_then(|(word, _)| word.parse::<f32>().ok()) else { break };
+            let Some(value) = self.peek_unless_last().and_then(|(word, _)| word.parse::<f32>().ok()) else {
+                break;
+            };
             self.next_unless_last();
             *number = f64::from(value);
             are_usable = (index == 0 || are_usable) && number.abs() <= LARGEST;
@@ -323,7 +327,7 @@ impl<'a> MapArguments<'a> {
 
     /// Consumes `on` or `off`.
     fn next_switch(&mut self) -> Option<bool> {
-        let is_on = parse_switch(self.peek()?.0)?;
+        let is_on = parse_switch(self.peek_unless_last()?.0)?;
         self.next_unless_last();
         Some(is_on)
     }
@@ -335,7 +339,7 @@ fn parse_switch(word: &str) -> Option<bool> {
 }
 
 /// Yields the whole text, then the text without its last comment, and so on.
-pub(in crate::assets::mesh) fn without_trailing_comments(text: &str) -> impl Iterator<Item = &str> {
+pub(in crate::assets::mesh) fn with_and_without_comments(text: &str) -> impl Iterator<Item = &str> {
     let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
     let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
     std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())

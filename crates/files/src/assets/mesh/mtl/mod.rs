@@ -11,7 +11,7 @@ use super::text::{convert_mac_line_ends, decode_line, strip_byte_order_mark};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{IgnoredStatement, collect_warnings};
-pub(super) use map::{first_existing_or_first, utf8_and_latin1_paths, without_trailing_comments};
+pub(super) use map::{first_existing_or_first, utf8_and_latin1_paths, with_and_without_comments};
 pub(super) use material::to_file_material;
 use statements::{MtlColor, MtlNumber, Statement};
 
@@ -67,7 +67,7 @@ impl MtlMaterial {
     }
 
     /// Candidate image paths for all maps, including unsupported ones.
-    pub(super) fn image_paths(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
+    pub(super) fn candidate_image_paths(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
         self.maps.iter().flat_map(|(_, map)| map.candidate_paths()).map(move |file| folder.join(file))
     }
 }
@@ -95,7 +95,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
 
 /// Returns the candidate image paths for a map statement in the MTL file at `path`. Empty for all other
 /// statements, and if the map statement is invalid.
-pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
+pub(super) fn map_statement_image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     match statements::parse(&decode_line(line), &mut Vec::new()) {
         Ok(Statement::Map(_, map)) => map.candidate_paths().map(|file| folder.join(file)).collect(),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, MtlLibrary, utf8_and_latin1_paths, without_trailing_comments};
+use super::super::mtl::{self, MtlLibrary, utf8_and_latin1_paths, with_and_without_comments};
 use super::super::{AssetError, MeshSource};
 use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
@@ -35,7 +35,7 @@ impl MtlLibraryLoader<'_> {
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
         let mut indices = HashMap::new();
         for path in library_paths(self.source.path, statement) {
-            indices.extend(self.load_file(&path)?);
+            indices.extend(self.load_file_and_map_materials(&path)?);
         }
         self.found.resolved.extend(indices.keys().cloned());
         Ok(indices)
@@ -43,25 +43,25 @@ impl MtlLibraryLoader<'_> {
 
     /// Maps each used material name to its index in `names`. In both OBJ and MTL files, a name may contain
     /// `#` (`Material #25`) or be followed by a comment, so the longest match is used.
-    fn resolve_material_names<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
+    fn map_used_names_to_indices<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
         for (name, index) in all {
-            for name in without_trailing_comments(name) {
+            for name in with_and_without_comments(name) {
                 known.entry(name).or_insert(index);
             }
         }
-        let index = |name: &String| without_trailing_comments(name).find_map(|name| known.get(name).copied());
+        let index = |name: &String| with_and_without_comments(name).find_map(|name| known.get(name).copied());
         self.used.iter().filter_map(|name| Some((name.clone(), index(name)?))).collect()
     }
 
-    fn load_file(&mut self, path: &Path) -> Result<HashMap<String, usize>, AssetError> {
+    fn load_file_and_map_materials(&mut self, path: &Path) -> Result<HashMap<String, usize>, AssetError> {
         let stamp = FileStamp::from_path(path);
         let library = mtl::load(path, self.source.monitor);
         let hash = library.as_ref().ok().map(|library| library.hash);
         self.found.files.push(Companion { path: path.to_owned(), hash, stamp });
         match library {
-            Ok(library) => Ok(self.add(path, library)),
+            Ok(library) => Ok(self.add_and_map_used_materials(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
                 self.found.missing = true;
                 self.found.warnings.push(missing_library_warning(&error));
@@ -71,10 +71,10 @@ impl MtlLibraryLoader<'_> {
         }
     }
 
-    fn add(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
+    fn add_and_map_used_materials(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
         let MtlLibrary { materials, ignored, hash: _ } = library;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let indices = self.resolve_material_names(materials.iter().map(|material| material.name.as_str()));
+        let indices = self.map_used_names_to_indices(materials.iter().map(|material| material.name.as_str()));
         let used: BTreeSet<usize> = indices.values().copied().collect();
         let found = &mut self.found;
         found.warnings.extend(mtl::collect_warnings(
@@ -82,7 +82,7 @@ impl MtlLibraryLoader<'_> {
             ignored,
             used.into_iter().map(|index| &materials[index]),
         ));
-        found.images.extend(materials.iter().flat_map(|material| material.image_paths(folder)));
+        found.images.extend(materials.iter().flat_map(|material| material.candidate_image_paths(folder)));
         let first = found.materials.len();
         found.materials.extend(materials.iter().map(|material| mtl::to_file_material(material, path)));
         indices.into_iter().map(|(name, index)| (name, first + index)).collect()
@@ -94,13 +94,13 @@ impl MtlLibraryLoader<'_> {
 pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =
-        without_trailing_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
+        with_and_without_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
     let readings = readings.flat_map(|name| utf8_and_latin1_paths(&name));
     let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
     if let Some(path) = single {
         return vec![path];
     }
-    let names = without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
+    let names = with_and_without_comments(statement).last().unwrap_or(statement).replace('\\', "/");
     names
         .split_whitespace()
         .filter_map(|name| mtl::first_existing_or_first(folder, utf8_and_latin1_paths(name)))

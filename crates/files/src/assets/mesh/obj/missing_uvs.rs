@@ -53,7 +53,7 @@ impl MissingUvs {
     /// Warning about objects in which only some corners have texture coordinates.
     pub(super) fn warning(&self, source: &MeshSource<'_>) -> Option<String> {
         let (first, count) = self.partial?;
-        Some(missing_uvs_warning(source.line_number(face_start(source, first)), count))
+        Some(partly_missing_uvs_warning(source.line_number(face_start(source, first)), count))
     }
 
     /// Warnings about textured objects without texture coordinates, one for each material.
@@ -74,7 +74,7 @@ impl MissingUvs {
     }
 }
 
-pub(super) fn missing_uvs_warning(first: usize, count: usize) -> String {
+pub(super) fn partly_missing_uvs_warning(first: usize, count: usize) -> String {
     let faces = match count {
         1 => format!("line {first}: a face has"),
         _ => format!("line {first} and {} more faces have", count - 1),

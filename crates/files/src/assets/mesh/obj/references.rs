@@ -17,8 +17,8 @@ pub(in crate::assets::mesh) fn referenced_files(
     let mut files = BTreeSet::new();
     for library in libraries(path, token)? {
         if let Ok(mut lines) = Lines::open(&library, mtl::FILE_LIMIT) {
-            while let Some(line) = lines.next(token)? {
-                files.extend(mtl::image_candidates(&library, line));
+            while let Some(line) = lines.read_next_line(token)? {
+                files.extend(mtl::map_statement_image_candidates(&library, line));
             }
         }
         files.insert(library);
@@ -31,12 +31,12 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
         // Most lines contain only numbers.
-        lines.skip_lines_without(b'm');
-        let Some(line) = lines.next(token)? else { return Ok(libraries) };
+        lines.skip_lines_without_letter(b'm');
+        let Some(line) = lines.read_next_line(token)? else { return Ok(libraries) };
         if !is_library_statement(line) {
             continue;
         }
-        let statement = lines.join_continuation_lines(token)?;
+        let statement = lines.append_continuation_lines(token)?;
         let statement = convert_mac_line_ends(statement);
         let mut words = Words::new(&statement);
         words.next_word();
@@ -114,7 +114,7 @@ mod tests {
         let text = format!("f {}\nmtllib a.mtl\n", "1 ".repeat(3 << 20));
         fs::write(&path, text).expect("written");
         let mut lines = Lines::open(&path, FILE_LIMIT).expect("opened");
-        while let Some(line) = lines.next(&CancelToken::new()).expect("not cancelled") {
+        while let Some(line) = lines.read_next_line(&CancelToken::new()).expect("not cancelled") {
             assert!(line.len() <= 1 << 20);
         }
         assert_eq!(listed(&path), [folder.path().join("a.mtl")].into());

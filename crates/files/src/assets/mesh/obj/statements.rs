@@ -4,7 +4,7 @@ use super::super::parsed::{alpha_ignored_warning, face_of_corner};
 use super::super::text::expected_message;
 use super::super::{AssetError, MeshSource};
 use super::vertex::Vertices;
-use super::words::{Words, integer, number, too_few_numbers_message};
+use super::words::{Words, parse_integer, parse_number, too_few_numbers_message};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Number of statements between polls of the cancel token.
@@ -69,7 +69,7 @@ impl Statements {
         let mut found = Self::default();
         let mut words = Words::new(source.bytes);
         let mut count = 0;
-        while words.next_statement() {
+        while words.move_to_next_statement() {
             if count % BATCH == 0 {
                 source.report_progress(words.offset())?;
             }
@@ -130,7 +130,7 @@ impl Statements {
     /// Parses a smoothing group. Ignores invalid groups with a warning.
     fn parse_smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
         let group = words.next_word().unwrap_or(b"off");
-        let smoothing = match integer(group).map(u32::try_from) {
+        let smoothing = match parse_integer(group).map(u32::try_from) {
             Some(Ok(0)) => Smoothing::Flat,
             Some(Ok(number)) => Smoothing::Group(number),
             None if group.eq_ignore_ascii_case(b"off") => Smoothing::Flat,
@@ -190,7 +190,7 @@ impl Statements {
     fn add_warnings(&mut self, source: &MeshSource<'_>) {
         if let Some(start) = self.vertices.first_excess {
             let line = source.line_number(start);
-            self.warnings.push(excess_words_warning(line));
+            self.warnings.push(excess_vertex_words_warning(line));
         }
         if let Some(start) = self.vertices.find_lowest_alpha_offset() {
             self.warnings.push(alpha_ignored_warning(source.line_number(start)));
@@ -215,7 +215,7 @@ pub(super) fn missing_attribute_warning(line: usize, attribute: &str) -> String 
     format!("line {line}: faces reference {attribute}, but the file has none; the references are ignored")
 }
 
-pub(super) fn excess_words_warning(line: usize) -> String {
+pub(super) fn excess_vertex_words_warning(line: usize) -> String {
     format!("line {line}: ignored extra words after a vertex's coordinates and color")
 }
 
@@ -245,7 +245,7 @@ pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
 fn face_starts<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use<'a> {
     let mut words = Words::new(source.bytes);
     std::iter::from_fn(move || {
-        while words.next_statement() {
+        while words.move_to_next_statement() {
             let start = words.offset();
             let is_face = words.next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"f"));
             while is_face && words.next_word().is_some() {}
@@ -263,7 +263,7 @@ fn parse_numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> R
     let mut values = [0.0; 3];
     let mut count = 0;
     while let Some(word) = words.next_word().filter(|_| count < max) {
-        let value = number(word).ok_or_else(|| expected_message(&format!("{max} {what}"), word))?;
+        let value = parse_number(word).ok_or_else(|| expected_message(&format!("{max} {what}"), word))?;
         values[count] = value;
         count += 1;
     }
@@ -279,7 +279,7 @@ fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String
         if digits.is_empty() && part > 0 {
             continue;
         }
-        let index = integer(digits).filter(|_| part < 3).ok_or_else(wrong)?;
+        let index = parse_integer(digits).filter(|_| part < 3).ok_or_else(wrong)?;
         corner[part] = absolute_index(index, counts[part])
             .ok_or_else(|| out_of_range_message(part, index, counts[part]))?;
     }

@@ -2,7 +2,7 @@
 
 use super::super::parsed::ColorRange;
 use super::super::text::expected_message;
-use super::words::{Words, number, too_few_numbers_message};
+use super::words::{Words, parse_number, too_few_numbers_message};
 use crate::math::DVec3;
 
 /// Positions and colors.
@@ -33,7 +33,7 @@ impl Vertices {
         let mut numbers = [0.0; 8];
         let mut count = 0;
         while let Some(word) = words.next_word() {
-            match number(word) {
+            match parse_number(word) {
                 Some(value) if count < numbers.len() => numbers[count] = value,
                 Some(_) => {}
                 None if count >= 3 => {

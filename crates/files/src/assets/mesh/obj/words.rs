@@ -21,7 +21,7 @@ impl<'a> Words<'a> {
     }
 
     /// Moves to the first word of the next statement. Returns false at the end of the text.
-    pub(super) fn next_statement(&mut self) -> bool {
+    pub(super) fn move_to_next_statement(&mut self) -> bool {
         let rest = &self.bytes[self.at..];
         self.at += rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
         self.at < self.bytes.len()
@@ -33,7 +33,7 @@ impl<'a> Words<'a> {
         loop {
             match self.bytes.get(self.at)? {
                 b'\n' | b'#' => return None,
-                b'\\' => match self.continuation_line(self.at) {
+                b'\\' => match self.continuation_line_offset(self.at) {
                     Some(next) => self.at = next,
                     None => break,
                 },
@@ -43,7 +43,7 @@ impl<'a> Words<'a> {
         }
         let ends = |at: usize| match self.bytes[at] {
             b'#' => true,
-            b'\\' => self.continuation_line(at).is_some(),
+            b'\\' => self.continuation_line_offset(at).is_some(),
             byte => byte.is_ascii_whitespace(),
         };
         let end = (self.at + 1..self.bytes.len()).find(|at| ends(*at)).unwrap_or(self.bytes.len());
@@ -77,7 +77,7 @@ impl<'a> Words<'a> {
     }
 
     /// Returns the offset of the next line if only blanks follow the backslash at `at`.
-    fn continuation_line(&self, at: usize) -> Option<usize> {
+    fn continuation_line_offset(&self, at: usize) -> Option<usize> {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace() && **byte != b'\n').count();
         (rest.get(blanks) == Some(&b'\n')).then_some(at + blanks + 2)
@@ -85,12 +85,12 @@ impl<'a> Words<'a> {
 }
 
 /// Parses a number. `nan` and `inf` are accepted. Overflow results in infinity.
-pub(super) fn number(word: &[u8]) -> Option<f64> {
+pub(super) fn parse_number(word: &[u8]) -> Option<f64> {
     parse(word).ok()
 }
 
 /// Parses an integer.
-pub(super) fn integer(word: &[u8]) -> Option<i64> {
+pub(super) fn parse_integer(word: &[u8]) -> Option<i64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
@@ -106,7 +106,7 @@ mod tests {
     fn statements(text: &str) -> Vec<Vec<String>> {
         let mut words = Words::new(text.as_bytes());
         let mut found = Vec::new();
-        while words.next_statement() {
+        while words.move_to_next_statement() {
             let statement = std::iter::from_fn(|| words.next_word());
             found.push(statement.map(|word| String::from_utf8_lossy(word).into_owned()).collect());
             words.take_line_rest();

@@ -71,7 +71,7 @@ impl NumberReader for AsciiReader<'_> {
             LineEndMode::EndItems(count, first) if self.0.skip_to_word_in_line() => {
                 *count += 1;
                 first.get_or_insert(self.0.offset());
-                self.0.end_line();
+                self.0.move_to_next_line();
             }
             LineEndMode::EndItems(..) | LineEndMode::Blank => {}
         }

@@ -1,6 +1,6 @@
 //! Colors in a PLY file. Their range depends on their type and on the largest value.
 
-use super::super::parsed::{ALPHA_IGNORED, ColorRange, ComponentExtremes, color_bytes};
+use super::super::parsed::{ALPHA_IGNORED, ColorRange, ComponentExtremes, unit_color_to_bytes};
 use super::header::ScalarType;
 
 /// Colors in file order.
@@ -71,13 +71,14 @@ impl PlyColors {
         };
         let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar));
         let outside = self.scalars.iter().zip(&self.extremes).find_map(|(scalar, extremes)| {
-            let fraction = extremes.fraction_warning().filter(|_| scalar.is_integer());
+            let fraction = extremes.fraction_in_integers_warning().filter(|_| scalar.is_integer());
             extremes.out_of_range_warning(one(*scalar)).or(fraction)
         });
         let mut warnings: Vec<_> = outside.into_iter().collect();
         warnings.extend(transparent.map(|(.., at)| (at, ALPHA_IGNORED.to_owned())));
         let ones = self.scalars.map(one);
-        let in_bytes = |color: &[f64; 3]| color_bytes(std::array::from_fn(|part| color[part] / ones[part]));
+        let in_bytes =
+            |color: &[f64; 3]| unit_color_to_bytes(std::array::from_fn(|part| color[part] / ones[part]));
         let colors = self.numbers.iter().map(in_bytes);
         (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, warnings)
     }

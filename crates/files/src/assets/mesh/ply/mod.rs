@@ -334,7 +334,7 @@ fn read_faces(
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    read_list_property(context, element, corners, numbers, |numbers, item, length| {
+    for_each_property_list(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
             faces.push_corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
         }
@@ -356,7 +356,7 @@ fn read_strips(
         return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
     };
     let faces = &mut parsed.faces;
-    read_list_property(context, element, corners, numbers, |numbers, item, length| {
+    for_each_property_list(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.integer(item)?;
@@ -395,7 +395,7 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
 
 /// Reads all items of an element. `corners` is a property index. `read` receives the type and length of that
 /// property's list.
-fn read_list_property<N: NumberReader>(
+fn for_each_property_list<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,

@@ -59,7 +59,7 @@ impl Histogram {
 
 /// Finds the cheapest plane. Returns `None` if a leaf is no more expensive.
 pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
-    let around = SimdBounds::around(references);
+    let around = SimdBounds::around_references(references);
     let extent = around.extent();
     let scale = |length: f32| {
         let per_length = BINS as f32 / length;

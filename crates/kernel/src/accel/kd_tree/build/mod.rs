@@ -86,7 +86,7 @@ fn build_with_budget(
         let (nodes, references, triangles) = Default::default();
         return Ok(BuiltKdTree { nodes, references, triangles, bounds: Aabb::EMPTY });
     }
-    let bounds = SimdBounds::around(&references);
+    let bounds = SimdBounds::around_references(&references);
     let levels = depth_limit(references.len());
     let part = build_part(&Cell { bounds, levels, room }, references, &corners, token)?;
     let all = part.flatten();

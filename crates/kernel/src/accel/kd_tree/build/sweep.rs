@@ -126,7 +126,7 @@ mod tests {
                     TriangleReference::new(id, [from, from + along, from + along * 0.5])
                 })
                 .collect();
-            let cell = SimdBounds::around(&references);
+            let cell = SimdBounds::around_references(&references);
             if cell.half_area() == 0.0 || cell.extent().truncate().min_element() == 0.0 {
                 continue;
             }

@@ -17,7 +17,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
-use split::{ReferenceRange, partition};
+use split::{PlannedReferenceRange, partition};
 use subtree::WideSubtree;
 
 /// Maximum number of triangles in a part built by a single thread. The cancellation token is polled between
@@ -48,13 +48,13 @@ pub fn build(
     if quality == Quality::High {
         references = triangle_splits::split_large_triangles(&references, &corners, token)?;
     }
-    let whole = ReferenceRange::whole(&references);
+    let whole = PlannedReferenceRange::whole(&references);
     let bounds = whole.bounds.aabb();
     let part = build_part(&mut references, 0, whole, token)?;
     token.check()?;
     let (nodes, leaves) = join::flatten(part);
     token.check()?;
-    let pack = |leaf: &subtree::PackRange| {
+    let pack = |leaf: &subtree::PackReferenceRange| {
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
     };
@@ -76,7 +76,7 @@ enum TreePart {
 fn build_part(
     references: &mut [TriangleReference],
     start: usize,
-    segment: ReferenceRange,
+    segment: PlannedReferenceRange,
     token: &CancelToken,
 ) -> Result<TreePart, Cancelled> {
     token.check()?;

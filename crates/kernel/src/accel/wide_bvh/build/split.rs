@@ -28,7 +28,7 @@ const SURFACE_AREA_LEVELS: u32 = 56;
 
 /// A range of references and how to split it.
 #[derive(Clone, Debug)]
-pub struct ReferenceRange {
+pub struct PlannedReferenceRange {
     pub count: usize,
     pub bounds: SimdBounds,
     /// Number of ancestors of this segment.
@@ -50,7 +50,7 @@ pub enum Split {
     Middle,
 }
 
-impl ReferenceRange {
+impl PlannedReferenceRange {
     /// The segment that contains all references.
     pub fn whole(references: &[TriangleReference]) -> Self {
         let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(ReferenceBounds::around);
@@ -265,9 +265,9 @@ impl<const N: usize> Histogram<N> {
 /// Reorders the references according to the split and returns the two nonempty segments.
 pub fn partition(
     references: &mut [TriangleReference],
-    segment: &ReferenceRange,
+    segment: &PlannedReferenceRange,
     split: &Split,
-) -> (ReferenceRange, ReferenceRange) {
+) -> (PlannedReferenceRange, PlannedReferenceRange) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
@@ -286,8 +286,8 @@ pub fn partition(
     };
     let level = segment.level + 1;
     let (left_references, right_references) = references.split_at(middle);
-    let left = ReferenceRange::new(left_references, left, level);
-    (left, ReferenceRange::new(right_references, right, level))
+    let left = PlannedReferenceRange::new(left_references, left, level);
+    (left, PlannedReferenceRange::new(right_references, right, level))
 }
 
 fn partition_along_axis<const AXIS: usize>(
@@ -380,7 +380,7 @@ mod tests {
                     let inside = |one: &&TriangleReference| bins.bin_indices(one)[axis] == bin;
                     let inside: Vec<TriangleReference> = references.iter().filter(inside).copied().collect();
                     assert_eq!(counts[axis] as usize, inside.len());
-                    assert_eq!(bits(&bounds[axis]), bits(&SimdBounds::around(&inside)));
+                    assert_eq!(bits(&bounds[axis]), bits(&SimdBounds::around_references(&inside)));
                 }
             }
             for (own, plain) in own.bounds.iter().flatten().zip(plain.bounds.iter().flatten()) {

@@ -1,12 +1,12 @@
 //! Subtrees built by a single thread.
 
-use super::split::{ReferenceRange, partition};
+use super::split::{PlannedReferenceRange, partition};
 use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
 /// A range of references that forms a triangle pack.
 #[derive(Clone, Copy, Debug)]
-pub struct PackRange {
+pub struct PackReferenceRange {
     /// Index of the first reference among all references.
     pub first: u32,
     /// Number of references, from one to four.
@@ -17,14 +17,14 @@ pub struct PackRange {
 #[derive(Debug)]
 pub struct WideSubtree {
     pub nodes: Vec<WideNode>,
-    pub packs: Vec<PackRange>,
+    pub packs: Vec<PackReferenceRange>,
     pub root: Child,
     pub bounds: SimdBounds,
 }
 
 impl WideSubtree {
     /// Builds a subtree over `references`. `start` is the index of the first reference among all references.
-    pub fn build(references: &mut [TriangleReference], start: usize, segment: ReferenceRange) -> Self {
+    pub fn build(references: &mut [TriangleReference], start: usize, segment: PlannedReferenceRange) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),
             packs: Vec::with_capacity(references.len() / 3),
@@ -39,7 +39,7 @@ impl WideSubtree {
         &mut self,
         references: &mut [TriangleReference],
         start: usize,
-        segment: ReferenceRange,
+        segment: PlannedReferenceRange,
     ) -> Child {
         if segment.is_node {
             Child::Inner(self.build_node(references, start, segment))
@@ -51,7 +51,8 @@ impl WideSubtree {
     fn build_leaf(&mut self, start: usize, count: usize) -> Child {
         let first = self.packs.len() as u32;
         for at in (0..count).step_by(PACK) {
-            self.packs.push(PackRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
+            self.packs
+                .push(PackReferenceRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
         }
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }
@@ -62,11 +63,11 @@ impl WideSubtree {
         &mut self,
         references: &mut [TriangleReference],
         start: usize,
-        segment: ReferenceRange,
+        segment: PlannedReferenceRange,
     ) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(WideNode::EMPTY);
-        let mut children: [Option<(usize, ReferenceRange)>; WIDTH] = [const { None }; WIDTH];
+        let mut children: [Option<(usize, PlannedReferenceRange)>; WIDTH] = [const { None }; WIDTH];
         children[0] = Some((0, segment));
         let mut count = 1;
         while count < WIDTH {
@@ -76,7 +77,9 @@ impl WideSubtree {
             });
             let next = inner.max_by(|a, b| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2)));
             let Some((slot, ..)) = next else { break };
-            let Some((from, ReferenceRange { split: Some(split), .. })) = &children[slot] else { break };
+            let Some((from, PlannedReferenceRange { split: Some(split), .. })) = &children[slot] else {
+                break;
+            };
             let (from, split) = (*from, *split);
             let Some((_, parent)) = &children[slot] else { break };
             let (left, right) = partition(&mut references[from..from + parent.count], parent, &split);

@@ -88,7 +88,7 @@ struct GridPlane {
 
 impl BisectionGrid {
     fn around(references: &[TriangleReference]) -> Self {
-        let all = SimdBounds::around(references);
+        let all = SimdBounds::around_references(references);
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 

@@ -55,7 +55,7 @@ const AXES: [[i32; 4]; 64] = {
 /// Loads the origin and the direction of a ray. The last lane of each contains the next float in memory.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
+fn load_origin_and_direction(ray: &Ray) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Ray>() == 32 && std::mem::offset_of!(Ray, direction) == 12);
     let floats: *const f32 = std::ptr::from_ref(ray).cast();
     // SAFETY: reads floats 0–3 and 3–6 of a ray's seven floats.
@@ -66,7 +66,7 @@ fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 pub fn is_traceable(ray: &Ray) -> bool {
-    let (origin, direction) = origin_and_direction(ray);
+    let (origin, direction) = load_origin_and_direction(ray);
     let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
     let (origin, direction) = (_mm_and_ps(origin, unsigned), _mm_and_ps(direction, unsigned));
     let finite = _mm_and_ps(
@@ -80,7 +80,7 @@ pub fn is_traceable(ray: &Ray) -> bool {
 /// Loads both corners of a box. The last lane of each contains an unrelated float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn load_box_corners(bounds: &Aabb) -> (__m128, __m128) {
+fn load_box_min_and_max(bounds: &Aabb) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Aabb>() == 24 && std::mem::offset_of!(Aabb, max) == 12);
     let floats: *const f32 = std::ptr::from_ref(bounds).cast();
     // SAFETY: reads the first four and the last four of a box's six floats.
@@ -91,7 +91,7 @@ fn load_box_corners(bounds: &Aabb) -> (__m128, __m128) {
 /// Mask of the lanes that are ∞ or −∞.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn infinite_lanes(v: __m128) -> __m128 {
+fn infinite_lane_mask(v: __m128) -> __m128 {
     let unsigned = _mm_and_ps(v, _mm_castsi128_ps(_mm_set1_epi32(i32::MAX)));
     _mm_cmpeq_ps(unsigned, _mm_set1_ps(f32::INFINITY))
 }
@@ -99,7 +99,7 @@ fn infinite_lanes(v: __m128) -> __m128 {
 /// Broadcasts the maximum of the first three lanes, which must be nonnegative.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn max_of_three(v: __m128) -> __m128 {
+fn broadcast_max_of_xyz(v: __m128) -> __m128 {
     let v = _mm_max_ps(v, _mm_permute_ps::<0b11_01_00_10>(v));
     _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
 }
@@ -132,21 +132,21 @@ impl SimdRay {
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
-        let (origin, direction) = origin_and_direction(ray);
-        let (min, max) = load_box_corners(whole);
+        let (origin, direction) = load_origin_and_direction(ray);
+        let (min, max) = load_box_min_and_max(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
         // Margin between boxes and their triangles: `triangle_margin`, plus the additional error of fused
         // products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
-        let farthest = max_of_three(_mm_max_ps(below, above));
+        let farthest = broadcast_max_of_xyz(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
         // Prepare the box tests. Near-zero direction components are increased slightly, which moves the ray
         // by less than the margin inside the boxes. This keeps the inverse finite unless the direction is
         // extremely short.
         let size = _mm_and_ps(direction, unsigned);
-        let least = _mm_mul_ps(max_of_three(size), _mm_set1_ps(LEAST_PART));
+        let least = _mm_mul_ps(broadcast_max_of_xyz(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
         let inverse = _mm_div_ps(_mm_set1_ps(1.0), moving);
         let is_down = _mm_cmplt_ps(inverse, _mm_setzero_ps());
@@ -167,11 +167,15 @@ impl SimdRay {
         let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
         let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
         Self {
-            from_near: broadcast_xyz_to_eight(_mm_blendv_ps(from_near, endless, infinite_lanes(from_near))),
+            from_near: broadcast_xyz_to_eight(_mm_blendv_ps(
+                from_near,
+                endless,
+                infinite_lane_mask(from_near),
+            )),
             from_far: broadcast_xyz_to_eight(_mm_blendv_ps(
                 from_far,
                 minus_endless,
-                infinite_lanes(from_far),
+                infinite_lane_mask(from_far),
             )),
             to_near: broadcast_xyz_to_eight(inverse),
             to_far: broadcast_xyz_to_eight(padded),
@@ -211,13 +215,13 @@ impl SimdRay {
         let corners =
             [self.sheared_corner(pack, 0), self.sheared_corner(pack, 3), self.sheared_corner(pack, 6)];
         let hits = triangle::intersect(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
-        let others = !self.start_triangle_lane(pack);
+        let others = !self.start_triangle_lane_mask(pack);
         Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
     /// Mask of the lane that contains the ray's start triangle.
     #[inline(always)]
-    fn start_triangle_lane(&self, pack: &TrianglePack) -> u32 {
+    fn start_triangle_lane_mask(&self, pack: &TrianglePack) -> u32 {
         // SAFETY: values of `SimdF32x4` exist, so the processor has the instructions. Reads four numbers.
         unsafe {
             let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());

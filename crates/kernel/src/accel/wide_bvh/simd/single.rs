@@ -124,14 +124,14 @@ fn push_children_ordered(
     let mut entries = [0.0_f32; 8];
     near.store(&mut entries);
     let mut nearest = sort_key(entries[first], node.children[first]);
-    prefetch(tree, nearest as u32);
+    prefetch_child_start(tree, nearest as u32);
     let mut pushed = 0;
     loop {
         let slot = rest.trailing_zeros() as usize % 8;
         rest &= rest - 1;
         let other = sort_key(entries[slot], node.children[slot]);
-        prefetch(tree, other as u32);
-        stack.insert_sorted(nearest.max(other), pushed);
+        prefetch_child_start(tree, other as u32);
+        stack.insert_key_into_sorted_top(nearest.max(other), pushed);
         nearest = nearest.min(other);
         if rest == 0 {
             return Some(nearest as u32);
@@ -142,7 +142,7 @@ fn push_children_ordered(
 
 /// Prefetches the beginning of a child. Prefetching the entire child would be slower.
 #[inline(always)]
-pub fn prefetch(tree: &WideBvh, code: u32) {
+pub fn prefetch_child_start(tree: &WideBvh, code: u32) {
     let index = (code & !LEAF_BITS) as usize;
     let node: *const i8 = tree.nodes.as_ptr().wrapping_add(index).cast();
     let pack: *const i8 = tree.packs.as_ptr().wrapping_add(index).cast();
@@ -156,7 +156,7 @@ pub fn prefetch(tree: &WideBvh, code: u32) {
 /// Whether the ray hits the triangle in a lane.
 #[cold]
 #[inline(never)]
-fn is_hit(pack: &TrianglePack, lane: usize, ray: &Ray) -> bool {
+fn is_lane_triangle_hit(pack: &TrianglePack, lane: usize, ray: &Ray) -> bool {
     ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
 }
 
@@ -179,7 +179,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
                 let (_, mut met) = lines.box_entries(node, end);
                 while met != 0 {
                     let child = node.children[met.trailing_zeros() as usize % 8];
-                    prefetch(tree, child);
+                    prefetch_child_start(tree, child);
                     stack.push(child);
                     met &= met - 1;
                 }
@@ -192,7 +192,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
                         let lane = lanes.trailing_zeros() as usize % PACK;
                         lanes &= lanes - 1;
                         if Some(pack.ids[lane]) != except
-                            && (hits.hit & 1 << lane != 0 || is_hit(pack, lane, ray))
+                            && (hits.hit & 1 << lane != 0 || is_lane_triangle_hit(pack, lane, ray))
                         {
                             return true;
                         }

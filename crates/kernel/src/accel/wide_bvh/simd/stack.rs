@@ -65,7 +65,7 @@ pub fn entry_distance(key: u64) -> f32 {
 impl Stack<u64> {
     /// Inserts a key into the topmost `count` keys, which are sorted with the nearest on top.
     #[inline(always)]
-    pub fn insert_sorted(&mut self, key: u64, count: usize) {
+    pub fn insert_key_into_sorted_top(&mut self, key: u64, count: usize) {
         self.push(key);
         let mut back = 0;
         while back < count && *self.nth_from_top(back + 1) < *self.nth_from_top(back) {

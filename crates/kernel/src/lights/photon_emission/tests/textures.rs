@@ -113,7 +113,8 @@ fn mesh_emission_matches_light_sampling() {
             Light::Area(light)
         };
         let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("never canceled"));
-        let source = PhotonSource::new(&lights, |_| Some(EmitterGeometry::Mesh { rounding: 1e-6 }), SCENE);
+        let source =
+            PhotonSource::new(&lights, |_| Some(EmissiveObjectGeometry::Mesh { rounding: 1e-6 }), SCENE);
         let source = source.expect("power");
         assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);
         if !is_textured {

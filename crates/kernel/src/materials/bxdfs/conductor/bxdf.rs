@@ -100,7 +100,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
         };
         let [eye, light] = self.smith_terms(view, wi);
         let white = eye.reflection_term(&light, distribution);
-        let cosine = half.cosine();
+        let cosine = half.cosine_to_either_direction();
         let weight = schlick_weight(cosine);
         let f = if any.contains(INDEX) {
             let (first, second) = (self.first, self.second);

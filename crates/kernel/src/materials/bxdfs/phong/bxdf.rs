@@ -130,7 +130,12 @@ impl Bxdf for PhongBxdf {
         // The normal is not used here.
         let lobes = self.lobes(view, SampledLobes::All, Vec3::Z);
         let (axis, exponent) = (view.reflected, self.shininess);
-        Some(NarrowLobe { axis, exponent, peak: lobes.value(1.0) - lobes.value(0.0), wide: lobes.value(0.0) })
+        Some(NarrowLobe {
+            axis,
+            exponent,
+            peak: lobes.gray_f_from_cosine_power(1.0) - lobes.gray_f_from_cosine_power(0.0),
+            wide: lobes.gray_f_from_cosine_power(0.0),
+        })
     }
 
     #[inline(always)]

@@ -63,7 +63,7 @@ impl PlasticBxdf {
 
     /// The coat's transmittance in both directions. 0 for light from behind.
     #[inline(always)]
-    fn coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
+    fn two_way_coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
         let cosine = view.normal.dot(wi);
         let is_ahead = cosine > 0.0;
         let entering = 1.0 - self.coat_albedo(if is_ahead { cosine } else { 0.0 }, any);
@@ -82,7 +82,7 @@ impl PlasticBxdf {
     fn distribution_and_fresnel(&self, view: &PlasticViewTerms, wi: Vec3) -> [f32; 2] {
         let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let distribution = half.isotropic_ggx(if self.alpha > 0.0 { self.alpha } else { 1.0 });
-        let fresnel = dielectric_from_outside(half.cosine(), self.ior);
+        let fresnel = dielectric_from_outside(half.cosine_to_either_direction(), self.ior);
         [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
     }
 }
@@ -127,7 +127,7 @@ impl Bxdf for PlasticBxdf {
 
     #[inline(always)]
     fn wide_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let transmittance = self.coat_transmittance(view, wi, any);
+        let transmittance = self.two_way_coat_transmittance(view, wi, any);
         let max = self.base.max_element() * transmittance;
         LobeValue { f: self.base * transmittance, max, shape: 0.0 }
     }

@@ -60,7 +60,7 @@ impl Plastic {
         let fresnel = |cosine: f64| dielectric_reflectance(cosine, ior.into());
         let is_smooth = roughness.as_constant() == Some(0.0);
         let albedos = if is_smooth {
-            AlbedoTable::from_albedo(LobeAlbedo::fit_with_exact_mean(fresnel))
+            AlbedoTable::from_single_albedo(LobeAlbedo::fit_with_exact_mean(fresnel))
         } else {
             AlbedoTable::new(
                 roughness.as_constant(),

@@ -113,7 +113,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// The coat's transmittance in both directions.
     #[inline(always)]
-    fn coat_transmittance(&self, view: &PrincipledViewTerms, cosine: f32, any: BxdfFlags) -> f32 {
+    fn two_way_coat_transmittance(&self, view: &PrincipledViewTerms, cosine: f32, any: BxdfFlags) -> f32 {
         if any.contains(COATED) {
             view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative(cosine)))
         } else {
@@ -125,11 +125,11 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn reflection_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let half = HalfVector::from_reflection(view.normal, view.wo, wi);
-        let weight = schlick_weight(half.cosine());
+        let weight = schlick_weight(half.cosine_to_either_direction());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
         let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
-        let specular = reflectance * (white * self.coat_transmittance(view, light.cosine, any));
+        let specular = reflectance * (white * self.two_way_coat_transmittance(view, light.cosine, any));
         if any.contains(COATED) {
             let [eye, light] = Self::smith_terms(view, wi, self.coat_alpha);
             let white = eye.reflection_term(&light, half.isotropic_ggx(self.coat_alpha));
@@ -144,12 +144,12 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn transmission_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let half = HalfVector::from_reflection(view.normal, view.wo, wi);
-        let weight = schlick_weight(half.cosine());
+        let weight = schlick_weight(half.cosine_to_either_direction());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
         let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
         let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
-        self.transmission * rest * (white * self.coat_transmittance(view, light.cosine, any))
+        self.transmission * rest * (white * self.two_way_coat_transmittance(view, light.cosine, any))
     }
 
     /// Pdf of a direction that is sampled from a lobe with this α.
@@ -232,7 +232,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
         let transmittance = self.specular_transmittance(nonnegative(cosine)) * view.transmittance;
-        let coat = if cosine > 0.0 { self.coat_transmittance(view, cosine, any) } else { 0.0 };
+        let coat = if cosine > 0.0 { self.two_way_coat_transmittance(view, cosine, any) } else { 0.0 };
         let f = self.base * transmittance * coat;
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }

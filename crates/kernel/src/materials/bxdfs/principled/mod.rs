@@ -110,13 +110,13 @@ pub struct SchlickAlbedo {
 impl SchlickAlbedo {
     /// The albedos for a constant roughness.
     fn from_roughness(roughness: f32) -> Self {
-        let [normal, grazing] = albedo_tables(Some(roughness));
+        let [normal, grazing] = build_schlick_albedo_tables(Some(roughness));
         Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
     }
 
     /// The albedos for any roughness, interpolated from tables.
     fn from_tables(roughness: f32) -> Self {
-        static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| albedo_tables(None));
+        static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| build_schlick_albedo_tables(None));
         let [normal, grazing] = &*TABLES;
         Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
     }
@@ -173,7 +173,7 @@ impl EmissionCoat {
 }
 
 /// The two tables of [`SchlickAlbedo`].
-fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
+fn build_schlick_albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     let alpha = |roughness: f32| microfacet::alphas_from_roughness(roughness, 0.0)[0];
     let weight = |cosine: f64| {
         let rest = 1.0 - cosine;

@@ -68,7 +68,8 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let [eye, light] = self.smith_terms(view, wi);
         if !THROUGH {
             let half = HalfVector::from_reflection(view.normal, view.wo, wi);
-            let reflectance = dielectric_from_either_side(half.cosine(), self.far / self.near);
+            let reflectance =
+                dielectric_from_either_side(half.cosine_to_either_direction(), self.far / self.near);
             return reflectance * eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
         }
         let indices = [self.near, self.far];

@@ -5,7 +5,7 @@ use super::rays::SimdRayPacket;
 use super::rows::RaySoa;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
-use crate::accel::wide_bvh::simd::single::prefetch;
+use crate::accel::wide_bvh::simd::single::prefetch_child_start;
 use crate::accel::wide_bvh::simd::stack::Stack;
 use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::accel::{F32x16, PACKET_SIZE as SIZE};
@@ -41,7 +41,7 @@ pub fn try_any_hit<V: SimdVector>(
                 while met != 0 {
                     let slot = met.trailing_zeros() as usize % 8;
                     met &= met - 1;
-                    prefetch(tree, node.children[slot]);
+                    prefetch_child_start(tree, node.children[slot]);
                     stack.push_if(node.children[slot], packet.any_ray_hits_box(node, slot, t_max * pad));
                 }
             }

@@ -7,7 +7,7 @@ use super::rows::RaySoa;
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
-use crate::accel::wide_bvh::simd::single::prefetch;
+use crate::accel::wide_bvh::simd::single::prefetch_child_start;
 use crate::accel::wide_bvh::simd::stack::{Stack, entry_distance, sort_key};
 use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
@@ -82,8 +82,8 @@ fn push_children_ordered<V: SimdVector>(
         if !packet.any_ray_hits_box(node, slot, end) {
             continue;
         }
-        prefetch(tree, node.children[slot]);
-        stack.insert_sorted(sort_key(entries[slot], node.children[slot]), pushed);
+        prefetch_child_start(tree, node.children[slot]);
+        stack.insert_key_into_sorted_top(sort_key(entries[slot], node.children[slot]), pushed);
         pushed += 1;
     }
 }

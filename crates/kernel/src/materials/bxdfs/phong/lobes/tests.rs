@@ -145,8 +145,11 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
         let direction = sample(&lobes, &mut next);
         let gloss = phong_cosine_power(lobes.mirrored_eye, direction, lobes.shininess);
         let cosine = normal.dot(direction).max(0.0);
-        assert!((lobes.value(gloss) - bsdf.value(&lobes, direction).x).abs() <= 1e-6 * lobes.value(gloss));
-        f64::from(lobes.value(gloss) * cosine / lobes.pdf(direction, gloss))
+        assert!(
+            (lobes.gray_f_from_cosine_power(gloss) - bsdf.value(&lobes, direction).x).abs()
+                <= 1e-6 * lobes.gray_f_from_cosine_power(gloss)
+        );
+        f64::from(lobes.gray_f_from_cosine_power(gloss) * cosine / lobes.pdf(direction, gloss))
     };
     (0..SAMPLES).map(one).sum::<f64>() / f64::from(SAMPLES)
 }
