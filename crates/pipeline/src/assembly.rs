@@ -54,7 +54,7 @@ impl RequestCamera {
 
     /// Returns the coordinate origin that maximizes precision near the camera.
     pub(super) fn coordinate_origin(&self) -> DVec3 {
-        world::choose_scene_origin(&self.camera, self.orbiter.as_ref())
+        world::choose_origin_near_camera_target(&self.camera, self.orbiter.as_ref())
     }
 }
 

@@ -17,7 +17,7 @@ use super::signals;
 const DEFAULT: &str = "vi";
 
 /// The editor from the environment, as a shell command.
-pub(super) fn editor_command(variable: impl Fn(&str) -> Option<String>) -> String {
+pub(super) fn editor_from_environment(variable: impl Fn(&str) -> Option<String>) -> String {
     editor_and_variable(variable).0
 }
 
@@ -39,7 +39,11 @@ pub fn editor_and_variable(variable: impl Fn(&str) -> Option<String>) -> (String
 pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
-    shell.arg("-c").arg(shell_command_line(editor)).arg(editor).args(position_arguments(editor, place));
+    shell
+        .arg("-c")
+        .arg(exec_prefixed_shell_command_line(editor))
+        .arg(editor)
+        .args(position_arguments(editor, place));
     let child = shell.spawn().map_err(failed)?;
     let id = i32::try_from(child.id()).map_err(|_| format!("lost track of the editor `{editor}`"))?;
     let id = Pid::from_raw(id);
@@ -73,7 +77,7 @@ fn wait_for_child(id: Pid) -> Result<WaitStatus, Errno> {
 
 /// Command line for the shell. Simple commands are run using `exec`, because an intermediate shell would
 /// intercept signals.
-fn shell_command_line(editor: &str) -> String {
+fn exec_prefixed_shell_command_line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
     let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&executable_name(editor));
     let exec = if editor.chars().all(is_plain) && !is_of_shell { "exec " } else { "" };
@@ -122,7 +126,7 @@ mod tests {
     #[test]
     fn visual_takes_precedence_over_editor() {
         let of = |pairs: &[(&str, &str)]| {
-            editor_command(|name| {
+            editor_from_environment(|name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
             })
         };
@@ -138,9 +142,12 @@ mod tests {
 
     #[test]
     fn only_simple_commands_use_exec() {
-        assert_eq!(shell_command_line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
+        assert_eq!(
+            exec_prefixed_shell_command_line("/usr/bin/nvim -u NONE"),
+            "exec /usr/bin/nvim -u NONE \"$@\""
+        );
         for editor in ["TERM=vt100 vi", "cd /; vi", "'my editor'", "vi #", "$HOME/vi", "command vi"] {
-            assert_eq!(shell_command_line(editor), format!("{editor} \"$@\""));
+            assert_eq!(exec_prefixed_shell_command_line(editor), format!("{editor} \"$@\""));
         }
     }
 

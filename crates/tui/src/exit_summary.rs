@@ -143,27 +143,27 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
 pub(super) fn describe_image(report: &Report, shown: ViewMode) -> String {
     let image = &report.image;
     let time = format_seconds(report.seconds.max(image.render_seconds));
-    let samples = format_sample_count(image.samples);
+    let samples = format_sample_count_or_range(image.samples);
     format!("{}{}×{}, {samples}, {time}", view_prefix(shown), image.width, image.height)
 }
 
 /// Describes an image that was written before its render finished.
 pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) -> String {
-    format!("{}unfinished ({})", view_prefix(shown), format_sample_count(samples))
+    format!("{}unfinished ({})", view_prefix(shown), format_sample_count_or_range(samples))
 }
 
 /// `64 samples`, or `16 to 32 samples`.
-fn format_sample_count(SampleCounts { min, max, .. }: SampleCounts) -> String {
+fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> String {
     if min == max { format!("{max} samples") } else { format!("{min} to {max} samples") }
 }
 
 fn view_prefix(view: ViewMode) -> String {
-    let view = view_label(view);
+    let view = view_name_unless_beauty(view);
     if view.is_empty() { view } else { format!("{view}, ") }
 }
 
 /// The view's name. Empty for the beauty view.
-pub(super) fn view_label(view: ViewMode) -> String {
+pub(super) fn view_name_unless_beauty(view: ViewMode) -> String {
     if view == ViewMode::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
 

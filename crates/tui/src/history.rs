@@ -76,7 +76,7 @@ struct HistoryEntry {
 
 impl RenderHistory {
     /// Records a scene edit. New entries include the edit once the scene has been read.
-    pub(super) fn record_edit(&mut self) {
+    pub(super) fn record_scene_edit(&mut self) {
         self.edits += 1;
     }
 
@@ -122,7 +122,7 @@ impl RenderHistory {
     }
 
     /// Reassigns a request's entry to the next request, which shows the same image differently.
-    pub(super) fn move_to_next_request(&mut self, generation: u64) {
+    pub(super) fn reassign_entry_to_next_request(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
@@ -217,7 +217,7 @@ impl RenderHistory {
     }
 
     /// Drops the unfinished entry for a request.
-    pub(super) fn drop_unfinished(&mut self, generation: u64) {
+    pub(super) fn drop_unfinished_of_request(&mut self, generation: u64) {
         let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
         if let Some(at) = self.past.iter().position(is_it) {
             self.remove(at);
@@ -297,7 +297,7 @@ impl RenderHistory {
     }
 
     /// Moves back by `back` entries, or forward if `back` is negative.
-    pub(super) fn step_back(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
+    pub(super) fn step_back_by(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
         self.show_entry(next, newest)
@@ -471,7 +471,7 @@ mod tests {
     fn equal_images_share_an_entry() {
         let mut history = RenderHistory::default();
         for generation in 0..3 {
-            history.record_edit();
+            history.record_scene_edit();
             history.record(shown_image(generation, 10), Instant::now(), ImageProvenance::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
@@ -522,7 +522,7 @@ mod tests {
         history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         edit(&mut history);
         history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
-        history.record_edit();
+        history.record_scene_edit();
         history.record_invalid_scene();
         history.record(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
@@ -583,7 +583,7 @@ mod tests {
     }
 
     fn edit(history: &mut RenderHistory) {
-        history.record_edit();
+        history.record_scene_edit();
         history.record_scene_read();
     }
 
@@ -623,11 +623,11 @@ mod tests {
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
         // Save twice. Only the second version can be read.
-        history.record_edit();
-        history.record_edit();
+        history.record_scene_edit();
+        history.record_scene_edit();
         history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
         history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(ViewMode::Normal)));
-        history.record_edit();
+        history.record_scene_edit();
         history.record(shown_image(4, 40), Instant::now(), origin(seed, None));
         history.record(shown_image(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(

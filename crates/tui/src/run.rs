@@ -286,7 +286,7 @@ impl EventLoop {
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();
-        let outcome = editor::run(&editor::editor_command(|name| std::env::var(name).ok()), place);
+        let outcome = editor::run(&editor::editor_from_environment(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
         input::set_input_paused(false);
         let end = self.apply_event(Event::Back).or_else(|| self.resume_and_redraw());

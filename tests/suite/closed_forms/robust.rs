@@ -264,7 +264,7 @@ fn closed_mesh_has_no_leaks() {
             let origin = (center + random.direction() * random.unit()).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
             leaks += u32::from(world.geometry.closest_hit(&ray).is_none());
-            leaks += u32::from(!world.geometry.occluded(&ray, LightGeometry::Nothing));
+            leaks += u32::from(!world.geometry.is_occluded_except_by_light(&ray, LightGeometry::Nothing));
         }
         assert_eq!(leaks, 0, "at {center}");
     }
@@ -384,7 +384,7 @@ fn invalid_rays_hit_nothing() {
             direction.direction[axis] = bad;
             for ray in [origin, direction] {
                 assert_eq!(world.geometry.closest_hit(&ray), None, "{ray:?}");
-                assert!(!world.geometry.occluded(&ray, LightGeometry::Nothing), "{ray:?}");
+                assert!(!world.geometry.is_occluded_except_by_light(&ray, LightGeometry::Nothing), "{ray:?}");
             }
         }
     }
@@ -422,7 +422,10 @@ fn tree_finds_the_same_hit_as_brute_force() {
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());
         assert_eq!(world.geometry.closest_hit(&ray), nearest, "{ray:?}");
-        assert_eq!(world.geometry.occluded(&ray, LightGeometry::Nothing), nearest.is_some());
+        assert_eq!(
+            world.geometry.is_occluded_except_by_light(&ray, LightGeometry::Nothing),
+            nearest.is_some()
+        );
     }
     assert!(found > 20_000);
 }

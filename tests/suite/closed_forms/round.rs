@@ -88,7 +88,11 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let allowed = 64.0 * f64::EPSILON * far;
     let length = ray.direction.as_dvec3().length();
     let hit = geometry.closest_hit(ray);
-    assert_eq!(geometry.occluded(ray, LightGeometry::Nothing), hit.is_some(), "{shape:?} {ray:?}");
+    assert_eq!(
+        geometry.is_occluded_except_by_light(ray, LightGeometry::Nothing),
+        hit.is_some(),
+        "{shape:?} {ray:?}"
+    );
     let Some(hit) = hit else {
         assert!(!crosses(shape, ray, 0.0, 2.0 * far / length, sign, allowed), "missed {shape:?} {ray:?}");
         return false;
@@ -285,7 +289,7 @@ fn rays_pass_through_missing_caps() {
             let from = random_in(&mut random, center, 3.0).as_vec3();
             let ray = Ray::new(from, (random_in(&mut random, center, 0.7) - from.as_dvec3()).as_vec3());
             let bare = open.closest_hit(&ray).map(|hit| hit.shape);
-            assert_eq!(open.occluded(&ray, LightGeometry::Nothing), bare.is_some());
+            assert_eq!(open.is_occluded_except_by_light(&ray, LightGeometry::Nothing), bare.is_some());
             match closed.closest_hit(&ray).map(|hit| hit.shape) {
                 Some(hit) if hit.primitive > 0 => {
                     let cap = closed.surface(&ray, &closed.closest_hit(&ray).expect("as before"));

@@ -21,8 +21,8 @@ use glimt::scene::description::{
     Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, build_lights, choose_scene_origin,
-    separate_coincident_emitters, sky_map, textures_needed,
+    Geometry, Image, MeshTree, NeededTextureRoleSet, World, WorldInputs, build_lights,
+    choose_origin_near_camera_target, separate_coincident_emitters, sky_map, textures_needed,
 };
 
 use super::v;
@@ -232,7 +232,7 @@ impl Build {
 
     pub fn world(&self) -> World {
         let mut parts = self.parts.clone();
-        for needed in textures_needed(&self.scene, &[], TextureNeeds::ALL) {
+        for needed in textures_needed(&self.scene, &[], NeededTextureRoleSet::ALL) {
             let texels = match needed.declared {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("an environment map"),
@@ -241,7 +241,7 @@ impl Build {
             let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
             parts.images.insert(needed.source, image);
         }
-        let origin = choose_scene_origin(&self.scene.camera, None);
+        let origin = choose_origin_near_camera_target(&self.scene.camera, None);
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not cancelled"));
         let sky = self.sky.as_ref().and_then(sky_map);

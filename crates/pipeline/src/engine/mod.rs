@@ -77,7 +77,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 use crate::system::priority;
 use crate::system::threads::{check_stack_space, core_count, describe_start_failure};
-use crate::world::{CoplanarLight, GlassSolids, TextureNeeds, World};
+use crate::world::{CoplanarLight, GlassSolids, NeededTextureRoleSet, World};
 
 /// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
@@ -574,7 +574,7 @@ impl Engine {
     fn load_assets(
         &mut self,
         parsed: &ParsedScene,
-        lookups: TextureNeeds,
+        lookups: NeededTextureRoleSet,
         findings: &mut Findings,
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
@@ -731,7 +731,8 @@ impl Engine {
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
-            let mut wanted = find_needed_textures(loaded, &found, TextureNeeds::ALL, &engine.textures);
+            let mut wanted =
+                find_needed_textures(loaded, &found, NeededTextureRoleSet::ALL, &engine.textures);
             add_check_only_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;

@@ -24,7 +24,7 @@ use crate::stages::parse::ParsedScene;
 use crate::stages::write::{ImageWriteContext, develop_settings, write_if_wanted};
 use crate::stages::{StageResult, StopReason};
 use crate::watch::content::FileRead;
-use crate::world::TextureNeeds;
+use crate::world::NeededTextureRoleSet;
 
 /// The scene's own image for the newest request.
 pub(super) struct SavedSceneImage {
@@ -273,7 +273,7 @@ pub(super) fn saved_scene_plan(
 
 /// Returns the textures that a request needs. These include the textures for the scene's own image, because
 /// its film key depends on them.
-pub(super) fn combined_texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> TextureNeeds {
+pub(super) fn combined_texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> NeededTextureRoleSet {
     let shown = plan.settings.texture_needs();
     own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }

@@ -18,7 +18,7 @@ use crate::stages::textures::{NeededTextures, Textures, find_needed_textures, lo
 use crate::stages::{FileReadContext, Findings, StopReason};
 use crate::table::StageRunner;
 use crate::watch::content::{FileRead, Snapshot};
-use crate::world::{GlassSolids, TextureNeeds};
+use crate::world::{GlassSolids, NeededTextureRoleSet};
 
 /// A valid scene and all files needed for its image.
 #[derive(Clone)]
@@ -122,7 +122,7 @@ impl Engine {
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,
-        lookups: TextureNeeds,
+        lookups: NeededTextureRoleSet,
         reading: &FileReadContext<'_>,
     ) -> Result<Option<LastValidScene>, StopReason> {
         let loaded = &good.parsed.loaded;

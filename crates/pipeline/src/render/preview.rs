@@ -40,7 +40,7 @@ impl PreviewTarget<'_> {
         if self.send_section_if_requested(state, true) {
             return;
         }
-        while !pool.install(|| update_previewer(state, self.plan.settings.view.quantity(), size)) {
+        while !pool.install(|| update_previewer(state, self.plan.settings.view.film_quantity(), size)) {
             if token.is_cancelled() {
                 return;
             }
@@ -55,7 +55,7 @@ impl PreviewTarget<'_> {
         if self.send_section_if_requested(state, false) {
             return true;
         }
-        update_previewer(state, self.plan.settings.view.quantity(), size);
+        update_previewer(state, self.plan.settings.view.film_quantity(), size);
         let is_whole = state.previewer.as_ref().is_some_and(Previewer::has_processed_all_tiles);
         if is_whole {
             self.send_current(state, false);
@@ -75,7 +75,7 @@ impl PreviewTarget<'_> {
     /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
     fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
-        let quantity = self.plan.settings.view.quantity();
+        let quantity = self.plan.settings.view.film_quantity();
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
         let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
@@ -116,7 +116,7 @@ impl PreviewTarget<'_> {
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
         }
-        tone.with_image_range(&state.film.image(self.plan.settings.view.quantity()))
+        tone.with_image_range(&state.film.image(self.plan.settings.view.film_quantity()))
     }
 
     /// Returns the pixels of the 1:1 section, if one was requested.

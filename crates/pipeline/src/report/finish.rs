@@ -129,7 +129,7 @@ fn data_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     if plan.tone.range_map == RangeMap::None {
         return None;
     }
-    let image = state.film.image(plan.settings.view.quantity());
+    let image = state.film.image(plan.settings.view.film_quantity());
     plan.tone.with_image_range(&image).range_map.range().map(|range| range.limits())
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn warn_about_coplanar_lights(
 ) {
     let loaded = &parsed.loaded;
     let scene = &loaded.scene;
-    let origin = world::choose_scene_origin(&scene.camera, parsed.orbiter.as_ref());
+    let origin = world::choose_origin_near_camera_target(&scene.camera, parsed.orbiter.as_ref());
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::with_origin(
         &keys::coplanar_lights_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None)),

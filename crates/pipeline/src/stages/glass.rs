@@ -40,7 +40,9 @@ pub(crate) fn find_glass_solids(
     };
     memo.set(key, Arc::clone(&bodies));
     findings.warnings.extend(open_glass_warnings(loaded, bodies.open_objects()));
-    findings.warnings.extend(bodies.flat_objects().iter().map(|&object| flat_glass_warning(loaded, object)));
+    findings
+        .warnings
+        .extend(bodies.zero_volume_objects().iter().map(|&object| flat_glass_warning(loaded, object)));
     Ok(bodies)
 }
 

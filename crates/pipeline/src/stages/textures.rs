@@ -29,7 +29,7 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, is_model};
 use crate::world::{
-    CutoffBits, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source,
+    CutoffBits, Image, Images, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
     textures_needed,
 };
 
@@ -122,11 +122,11 @@ pub(crate) struct NeededTextures {
 pub(crate) fn find_needed_textures(
     loaded: &LoadedScene,
     meshes: &Meshes,
-    lookups: TextureNeeds,
+    lookups: NeededTextureRoleSet,
     cache: &TextureCache,
 ) -> NeededTextures {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    let all = textures_needed(&loaded.scene, &meshes, TextureNeeds::ALL);
+    let all = textures_needed(&loaded.scene, &meshes, NeededTextureRoleSet::ALL);
     let for_image = textures_needed(&loaded.scene, &meshes, lookups);
     let left_out = all.len() - for_image.len();
     if left_out == 0 || cache.has_all(&all) {

@@ -200,7 +200,8 @@ fn write_outdated_outputs(
         let wrote = match state.share {
             Some(_) => write_part(state, to, (path, &written.sweep), token),
             None => {
-                let image = radiance.get_or_insert_with(|| state.film.image(plan.settings.view.quantity()));
+                let image =
+                    radiance.get_or_insert_with(|| state.film.image(plan.settings.view.film_quantity()));
                 token
                     .check()
                     .map_err(OutputError::from)
@@ -360,7 +361,7 @@ fn write_part(
 /// Returns the settings for developing and encoding a film.
 pub(crate) fn develop_settings(plan: &RenderPlan) -> DevelopSettings {
     DevelopSettings {
-        quantity: plan.settings.view.quantity(),
+        quantity: plan.settings.view.film_quantity(),
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: metadata(plan),

@@ -23,7 +23,7 @@ pub fn shade_aov(
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
         let passed = if tile.world.has_see_through() {
-            Some(tile.first_opaque_hit(path, hit, counters))
+            Some(tile.first_opaque_path_and_hit(path, hit, counters))
         } else {
             None
         };

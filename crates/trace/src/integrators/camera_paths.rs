@@ -16,14 +16,14 @@ use super::photons::gather::GatherPhotons;
 use super::transport::accumulator::{Accumulator, NonReflectedTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
-use super::transport::crossing::CrossingMemory;
+use super::transport::crossing::CrossingBuffers;
 use super::transport::interface::{
-    FresnelSplit, diffusing_sheet_transmission, fresnel_split, reflected_path,
+    FresnelSplit, fresnel_split, reflected_path, sheet_transmission_between_media,
 };
 use super::transport::interiors::InteriorList;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
-use super::transport::scatter::Continuation;
+use super::transport::scatter::ContinuationPolicy;
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, SurfaceVertex};
@@ -127,7 +127,7 @@ struct CameraWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
     /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
-    continuation: Option<Continuation>,
+    continuation: Option<ContinuationPolicy>,
     tile: &'a TileContext<'a>,
     /// Photon maps for the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
@@ -140,7 +140,7 @@ struct CameraWavefront<'a, 's> {
     next: &'a mut Vec<PathRay>,
     /// Index of the current path in this bounce's queue.
     place: u32,
-    crossing: &'a mut CrossingMemory,
+    crossing: &'a mut CrossingBuffers,
     counters: &'a mut RayCounters,
 }
 
@@ -149,7 +149,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         self.tile
     }
 
-    fn crossing_memory(&mut self) -> &mut CrossingMemory {
+    fn crossing_buffers(&mut self) -> &mut CrossingBuffers {
         self.crossing
     }
 
@@ -238,7 +238,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn prepare_bounce_continuation(&mut self) {
-        let continuation = || Continuation::new(self.tile, self.depth, SampledLobes::All);
+        let continuation = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::All);
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
 
@@ -259,7 +259,7 @@ impl CameraWavefront<'_, '_> {
                 self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
-                let surface = packet.surface(self.surfaces, lane);
+                let surface = packet.surface_unless_plain(self.surfaces, lane);
                 walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
@@ -466,7 +466,7 @@ impl CameraWavefront<'_, '_> {
             }
             return;
         }
-        let is_colored = self.accumulator.aov.is_colored();
+        let is_colored = self.accumulator.aov.has_surface_colors_applied();
         let mut bsdf =
             if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
@@ -500,7 +500,8 @@ impl CameraWavefront<'_, '_> {
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
         // viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
-            let throughput = path.throughput * diffusing_sheet_transmission(tile.world, &path.interiors, far);
+            let throughput =
+                path.throughput * sheet_transmission_between_media(tile.world, &path.interiors, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.far_side());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
@@ -565,7 +566,7 @@ impl CameraWavefront<'_, '_> {
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading_normals(self.counters);
-        let is_colored = self.accumulator.aov.is_colored();
+        let is_colored = self.accumulator.aov.has_surface_colors_applied();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }

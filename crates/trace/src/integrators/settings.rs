@@ -4,7 +4,7 @@ use super::{AovSource, FirstHitQuantity, LightAov, ViewMode};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use crate::world::TextureNeeds;
+use crate::world::NeededTextureRoleSet;
 
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,36 +57,46 @@ impl RenderSettings {
     }
 
     /// Textures needed for images with these settings.
-    pub fn texture_needs(&self) -> TextureNeeds {
+    pub fn texture_needs(&self) -> NeededTextureRoleSet {
         match self.view.aov_source() {
             AovSource::FirstHit(FirstHitQuantity::Normal) => {
-                TextureNeeds { normals: true, ..TextureNeeds::NONE }
+                NeededTextureRoleSet { normals: true, ..NeededTextureRoleSet::NONE }
             }
             AovSource::FirstHit(FirstHitQuantity::Albedo) => {
-                TextureNeeds { diffuse: true, ..TextureNeeds::NONE }
+                NeededTextureRoleSet { diffuse: true, ..NeededTextureRoleSet::NONE }
             }
             // Photons may be scattered by any surface.
-            AovSource::FirstHit(FirstHitQuantity::Photons) if self.gathers_photons() => TextureNeeds::ALL,
+            AovSource::FirstHit(FirstHitQuantity::Photons) if self.gathers_photons() => {
+                NeededTextureRoleSet::ALL
+            }
             AovSource::FirstHit(
                 FirstHitQuantity::Depth
                 | FirstHitQuantity::Barycentric
                 | FirstHitQuantity::Uv
                 | FirstHitQuantity::Photons,
-            ) => TextureNeeds::NONE,
+            ) => NeededTextureRoleSet::NONE,
             // Normals and emission are needed, but not surface colors.
-            AovSource::Light(LightAov::LitFraction) => {
-                TextureNeeds { diffuse: false, specular: false, ambient: false, ..TextureNeeds::ALL }
-            }
+            AovSource::Light(LightAov::LitFraction) => NeededTextureRoleSet {
+                diffuse: false,
+                specular: false,
+                ambient: false,
+                ..NeededTextureRoleSet::ALL
+            },
             AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
                 let ambient =
                     parts.ambient && self.without_ineffective_settings().render.ambient != Vec3::ZERO;
-                TextureNeeds { ambient, lights: parts.emitted, by_delta: true, ..TextureNeeds::NONE }
+                NeededTextureRoleSet {
+                    ambient,
+                    lights: parts.emitted,
+                    by_delta: true,
+                    ..NeededTextureRoleSet::NONE
+                }
             }
             // Boxes are drawn over the beauty image.
             AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
             | AovSource::Bounds
-            | AovSource::Film(_) => TextureNeeds::ALL,
+            | AovSource::Film(_) => NeededTextureRoleSet::ALL,
         }
     }
 

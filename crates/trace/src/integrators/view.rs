@@ -88,7 +88,7 @@ impl ViewMode {
     }
 
     /// Film quantity shown by this view.
-    pub fn quantity(self) -> Quantity {
+    pub fn film_quantity(self) -> Quantity {
         match self.aov_source() {
             AovSource::Film(quantity) => quantity,
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => Quantity::Radiance,
@@ -136,7 +136,7 @@ impl LightAov {
     pub const ALL: Self = Self::Radiance(RadianceComponents::ALL);
 
     /// Whether surface colors are applied to reflected light.
-    pub fn is_colored(self) -> bool {
+    pub fn has_surface_colors_applied(self) -> bool {
         match self {
             Self::Radiance(_) | Self::TraversalCost => true,
             Self::LitFraction => false,

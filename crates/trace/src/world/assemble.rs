@@ -41,14 +41,14 @@ impl World {
             lens_glass: Vec::new(),
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
-            has_second_uvs: has_second_uvs(scene, inputs),
-            colored: objects_with_vertex_colors(scene),
+            has_second_uvs: are_second_uvs_used(scene, inputs),
+            colored: vertex_color_usage_by_object(scene),
             see_through: None,
         };
         Self {
             unlit_glass: world.find_unlit_glass(),
             lens_glass: world.find_lens_glass(),
-            enclosing_glass: world.find_glass_of_subtrees(),
+            enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),
             see_through: SeeThroughObjects::from_world(&world).map(Box::new),
             ..world
@@ -57,7 +57,7 @@ impl World {
 }
 
 /// Whether any texture uses the second UV set and any mesh has a second UV set.
-fn has_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
+fn are_second_uvs_used(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }
@@ -69,7 +69,7 @@ fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
 }
 
 /// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
-fn objects_with_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
+fn vertex_color_usage_by_object(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
     let all: Box<[bool]> = scene.objects.iter().map(is_colored).collect();

@@ -107,7 +107,8 @@ impl World {
         for ray in 0..MIN_RAYS.max(objects.len()) {
             let target =
                 self.geometry.objects()[objects[ray % objects.len()] as usize].surface_point_by_number(ray);
-            let Some((is_back, seen)) = target.and_then(|target| self.hit_side(body, (point, of), target))
+            let Some((is_back, seen)) =
+                target.and_then(|target| self.ray_hit_side_and_material(body, (point, of), target))
             else {
                 continue;
             };
@@ -122,7 +123,7 @@ impl World {
 
     /// Casts a ray toward `target`. Returns whether the ray hits the solid from behind, and the material at
     /// the hit. `None` if the ray misses the solid or leaves through an opaque surface that closes it.
-    fn hit_side(
+    fn ray_hit_side_and_material(
         &self,
         body: &CompoundSolid,
         (point, of): (Vec3, Option<u32>),

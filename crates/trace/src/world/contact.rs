@@ -19,7 +19,7 @@ pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
 /// the same point have no effect there.
-pub(super) type SubtreeGlassList = ArrayVec<u32, MAX_INTERIORS>;
+pub(super) type ClosedGlassShapesOfSubtree = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on each side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,14 +32,14 @@ pub struct OffsetPoints {
 
 impl OffsetPoints {
     /// Returns the segment from `before` to `beyond`, which ends at t = 1.
-    pub fn ray(&self) -> Ray {
+    pub fn segment_from_before_to_beyond(&self) -> Ray {
         Ray { t_max: 1.0, ..Ray::new(self.before, self.beyond - self.before) }
     }
 }
 
 /// A shape around the far point, or a surface between the two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CoincidentSurface {
+pub enum CoincidentOrEnclosingSurface {
     /// A glass shape that encloses [`OffsetPoints::beyond`].
     Around {
         /// Index of the shape's object.
@@ -90,7 +90,7 @@ struct CoincidenceSegment {
 impl CoincidenceSegment {
     /// Value of t at `close` along the segment.
     fn close_point_t(&self) -> f32 {
-        let way = self.sides.ray().direction;
+        let way = self.sides.segment_from_before_to_beyond().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
     }
 }
@@ -103,14 +103,14 @@ impl World {
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
-        visit: impl FnMut(CoincidentSurface),
+        visit: impl FnMut(CoincidentOrEnclosingSurface),
     ) -> OffsetPoints {
         let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
             if self.is_glass_thicker_than(at, margin) {
                 return self.classify_isolated_hit(at, visit);
             }
-            self.geometry.set_hit_as_candidate(at, memory)
+            self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
             self.geometry.find_candidates(at, memory, &self.enclosing_glass)
         };
@@ -132,12 +132,15 @@ impl World {
     fn classify_isolated_hit(
         &self,
         at: &CoincidenceQuery<'_>,
-        mut visit: impl FnMut(CoincidentSurface),
+        mut visit: impl FnMut(CoincidentOrEnclosingSurface),
     ) -> OffsetPoints {
         let SurfacePoint { point, error, normal, .. } = *at.surface;
         let object = at.hit.object;
         if normal.dot(at.normal) > 0.0 {
-            visit(CoincidentSurface::Around { object, material: self.material_index(at.hit) as u32 });
+            visit(CoincidentOrEnclosingSurface::Around {
+                object,
+                material: self.material_index(at.hit) as u32,
+            });
         }
         OffsetPoints {
             before: offset_origin(point, error, at.normal, at.normal),
@@ -151,7 +154,7 @@ impl World {
         &self,
         at: &CoincidenceQuery<'_>,
         (memory, error): (&CoincidenceScratch, Vec3),
-        mut visit: impl FnMut(CoincidentSurface),
+        mut visit: impl FnMut(CoincidentOrEnclosingSurface),
     ) -> OffsetPoints {
         let geometry = &self.geometry;
         let (point, normal) = (at.surface.point, at.normal);
@@ -162,10 +165,10 @@ impl World {
         let probe = CoincidenceSegment { sides, close: offset_origin(point, error, normal, normal) };
         let lead_end = probe.close_point_t();
         let mut is_led = false;
-        let mut found = |near: CoincidentSurface| {
+        let mut found = |near: CoincidentOrEnclosingSurface| {
             is_led |= match near {
-                CoincidentSurface::Around { .. } => false,
-                CoincidentSurface::Surface { hit, .. } => hit.shape.t <= lead_end,
+                CoincidentOrEnclosingSurface::Around { .. } => false,
+                CoincidentOrEnclosingSurface::Surface { hit, .. } => hit.shape.t <= lead_end,
             };
             visit(near);
         };
@@ -176,13 +179,17 @@ impl World {
                 let inside = shape.encloses_points(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
-                self.test_shape_coincidence(shape, id, (&sides, is_around)).into_iter().for_each(&mut found);
+                self.test_coincidence_or_enclosure(shape, id, (&sides, is_around))
+                    .into_iter()
+                    .for_each(&mut found);
             }
         }
         let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
         for &(object, triangle) in &memory.triangles {
             let mesh = geometry.objects()[object as usize].mesh();
-            if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.intersect_segment(triangle, ends)) {
+            if let Some((shape, is_front)) =
+                mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
+            {
                 let hit = Hit { shape, object };
                 found(self.coincident_surface_from_hit(hit, self.material_index(&hit) as u32, is_front));
             }
@@ -192,17 +199,17 @@ impl World {
 
     /// Returns the shape if its surface is between the points, or if it is glass and encloses
     /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
-    fn test_shape_coincidence(
+    fn test_coincidence_or_enclosure(
         &self,
         shape: &Shape,
         object: u32,
         (sides, is_around): (&OffsetPoints, Option<bool>),
-    ) -> Option<CoincidentSurface> {
+    ) -> Option<CoincidentOrEnclosingSurface> {
         let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object }) as u32;
         if let (true, Some(is_around)) = (self.is_glass_material(material), is_around) {
-            return is_around.then_some(CoincidentSurface::Around { object, material });
+            return is_around.then_some(CoincidentOrEnclosingSurface::Around { object, material });
         }
-        let ray = sides.ray().to_f64();
+        let ray = sides.segment_from_before_to_beyond().to_f64();
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
         let is_front =
@@ -210,9 +217,14 @@ impl World {
         Some(self.coincident_surface_from_hit(Hit { shape: own, object }, material, is_front))
     }
 
-    fn coincident_surface_from_hit(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
+    fn coincident_surface_from_hit(
+        &self,
+        hit: Hit,
+        material: u32,
+        is_front: bool,
+    ) -> CoincidentOrEnclosingSurface {
         let is_inside_out = self.is_glass_material(material) && self.glass_solids.is_inside_out(hit.object);
-        CoincidentSurface::Surface { hit, material, is_front: is_front != is_inside_out }
+        CoincidentOrEnclosingSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }
 
     /// The object that represents the glass solid of `object`: the solid's last object in file order.
@@ -252,8 +264,8 @@ impl World {
         })
     }
 
-    /// The [`SubtreeGlassList`] of each subtree. Empty if few objects are nested.
-    pub(super) fn find_glass_of_subtrees(&self) -> Box<[SubtreeGlassList]> {
+    /// The [`ClosedGlassShapesOfSubtree`] of each subtree. Empty if few objects are nested.
+    pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[ClosedGlassShapesOfSubtree]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
@@ -262,7 +274,7 @@ impl World {
     }
 
     /// Whether an object is a closed shape that contains a point.
-    pub fn encloses(&self, object: u32, point: Vec3) -> bool {
+    pub fn is_closed_shape_around_point(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
@@ -276,11 +288,11 @@ impl Geometry {
 
     /// Search distance for coincident surfaces along each axis.
     pub(super) fn coincidence_margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
-        (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding_error() + 2.0 * at.lead))
+        (at.surface.error * Self::REACH).max(Vec3::splat(self.max_mesh_rounding_error() + 2.0 * at.lead))
     }
 
     /// Makes the hit itself the only candidate. Returns its error bound per axis.
-    pub(super) fn set_hit_as_candidate(
+    pub(super) fn set_hit_as_only_candidate(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
@@ -307,7 +319,7 @@ impl Geometry {
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
-        enclosing: &[SubtreeGlassList],
+        enclosing: &[ClosedGlassShapesOfSubtree],
     ) -> Vec3 {
         let CoincidenceScratch { objects, triangles } = memory;
         objects.clear();
@@ -357,7 +369,7 @@ impl MeshInstance {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
-        let of_tests = self.to_placed_mesh(&self.transform).point_error_bound(point, local, corners);
+        let of_tests = self.combine_with_placement(&self.transform).point_error_bound(point, local, corners);
         of_tests + self.transform.transform_abs_bound(reach).as_vec3() * f32::EPSILON
     }
 
@@ -373,7 +385,11 @@ impl MeshInstance {
 
     /// Intersects a segment with a triangle in `f64` arithmetic. Returns the hit and whether the front was
     /// hit. At a shared edge, exactly one of the triangles is hit.
-    fn intersect_segment(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
+    fn intersect_segment_with_triangle(
+        &self,
+        triangle: u32,
+        [from, to]: [DVec3; 2],
+    ) -> Option<(ShapeHit, bool)> {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         let normal = (b - a).cross(c - a);
         let (start, end) = (normal.dot(from - a), normal.dot(to - a));

@@ -153,7 +153,7 @@ impl EmissiveFaces {
 /// `meshes` contains the scene's loaded mesh files.
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
-    for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
+    for object in (0..scene.objects.len()).filter(|object| can_object_emit(scene, meshes, *object)) {
         visit_flat_faces(scene, meshes, (object, origin), None, |face| {
             if face.emits.is_some() && !face.corners.is_empty() {
                 faces.push(face.clone());
@@ -268,7 +268,7 @@ pub(super) fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> boo
 }
 
 /// Whether an object may have emissive faces.
-fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
+fn can_object_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
     match (object.material, object.shape.mesh()) {
         (Some(material), _) => scene.materials[material].emits(),

@@ -75,7 +75,7 @@ const SURFACES: [&str; 6] = [
     "[[mesh]]\nfile = '../../assets/gem.off'\nscale = 4\nmaterial = 'w'\n",
 ];
 
-fn distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
+fn mesh_with_separated_emitters(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
     separate_coincident_emitters(loaded, all_emit, &CancelToken::new()).expect("never canceled")
 }
 
@@ -196,8 +196,8 @@ fn rays_hit_the_first_of_repeated_faces() {
         positions.extend(positions.clone());
         let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
         let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-        assert!(distinct_lights(&loaded, false).is_none());
-        let distinct = distinct_lights(&loaded, true).expect("repeated faces");
+        assert!(mesh_with_separated_emitters(&loaded, false).is_none());
+        let distinct = mesh_with_separated_emitters(&loaded, true).expect("repeated faces");
         let geometry = build_geometry_with_mesh(&scene_from_toml(LIGHTS[4]), Accel::Bvh, distinct.clone());
         let mut hits = 0;
         for _ in 0..4000 {
@@ -224,7 +224,7 @@ fn opposite_faces_are_hit_from_their_fronts() {
             let triangles = [[[0, 1, 2], [0, 2, 3]], reversed].concat();
             let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
             let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-            let distinct = distinct_lights(&loaded, true).expect("reversed faces");
+            let distinct = mesh_with_separated_emitters(&loaded, true).expect("reversed faces");
             let geometry = build_geometry_with_mesh(&scene_from_toml(LIGHTS[4]), Accel::Bvh, distinct);
             for round in 0..100 {
                 let target = corner([0.5, 0.5]).as_dvec3() + (x * vector().x + y * vector().x) * 0.45;
@@ -318,7 +318,10 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // Shadow rays that ignore the light reach it because the surface below does not occlude
                     // it.
                     let shadow = Ray::segment(from, target);
-                    assert!(!geometry.occluded(&shadow, LightGeometry::Object(number)), "{tables} {from}");
+                    assert!(
+                        !geometry.is_occluded_except_by_light(&shadow, LightGeometry::Object(number)),
+                        "{tables} {from}"
+                    );
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
                     let hit = geometry.closest_hit(&Ray::new(below, target - below)).expect("a hit");
@@ -326,7 +329,10 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // Light samples are occluded from the same positions as hits.
                     let lift = geometry.light_lifts()[number as usize].as_vec3();
                     let hidden = Ray::segment(below, target + lift);
-                    assert!(geometry.occluded(&hidden, LightGeometry::Object(number)), "{tables} {below}");
+                    assert!(
+                        geometry.is_occluded_except_by_light(&hidden, LightGeometry::Object(number)),
+                        "{tables} {below}"
+                    );
                 }
             }
         }
@@ -407,9 +413,9 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
         physical: None,
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
-    let lifted = distinct_lights(&loaded, false).expect("a coplanar light").mesh;
+    let lifted = mesh_with_separated_emitters(&loaded, false).expect("a coplanar light").mesh;
     // Another instance, whose material makes all faces emit, does not change this.
-    let emissive = distinct_lights(&loaded, true).expect("a coplanar light").mesh;
+    let emissive = mesh_with_separated_emitters(&loaded, true).expect("a coplanar light").mesh;
     assert_eq!(emissive.triangles, lifted.triangles);
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
@@ -425,8 +431,8 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
     }
     // Meshes without coplanar lights are unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
-    assert!(distinct_lights(&dark, false).is_none());
+    assert!(mesh_with_separated_emitters(&dark, false).is_none());
     let mut below = loaded;
     below.mesh.positions[4..].iter_mut().for_each(|position| position.y = 1.9);
-    assert!(distinct_lights(&below, false).is_none());
+    assert!(mesh_with_separated_emitters(&below, false).is_none());
 }

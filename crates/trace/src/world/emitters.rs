@@ -44,7 +44,7 @@ pub fn build_lights(
     let points = points.map(|light| delta_or_directional_light(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
-        let emission = discard_black_emission(lower_emission(scene, images, material));
+        let emission = emission_unless_texture_black(lower_emission(scene, images, material));
         EmissiveMaterial::new(emission, lower_opacity(scene, images, material))
     });
     let emissive: Vec<EmissiveMaterial> = emissive.collect();
@@ -109,7 +109,7 @@ fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Ligh
 }
 
 /// Returns the emission, or [`Emission::NONE`] if its texture is entirely black.
-fn discard_black_emission(emission: Emission) -> Emission {
+fn emission_unless_texture_black(emission: Emission) -> Emission {
     match &emission.texture {
         Some(texture) if emission.is_emissive() && texture.is_black() => Emission::NONE,
         Some(_) | None => emission,
@@ -198,7 +198,7 @@ fn mesh_lights(
         None => {
             let of_file = |material| {
                 EmissiveMaterial::new(
-                    discard_black_emission(file_emission(images, material)),
+                    emission_unless_texture_black(file_emission(images, material)),
                     file_opacity(images, material),
                 )
             };

@@ -155,7 +155,7 @@ impl Geometry {
     /// Returns the merged meshes if they are represented by `id`, which is an id from
     /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
     #[inline(always)]
-    pub(super) fn merged_meshes(&self, id: u32) -> Option<&MergedMeshes> {
+    pub(super) fn merged_meshes_with_tree_id(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
         (id as usize == self.objects.len()).then_some(&merged.meshes)
     }
@@ -173,7 +173,7 @@ impl Geometry {
 
     /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
-    pub(super) fn is_merged_mesh_light(&self, source: LightGeometry) -> bool {
+    pub(super) fn is_light_entire_merged_mesh(&self, source: LightGeometry) -> bool {
         match (source, &self.merged) {
             (LightGeometry::Object(object), Some(merged)) => merged.meshes.has(object),
             (
@@ -197,7 +197,7 @@ impl Geometry {
     }
 
     /// Upper bound on the position error of mesh triangles, including the error of ray tests.
-    pub(super) fn mesh_rounding_error(&self) -> f32 {
+    pub(super) fn max_mesh_rounding_error(&self) -> f32 {
         self.mesh_rounding
     }
 
@@ -220,19 +220,21 @@ impl Geometry {
 
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_hit_in_tree(self.traced_tree(), ray, |id, segment| match self.merged_meshes(id) {
-            Some(merged) => {
-                let shape = merged.closest_hit(segment)?;
-                let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
-                Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
+        self.closest_hit_in_tree(self.traced_tree(), ray, |id, segment| {
+            match self.merged_meshes_with_tree_id(id) {
+                Some(merged) => {
+                    let shape = merged.closest_hit(segment)?;
+                    let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
+                    Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
+                }
+                None => self.intersect_object(id, segment),
             }
-            None => self.intersect_object(id, segment),
         })
     }
 
     /// Returns the nearest hit among the objects for which `counts` returns true. At equal distances, the
     /// lowest object id wins.
-    pub fn closest_hit_among(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
+    pub fn closest_hit_on_objects_where(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
         self.closest_hit_in_tree(&self.tree, ray, |id, segment| {
             if counts(id) { self.intersect_object(id, segment) } else { None }
         })
@@ -272,7 +274,7 @@ impl Geometry {
     }
 
     /// Whether anything other than the light itself blocks a shadow ray.
-    pub fn occluded(&self, ray: &Ray, source: LightGeometry) -> bool {
+    pub fn is_occluded_except_by_light(&self, ray: &Ray, source: LightGeometry) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any_hit(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
@@ -280,7 +282,7 @@ impl Geometry {
             LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
             LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        let test = |id: u32| match (self.merged_meshes(id), source) {
+        let test = |id: u32| match (self.merged_meshes_with_tree_id(id), source) {
             (
                 Some(merged),
                 LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
@@ -290,7 +292,7 @@ impl Geometry {
             }
             (None, _) => of_object(id),
         };
-        if self.is_merged_mesh_light(source) {
+        if self.is_light_entire_merged_mesh(source) {
             return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any_hit(ray, of_object);
         }
         self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any_hit(ray, test)
@@ -341,8 +343,8 @@ impl Geometry {
     }
 
     /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set. `None` without a second UV set.
-    pub fn second_uv(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
-        self.objects[hit.object as usize].mesh()?.second_parameterization(&hit.shape)
+    pub fn second_uv_and_tangents(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
+        self.objects[hit.object as usize].mesh()?.second_uv_and_tangents(&hit.shape)
     }
 
     /// Memory used by the objects and the trees over them, in bytes. Excludes per-mesh trees.

@@ -145,7 +145,7 @@ impl Geometry {
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
     fn new_isolation_table(&self, object: &Object) -> IsolationTable {
-        let of_rays = self.mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
+        let of_rays = self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.max_rounding_error());

@@ -1,7 +1,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, OffsetPoints};
+use super::super::contact::{
+    CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, OffsetPoints,
+};
 use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, build_lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
@@ -262,10 +264,10 @@ fn isolated_regions_match_the_full_search() {
                 normal,
                 lead: hit.shape.t * f32::EPSILON * facing.abs(),
             };
-            let found = |only_hit: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
+            let found = |only_hit: bool| -> (OffsetPoints, Vec<CoincidentOrEnclosingSurface>) {
                 let (mut memory, mut near) = (CoincidenceScratch::default(), Vec::new());
                 let error = if only_hit {
-                    world.geometry.set_hit_as_candidate(&at, &mut memory)
+                    world.geometry.set_hit_as_only_candidate(&at, &mut memory)
                 } else {
                     world.geometry.find_candidates(&at, &mut memory, &world.enclosing_glass)
                 };
@@ -281,9 +283,11 @@ fn isolated_regions_match_the_full_search() {
             let sides =
                 world.find_coincident_surfaces(&at, &mut CoincidenceScratch::default(), |one| near.push(one));
             assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
-            let is_other = |near: &CoincidentSurface| match near {
-                CoincidentSurface::Around { object, .. }
-                | CoincidentSurface::Surface { hit: Hit { object, .. }, .. } => *object != hit.object,
+            let is_other = |near: &CoincidentOrEnclosingSurface| match near {
+                CoincidentOrEnclosingSurface::Around { object, .. }
+                | CoincidentOrEnclosingSurface::Surface { hit: Hit { object, .. }, .. } => {
+                    *object != hit.object
+                }
             };
             touching += usize::from(searched.1.iter().any(is_other));
             isolated += usize::from(is_isolated && round % 4 == 3);
@@ -318,7 +322,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             let mut found = 0_u32;
             let sides = world.find_coincident_surfaces(&at, &mut memory, |near| {
                 found += 1;
-                if let CoincidentSurface::Around { object, .. } = near {
+                if let CoincidentOrEnclosingSurface::Around { object, .. } = near {
                     around.push(object);
                 }
             });
@@ -327,7 +331,8 @@ fn nested_sphere_search_takes_log_squared_time() {
             assert!(f64::from(found) <= bound, "{found} of {count}");
             // Check that the listed spheres include the spheres that determine the medium.
             let glasses = world.closed_glass_shapes().map(|(object, _)| object);
-            let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
+            let enclosing =
+                glasses.filter(|object| world.is_closed_shape_around_point(*object, sides.beyond));
             let enclosing: Vec<_> = enclosing.collect();
             around.sort_unstable();
             let last = |all: &[u32]| all[all.len().saturating_sub(MAX_INTERIORS)..].to_vec();

@@ -184,7 +184,7 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
         (FileMaterialKind::Mirror, _) => {
             Bsdf::Mirror(Mirror::Constant(ColorParameter::Constant(own.specular.min(Vec3::ONE))))
         }
-        (FileMaterialKind::Coated, _) => file_coated(images, own),
+        (FileMaterialKind::Coated, _) => file_mirror_over_diffuse(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
             Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(ScalarParameter::Constant(roughness)))
@@ -227,7 +227,7 @@ fn file_color(
 
 /// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
 /// incidence.
-fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
+fn file_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
     let specular = own.specular.min(Vec3::ONE);
     let root = specular.max_element().min(FileMaterial::MAX_COAT).sqrt();
     let diffuse = file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));

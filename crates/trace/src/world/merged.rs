@@ -70,7 +70,7 @@ impl MergedMeshes {
     ) -> Result<Option<Self>, Cancelled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
-        let least = min_object_size(objects);
+        let least = smallest_object_size(objects);
         let mut chosen: Vec<usize> =
             (0..objects.len()).filter(|&id| may_be_merged(&objects[id], least)).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
@@ -90,8 +90,9 @@ impl MergedMeshes {
         // A small number of triangles is worth merging only if packets can test them without a tree.
         let rounded = |&id: &usize| {
             let mesh = objects[id].mesh();
-            mesh.into_iter()
-                .flat_map(|mesh| (0..mesh.triangle_count() as u32).map(|own| mesh.rounded_corners(own)))
+            mesh.into_iter().flat_map(|mesh| {
+                (0..mesh.triangle_count() as u32).map(|own| mesh.world_corners_rounded_to_f32(own))
+            })
         };
         chosen.sort_unstable();
         let facets = if total > MAX_FACETS {
@@ -118,7 +119,9 @@ impl MergedMeshes {
         // Build the tree.
         let corners = |number: u32| {
             let MergedTriangle { object, primitive } = triangles[number as usize];
-            objects[object as usize].mesh().map_or([Vec3::NAN; 3], |mesh| mesh.rounded_corners(primitive))
+            objects[object as usize]
+                .mesh()
+                .map_or([Vec3::NAN; 3], |mesh| mesh.world_corners_rounded_to_f32(primitive))
         };
         let number = triangles.len() as u32;
         let tree = TriangleTree::build(accel, number, corners, token)?;
@@ -178,7 +181,7 @@ impl MergedMeshes {
     ) {
         let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, met, ends, found) };
         let size = self.bounds().extent();
-        match by.run(ClosestFacetKernel { facets, size, rows, met, ends, found }) {
+        match by.run(IncoherentClosestFacetKernel { facets, size, rows, met, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_one_by_one(rows, undecided, ends, found),
             None => self.closest_hit_by_tree(rows, met, ends, found),
@@ -220,7 +223,7 @@ impl MergedMeshes {
         let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(AnyFacetKernel { facets, size, rows, met, ends, except: own }) {
+        match by.run(IncoherentAnyFacetKernel { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_hit_by_tree(rows, met, ends, except),
@@ -290,7 +293,7 @@ const COHERENCE: f32 = 0.125;
 
 /// Calls [`TriangleList::closest_hit_packet`] for incoherent rays. Returns the lanes that need an exact test, or `None`
 /// for coherent rays.
-struct ClosestFacetKernel<'a> {
+struct IncoherentClosestFacetKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -299,7 +302,7 @@ struct ClosestFacetKernel<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for ClosestFacetKernel<'_> {
+impl SimdKernel for IncoherentClosestFacetKernel<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]
@@ -314,7 +317,7 @@ impl SimdKernel for ClosestFacetKernel<'_> {
 
 /// Calls [`TriangleList::any_hit_packet`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
 /// test, or `None` for coherent rays.
-struct AnyFacetKernel<'a> {
+struct IncoherentAnyFacetKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -323,7 +326,7 @@ struct AnyFacetKernel<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for AnyFacetKernel<'_> {
+impl SimdKernel for IncoherentAnyFacetKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]
@@ -348,7 +351,7 @@ fn unpack_rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
 }
 
 /// Size of the smallest finite object, or infinity if there is none.
-fn min_object_size(objects: &[Object]) -> f32 {
+fn smallest_object_size(objects: &[Object]) -> f32 {
     let bounds = objects.iter().filter_map(Object::bounds).filter(|bounds| !bounds.is_empty());
     let sizes = bounds.map(|bounds| bounds.extent().max_element());
     sizes.filter(|size| *size > 0.0).fold(f32::INFINITY, f32::min)
@@ -487,7 +490,7 @@ pub(super) mod tests {
                         own.any_hit(&ray, &ray.to_f64(), (id == of).then_some(part))
                     }
                 });
-                assert_eq!(geometry.occluded(&ray, source), any, "{ray:?} {source:?}");
+                assert_eq!(geometry.is_occluded_except_by_light(&ray, source), any, "{ray:?} {source:?}");
                 blocked += u32::from(any);
             }
         }

@@ -68,7 +68,7 @@ impl MeshInstance {
 
     /// Like `scene_triangle_number`, for a packet. Lanes without a triangle contain arbitrary numbers.
     #[inline(always)]
-    pub fn scene_triangle_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+    pub fn packet_scene_triangle_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET_SIZE] };
         triangles.map(|triangle| first.wrapping_add(triangle))
     }
@@ -116,7 +116,7 @@ impl MeshInstance {
     }
 
     /// Corners of a triangle in world coordinates, rounded to `f32`, in file order.
-    pub(super) fn rounded_corners(&self, triangle: u32) -> [Vec3; 3] {
+    pub(super) fn world_corners_rounded_to_f32(&self, triangle: u32) -> [Vec3; 3] {
         let corners = self.tree.loaded().mesh.corners(triangle);
         if !self.is_transformed {
             return corners;
@@ -158,7 +158,7 @@ impl MeshInstance {
     }
 
     /// UV and tangents at a hit in the second UV set. `None` without a second set.
-    pub(super) fn second_parameterization(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
+    pub(super) fn second_uv_and_tangents(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
         let mesh = &self.tree.loaded().mesh;
         if mesh.second_uvs.is_empty() {
             return None;
@@ -166,7 +166,7 @@ impl MeshInstance {
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
         let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-        let (uv, dpdu, dpdv) = self.parameterization(&mesh.second_uvs, vertices, barycentric, [b - a, c - a]);
+        let (uv, dpdu, dpdv) = self.uv_and_tangents(&mesh.second_uvs, vertices, barycentric, [b - a, c - a]);
         Some((uv, [dpdu, dpdv]))
     }
 
@@ -176,7 +176,7 @@ impl MeshInstance {
         if !self.smooth {
             return 0.0;
         }
-        let (mesh, normals) = (&self.tree.loaded().mesh, self.tree.normals());
+        let (mesh, normals) = (&self.tree.loaded().mesh, self.tree.file_or_computed_normals());
         let vertices = mesh.triangles[triangle as usize].map(|vertex| {
             let own = self.transform.normal(normals[vertex as usize].as_dvec3()).normalize_or_zero();
             let own = if own.dot(normal.as_dvec3()) < 0.0 { -own } else { own };
@@ -192,7 +192,7 @@ impl MeshInstance {
 
     /// Combines this mesh with `placement`, which must represent the mesh's transform.
     #[inline(always)]
-    pub(super) fn to_placed_mesh<P>(&self, placement: P) -> PlacedMesh<P> {
+    pub(super) fn combine_with_placement<P>(&self, placement: P) -> PlacedMesh<P> {
         PlacedMesh {
             placement,
             edge_margin: self.edge_margin,
@@ -203,8 +203,12 @@ impl MeshInstance {
     /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => self.surface_with_placement(self.to_placed_mesh(&self.transform), ray, hit, asked),
-            false => self.surface_with_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, asked),
+            true => {
+                self.surface_with_placement(self.combine_with_placement(&self.transform), ray, hit, asked)
+            }
+            false => {
+                self.surface_with_placement(self.combine_with_placement(IdentityPlacement), ray, hit, asked)
+            }
         }
     }
 
@@ -220,17 +224,17 @@ impl MeshInstance {
         let facet = placed.triangle_point(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let TrianglePoint { corners: [a, b, c], normal, barycentric, .. } = facet;
         let [point, error] = match facet.may_need_correction() {
-            true => placed.corrected(&facet, ray, [hit.u, hit.v]),
+            true => placed.corrected_point_and_error(&facet, ray, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
         let (uv, dpdu, dpdv) = if asked.uv {
-            self.parameterization(&mesh.uvs, vertices, barycentric, [b - a, c - a])
+            self.uv_and_tangents(&mesh.uvs, vertices, barycentric, [b - a, c - a])
         } else {
             (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
         };
         let (mut shading_normal, mut shadow_point) = (normal, point);
         if self.smooth {
-            let normals = self.tree.normals();
+            let normals = self.tree.file_or_computed_normals();
             let normals = vertices.map(|vertex| normals[vertex]);
             shading_normal = placed.shading_normal(&facet, &normals);
             if asked.shadow_point && !placed.uses_point_from_ray(&facet, ray) {
@@ -251,7 +255,7 @@ impl MeshInstance {
     }
 
     /// UV and tangents at a point on a triangle. Uses barycentric coordinates if the mesh has no UVs.
-    fn parameterization(
+    fn uv_and_tangents(
         &self,
         uvs: &[Vec2],
         vertices: [usize; 3],

@@ -62,7 +62,7 @@ impl MeshInstance {
         }
         surface.copy_points(of, &found);
         if self.smooth {
-            let normals = gather_vertex_attributes(&vertices, self.tree.normals());
+            let normals = gather_vertex_attributes(&vertices, self.tree.file_or_computed_normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
             for i in 0..PACKET_SIZE {
                 let facet = placed.triangle_point(corners_of(i), [hits.u[i], hits.v[i]]);
@@ -113,7 +113,7 @@ impl SimdKernel for FillSurfaces<'_> {
         let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
         if mesh.is_transformed {
             mesh.fill_placed_surfaces(
-                mesh.to_placed_mesh(&mesh.transform),
+                mesh.combine_with_placement(&mesh.transform),
                 surface,
                 (rays, hits),
                 of,
@@ -122,7 +122,7 @@ impl SimdKernel for FillSurfaces<'_> {
             );
         } else {
             mesh.fill_placed_surfaces(
-                mesh.to_placed_mesh(IdentityPlacement),
+                mesh.combine_with_placement(IdentityPlacement),
                 surface,
                 (rays, hits),
                 of,
@@ -149,7 +149,7 @@ fn correct_points(
         let (ray, uv) = (rays.ray(i).to_f64(), [hits.u[i], hits.v[i]]);
         let facet =
             placed.triangle_point([lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)], uv);
-        let [point, error] = placed.corrected(&facet, &ray, uv);
+        let [point, error] = placed.corrected_point_and_error(&facet, &ray, uv);
         set_lane(&mut found.point, i, point);
         set_lane(&mut found.error, i, error);
         on_ray |= if placed.uses_point_from_ray(&facet, &ray) { 1 << i } else { 0 };
@@ -334,7 +334,7 @@ mod tests {
                         assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());
                         assert_eq!(bits(lane(&row.error, i)), bits(alone.error), "{}", what());
                         assert_eq!(bits(lane(&row.normal, i)), bits(alone.normal), "{}", what());
-                        let second = mesh.second_parameterization(&hit).filter(|_| set == UvSet::Second);
+                        let second = mesh.second_uv_and_tangents(&hit).filter(|_| set == UvSet::Second);
                         let uv = second.map_or(alone.uv, |(uv, _)| uv.as_dvec2());
                         assert_eq!([row.uv[0][i], row.uv[1][i]], uv.to_array(), "{}", what());
                         if mesh.smooth {

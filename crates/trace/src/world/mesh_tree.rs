@@ -51,7 +51,7 @@ impl MeshTree {
 
     /// Vertex normals from the file, or computed normals. Returns immediately if
     /// [`MeshTree::prepare_normals`] has already been called.
-    pub fn normals(&self) -> &[Vec3] {
+    pub fn file_or_computed_normals(&self) -> &[Vec3] {
         if !self.loaded.mesh.normals.is_empty() {
             return &self.loaded.mesh.normals;
         }

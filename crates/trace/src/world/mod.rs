@@ -35,7 +35,9 @@ use std::sync::Arc;
 pub use crate::accel::{PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeSummary};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
-pub use contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, MAX_INTERIORS, OffsetPoints};
+pub use contact::{
+    CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, MAX_INTERIORS, OffsetPoints,
+};
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
 pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
 pub use emitters::{build_lights, photon_source, sky_map};
@@ -46,13 +48,13 @@ pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use null_interaction::{MAX_NULL_INTERACTIONS, TransmittancePacket};
 pub use object::Object;
-pub use origin::choose_scene_origin;
+pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    CutoffBits, NeededTexture, TextureNeeds, TextureSource, environment_source, material_texture_source,
-    textures_needed,
+    CutoffBits, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
+    material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightBoundingBoxes;
+pub use unlit_glass::LightBoundingBoxPair;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -122,7 +124,7 @@ pub struct World {
     /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
-    enclosing_glass: Box<[contact::SubtreeGlassList]>,
+    enclosing_glass: Box<[contact::ClosedGlassShapesOfSubtree]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
@@ -216,14 +218,14 @@ impl World {
 
     /// Whether an object's vertex colors are used.
     #[inline]
-    pub fn has_vertex_colors(&self, object: u32) -> bool {
+    pub fn are_vertex_colors_used(&self, object: u32) -> bool {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
     /// The vertex color that tints the material at a hit. `None` if vertex colors are not used.
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
-        self.has_vertex_colors(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
+        self.are_vertex_colors_used(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
     /// Texture coordinates at a hit. `footprint` computes their footprint from the tangents.
@@ -246,7 +248,7 @@ impl World {
         hit: &Hit,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
     ) -> Option<Box<SecondUvPoint>> {
-        let (uv, tangents) = self.geometry.second_uv(hit)?;
+        let (uv, tangents) = self.geometry.second_uv_and_tangents(hit)?;
         Some(Box::new(SecondUvPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
     }
 

@@ -93,18 +93,22 @@ impl World {
     }
 
     /// Whether a shadow ray's transmittance is zero.
-    pub fn is_fully_occluded(&self, ray: &Ray, source: LightGeometry) -> bool {
+    pub fn has_zero_transmittance(&self, ray: &Ray, source: LightGeometry) -> bool {
         self.transmittance(ray, source, &mut 0) == Vec3::ZERO
     }
 
     /// Transmittance along a shadow ray to its light.
     pub fn transmittance(&self, ray: &Ray, source: LightGeometry, lookups: &mut u64) -> Vec3 {
         let Some(see_through) = &self.see_through else {
-            return if self.geometry.occluded(ray, source) { Vec3::ZERO } else { Vec3::ONE };
+            return if self.geometry.is_occluded_except_by_light(ray, source) {
+                Vec3::ZERO
+            } else {
+                Vec3::ONE
+            };
         };
         let is_own = |object: u32| source == LightGeometry::Object(object);
         let stops = |object: u32| !see_through.has(object) && !is_own(object);
-        if self.geometry.closest_hit_among(ray, stops).is_some() {
+        if self.geometry.closest_hit_on_objects_where(ray, stops).is_some() {
             return Vec3::ZERO;
         }
         self.see_through_transmittance(see_through, ray, source, lookups)
@@ -138,8 +142,9 @@ impl World {
         let is_own = |object: u32| source == LightGeometry::Object(object);
         // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
-        while let Some(hit) =
-            self.geometry.closest_hit_among(&ray, |object| see_through.has(object) && !is_own(object))
+        while let Some(hit) = self
+            .geometry
+            .closest_hit_on_objects_where(&ray, |object| see_through.has(object) && !is_own(object))
         {
             if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;

@@ -10,7 +10,10 @@ use crate::scene::description;
 /// origin is 0 if the target is within about 20 camera distances of 0. It depends only on the point that the
 /// camera orbits and the distance to this point, and changes in discrete steps. Orbiting does not change the
 /// origin. Trees are rebuilt only when the origin changes.
-pub fn choose_scene_origin(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> DVec3 {
+pub fn choose_origin_near_camera_target(
+    camera: &description::Camera,
+    orbiter: Option<&GkitOrbiterCamera>,
+) -> DVec3 {
     let (aim, distance) = Camera::target_and_distance(camera, orbiter);
     origin_near(aim, distance)
 }

@@ -40,7 +40,7 @@ impl Geometry {
         (nearest.hits, nearest.object)
     }
 
-    /// Like [`Geometry::occluded`], for a packet of shadow rays. Returns the mask of occluded rays. `traced`
+    /// Like [`Geometry::is_occluded_except_by_light`], for a packet of shadow rays. Returns the mask of occluded rays. `traced`
     /// is the mask of rays to trace. Must be called inside a SIMD kernel.
     #[inline(always)]
     pub fn occluded_ray_packet(
@@ -64,7 +64,7 @@ impl Geometry {
         }
         let is_whole = |lane: usize| {
             sources.part[lane] == LightGeometryPacket::NONE
-                && self.is_merged_mesh_light(LightGeometry::Object(sources.object[lane]))
+                && self.is_light_entire_merged_mesh(LightGeometry::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
@@ -88,7 +88,7 @@ impl Geometry {
         (hits, objects)
     }
 
-    /// Calls [`Geometry::occluded`] for each ray.
+    /// Calls [`Geometry::is_occluded_except_by_light`] for each ray.
     #[cold]
     #[inline(never)]
     fn occluded_one_by_one(
@@ -99,7 +99,10 @@ impl Geometry {
         sources: &LightGeometryPacket,
     ) -> u32 {
         let is_occluded = |&lane: &usize| {
-            self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.geometry(lane))
+            self.is_occluded_except_by_light(
+                &Ray { t_max: ends[lane], ..rows.ray(lane) },
+                sources.geometry(lane),
+            )
         };
         lane_indices(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
     }
@@ -166,7 +169,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
-        match self.geometry.merged_meshes(id) {
+        match self.geometry.merged_meshes_with_tree_id(id) {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
                 merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
@@ -224,14 +227,14 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
         sources: &'a LightGeometryPacket,
         simd: F,
     ) -> Self {
-        Self { geometry, rows, sources, in_part: rays_to_primitive_lights(sources, simd), simd }
+        Self { geometry, rows, sources, in_part: rays_to_single_primitive_lights(sources, simd), simd }
     }
 }
 
 impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
-        if let Some(merged) = self.geometry.merged_meshes(id) {
+        if let Some(merged) = self.geometry.merged_meshes_with_tree_id(id) {
             let these = masked_ends(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_hit_packet(
@@ -267,7 +270,7 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn rays_to_primitive_lights(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
+fn rays_to_single_primitive_lights(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -427,7 +430,11 @@ pub(super) mod tests {
             sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
             let occluded = geometry.instruction_set().run(Occluded { geometry, rays: &rays, sources: &row });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {
-                assert_eq!(occluded & 1 << lane != 0, geometry.occluded(ray, *source), "{lane} of {rays:?}");
+                assert_eq!(
+                    occluded & 1 << lane != 0,
+                    geometry.is_occluded_except_by_light(ray, *source),
+                    "{lane} of {rays:?}"
+                );
             }
             hits += alone.iter().flatten().count();
             shadows += occluded.count_ones();

@@ -20,12 +20,14 @@ impl Geometry {
             |id, depth| below.push((id, depth)),
         );
         for (id, above) in below {
-            let (local, tree) =
-                match (self.merged_meshes(id), self.objects().get(id as usize).and_then(Object::mesh)) {
-                    (Some(merged), _) => (*ray, merged.tree()),
-                    (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangle_tree()),
-                    (None, None) => continue,
-                };
+            let (local, tree) = match (
+                self.merged_meshes_with_tree_id(id),
+                self.objects().get(id as usize).and_then(Object::mesh),
+            ) {
+                (Some(merged), _) => (*ray, merged.tree()),
+                (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangle_tree()),
+                (None, None) => continue,
+            };
             tree.visit_nodes_along_ray(&local, |cell, stretch| {
                 visit(&local, &TreeNodeSummary { depth: above + cell.depth, ..*cell }, stretch)
             });

@@ -85,7 +85,7 @@ impl NeededTexture {
 
 /// Which textures an image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TextureNeeds {
+pub struct NeededTextureRoleSet {
     /// Diffuse reflectance.
     pub diffuse: bool,
     /// Glossy reflectance.
@@ -101,7 +101,7 @@ pub struct TextureNeeds {
     pub by_delta: bool,
 }
 
-impl TextureNeeds {
+impl NeededTextureRoleSet {
     /// Every texture.
     pub const ALL: Self =
         Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
@@ -148,7 +148,7 @@ impl TextureNeeds {
 pub fn textures_needed(
     scene: &Scene,
     meshes: &[Arc<LoadedMesh>],
-    lookups: TextureNeeds,
+    lookups: NeededTextureRoleSet,
 ) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
@@ -379,7 +379,7 @@ pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> PixelInter
 
 fn file_textures(
     own: &FileMaterial,
-    lookups: TextureNeeds,
+    lookups: NeededTextureRoleSet,
 ) -> impl Iterator<Item = (&FileTexture, PixelInterpretation)> {
     let shared = [
         (&own.diffuse_texture, TextureRole::Ambient),

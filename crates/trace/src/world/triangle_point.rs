@@ -27,7 +27,7 @@ pub(super) struct TrianglePoint {
 }
 
 impl TrianglePoint {
-    /// Whether [`PlacedMesh::corrected`] may change the point.
+    /// Whether [`PlacedMesh::corrected_point_and_error`] may change the point.
     #[inline(always)]
     pub(super) fn may_need_correction(&self) -> bool {
         self.is_near_edge | self.is_coarse
@@ -94,7 +94,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let error = self.point_error_bound(point, local, corners);
         let across = ab.cross(ac);
         // Compare squared distances from the edges with the squared minimum.
-        let least = self.min_edge_distance(error, corners);
+        let least = self.required_edge_distance(error, corners);
         let bound = least * least / across.length_squared();
         let (u, v) = (f64::from(u), f64::from(v));
         let w = 1.0 - u - v;
@@ -124,7 +124,12 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// the point and its error.
     #[cold]
     #[inline(never)]
-    pub(super) fn corrected(&self, facet: &TrianglePoint, ray: &RayF64, weights: [f32; 2]) -> [Vec3; 2] {
+    pub(super) fn corrected_point_and_error(
+        &self,
+        facet: &TrianglePoint,
+        ray: &RayF64,
+        weights: [f32; 2],
+    ) -> [Vec3; 2] {
         match self.point_from_ray(facet, ray) {
             Some(corrected) => corrected,
             None if facet.is_near_edge => self.pulled_inside(facet, weights),
@@ -132,7 +137,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         }
     }
 
-    /// Whether [`PlacedMesh::corrected`] computes the point from the ray.
+    /// Whether [`PlacedMesh::corrected_point_and_error`] computes the point from the ray.
     #[inline(always)]
     pub(super) fn uses_point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> bool {
         facet.is_coarse && self.point_from_ray(facet, ray).is_some()
@@ -159,7 +164,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Minimum distance from a point to its triangle's edges, in mesh coordinates: the point's error plus the
     /// error of testing a neighbor of the same size.
     #[inline(always)]
-    fn min_edge_distance(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    fn required_edge_distance(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
         let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
         self.edge_margin * f64::from(error.max_element()) + EDGE_MARGIN * f64::from(f32::EPSILON) * greatest
     }
@@ -170,7 +175,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     fn pulled_inside(&self, facet: &TrianglePoint, [u, v]: [f32; 2]) -> [Vec3; 2] {
         let [a, b, c] = facet.corners;
         let (ab, ac) = (b - a, c - a);
-        let least = self.min_edge_distance(facet.error, facet.corners) / ab.cross(ac).length();
+        let least = self.required_edge_distance(facet.error, facet.corners) / ab.cross(ac).length();
         let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MAX_EDGE_MARGIN));
         let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
         let excess = (u + v - (1.0 - of_w)).max(0.0);

@@ -91,7 +91,7 @@ impl ColorMapper {
         if self.depth == ColorDepth::Ansi16 {
             let labs = fitted.pair.map(|rgb| linear_to_oklab(srgb8_to_linear(rgb)));
             if labs[0].distance_squared(labs[1]) < EDGE {
-                return self.dithered_cell(mean_cell_color(first, second, fitted.tile), x, y);
+                return self.dithered_cell(pattern_weighted_mean_color(first, second, fitted.tile), x, y);
             }
         }
         let pair = [self.map_color(first, x, 2 * y), self.map_color(second, x, 2 * y + 1)];
@@ -121,7 +121,7 @@ fn ansi_color_mixes(inks: &[DitherColor]) -> Vec<AnsiColorMix> {
     alone.chain(shaded).collect()
 }
 
-fn mean_cell_color(first: [u8; 3], second: [u8; 3], tile: BlockPattern) -> [u8; 3] {
+fn pattern_weighted_mean_color(first: [u8; 3], second: [u8; 3], tile: BlockPattern) -> [u8; 3] {
     let [a, b] = tile.part_sizes().map(|size| size as f32);
     let mixed = (srgb8_to_linear(first) * a + srgb8_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)

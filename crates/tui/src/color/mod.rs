@@ -63,7 +63,7 @@ pub(super) fn resolve_depth(choice: ColorChoice, variable: impl Fn(&str) -> Opti
 fn detect_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
-    if !get("NO_COLOR").is_empty() || has_no_colors(&term) {
+    if !get("NO_COLOR").is_empty() || is_terminal_without_colors(&term) {
         return ColorDepth::None;
     }
     // GNU screen passes on the outer terminal's COLORTERM but does not support 24-bit color itself.
@@ -80,7 +80,7 @@ fn detect_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     }
 }
 
-fn has_no_colors(term: &str) -> bool {
+fn is_terminal_without_colors(term: &str) -> bool {
     term == "dumb" || term.starts_with("vt1") || term.starts_with("vt2") || term.ends_with("-mono")
 }
 

@@ -40,7 +40,7 @@ impl TestImageTerminal {
     }
 
     /// Number of images shown so far.
-    pub fn total_displayed_images(&self) -> usize {
+    pub fn images_shown_so_far_count(&self) -> usize {
         self.count
     }
 

@@ -103,7 +103,7 @@ impl Decoder {
 
     fn expire_pending(&mut self, now: Instant) {
         if self.deadline().is_some_and(|deadline| now >= deadline) {
-            match self.drop_sequence() {
+            match self.drop_and_return_sequence() {
                 PendingSequence::Escape => {
                     self.escaped = Some(now);
                     self.push_escape_key();
@@ -136,7 +136,7 @@ impl Decoder {
             PendingSequence::Sequence { bytes: 2, introducer, .. }
                 if are_three_key_presses(introducer, byte) =>
             {
-                self.drop_sequence();
+                self.drop_and_return_sequence();
                 self.push_escape_key();
                 self.replay(&[introducer]);
                 self.begin_sequence(byte, now);
@@ -182,7 +182,7 @@ impl Decoder {
             }
             // Not the start of any terminal sequence.
             byte if !INTRODUCERS.contains(&byte) => {
-                self.drop_sequence();
+                self.drop_and_return_sequence();
                 self.push_escape_key();
                 self.begin_sequence(byte, now);
             }
@@ -202,7 +202,7 @@ impl Decoder {
         if std::mem::take(&mut self.meaning.is_paste) {
             self.held = PendingSequence::Paste(Paste::new(now));
         } else if bytes >= MAX_BYTES {
-            self.drop_sequence();
+            self.drop_and_return_sequence();
         } else if !self.meaning.has_ended {
             self.held = PendingSequence::Sequence { begin, bytes, introducer };
         }
@@ -222,14 +222,14 @@ impl Decoder {
             bytes.push(byte);
             self.held = PendingSequence::Doubtful(bytes);
         } else {
-            self.drop_sequence();
+            self.drop_and_return_sequence();
             self.replay(&bytes);
             self.begin_sequence(byte, now);
         }
     }
 
     /// Drops the current sequence and returns it.
-    fn drop_sequence(&mut self) -> PendingSequence {
+    fn drop_and_return_sequence(&mut self) -> PendingSequence {
         self.meaning.reset();
         self.command.clear();
         self.parser = vte::Parser::default();

@@ -191,7 +191,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         }
     };
     state.saving.camera_edits.pop();
-    state.picture.history.record_edit();
+    state.picture.history.record_scene_edit();
     let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();

@@ -38,7 +38,7 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     if state.picture.history.returns_to_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
-    match state.picture.history.step_back(steps, newest) {
+    match state.picture.history.step_back_by(steps, newest) {
         Some(shown) => show_older_render(state, shown),
         None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
     }

@@ -82,7 +82,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
                 (state.overlays.message, state.selection.facts) = (None, None);
             }
             if !is_own {
-                state.picture.history.record_edit();
+                state.picture.history.record_scene_edit();
             }
             state.saving.edits += 1;
             let effects = request_render(state, false);

@@ -11,7 +11,7 @@ use crate::view::layout::Layout;
 pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     // Do not fill up the history while the camera is moving.
     if state.request.camera_step.generation == Some(state.request.generation) {
-        state.picture.history.drop_unfinished(state.request.generation);
+        state.picture.history.drop_unfinished_of_request(state.request.generation);
     } else {
         history::record_image(state);
     }
@@ -21,7 +21,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.
-        state.picture.history.move_to_next_request(state.request.generation);
+        state.picture.history.reassign_entry_to_next_request(state.request.generation);
     }
     state.work.is_counted &= state.request.is_exposure_only;
     state.request.generation += 1;

@@ -291,7 +291,7 @@ fn record_written_file(
     let made = match (unfinished, &state.work.report) {
         (Some(samples), _) => exit_summary::describe_unfinished_image(samples, view),
         (None, Some(report)) => exit_summary::describe_image(report, view),
-        (None, None) if generation == state.request.generation => exit_summary::view_label(view),
+        (None, None) if generation == state.request.generation => exit_summary::view_name_unless_beauty(view),
         (None, None) => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);

@@ -3,7 +3,7 @@
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
-use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
+use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -350,9 +350,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         samples: &LightSamplePacket,
         share: f32,
         simd: impl Simd,
-    ) -> (Vec3x16, u32, BsdfResponse) {
-        let response = self.row.evaluate_bsdf(&samples.directions, simd);
-        let BsdfResponse { bsdf, cosines } = &response;
+    ) -> (Vec3x16, u32, BsdfValuesAndCosines) {
+        let response = self.row.evaluate_bsdf_and_cosines(&samples.directions, simd);
+        let BsdfValuesAndCosines { bsdf, cosines } = &response;
         let f = bsdf.f();
         let mut arriving = samples.weights;
         if self.aov == LightAov::LitFraction {

@@ -3,7 +3,7 @@
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
 use crate::geometry::packet::{RayPacket, lane_indices};
-use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
+use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -48,7 +48,7 @@ impl SimdKernel for LobeRayKernel<'_> {
                 [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
             let wi = row.bsdf.sample(SampledLobes::Narrow, &row.normal, &choices, &u, simd);
-            let BsdfResponse { bsdf, cosines } = row.evaluate_bsdf(&wi, simd);
+            let BsdfValuesAndCosines { bsdf, cosines } = row.evaluate_bsdf_and_cosines(&wi, simd);
             let pdfs = row.bsdf.pdf(SampledLobes::Narrow, &row.normal, &wi, &bsdf, simd);
             let narrow = &bsdf.narrow;
             // Select the rays above the horizon.

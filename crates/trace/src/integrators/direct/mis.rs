@@ -2,7 +2,7 @@
 //! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
 use crate::geometry::{Ray, ShapeHit};
-use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
+use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
@@ -56,7 +56,7 @@ impl CompetingTechnique {
     pub fn apply_mis_weights(
         self,
         row: &VertexBatch,
-        (samples, response): (&LightSamplePacket, &BsdfResponse),
+        (samples, response): (&LightSamplePacket, &BsdfValuesAndCosines),
         mut values: Vec3x16,
         (of_light, competing): (&F32x16, f32),
         simd: impl Simd,
@@ -272,7 +272,9 @@ impl TileContext<'_> {
     pub fn coincident_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
-        if path.state.pdf > 0.0 && !self.world.is_fully_occluded(&shadow, LightGeometry::Object(hit.object)) {
+        if path.state.pdf > 0.0
+            && !self.world.has_zero_transmittance(&shadow, LightGeometry::Object(hit.object))
+        {
             self.emitter_weight(path, hit)
         } else {
             1.0

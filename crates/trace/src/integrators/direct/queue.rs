@@ -15,7 +15,7 @@ use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
+use crate::integrators::transport::scatter::{ContinuationPolicy, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
@@ -213,7 +213,7 @@ impl DirectLightQueue {
         &mut self,
         tile: &TileContext<'_>,
         aov: LightAov,
-        (continuation, depth): (Option<Continuation>, u32),
+        (continuation, depth): (Option<ContinuationPolicy>, u32),
         gather: impl Fn(&VertexBatch) -> Option<Vec3x16>,
         next: &mut Vec<PathRay>,
     ) -> Result<DirectLightCounters, Cancelled> {
@@ -223,7 +223,8 @@ impl DirectLightQueue {
         // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
-        let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, SampledLobes::Narrow));
+        let mirrors =
+            || tile.behavior.mirrors.then(|| ContinuationPolicy::new(tile, depth, SampledLobes::Narrow));
         let of_row = |row: &VertexBatch| {
             let own = if row.bsdf.extends_narrow_lobe_paths() {
                 continuation.or_else(mirrors)
@@ -310,7 +311,7 @@ impl DirectLightQueue {
 
     /// Media at a packet's vertices. `None` if all vertices are in air.
     fn interiors_of(&self, row: &VertexBatch) -> Option<&InteriorLists> {
-        (!self.interior_lists.are_air() && row.is_in_glass()).then_some(&self.interior_lists)
+        (!self.interior_lists.are_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.

@@ -35,7 +35,7 @@ impl UnshadowedLobeRay<'_> {
         // Add the emitters along the ray, front to back.
         for _ in 0..=MAX_NULL_INTERACTIONS {
             let Some(hit) =
-                world.geometry.closest_hit_among(&along, |object| world.lights.has_object(object))
+                world.geometry.closest_hit_on_objects_where(&along, |object| world.lights.has_object(object))
             else {
                 break;
             };

@@ -14,14 +14,14 @@ use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
-use crate::integrators::transport::crossing::CrossingMemory;
+use crate::integrators::transport::crossing::CrossingBuffers;
 use crate::integrators::transport::interface::{
-    FresnelSplit, diffusing_sheet_transmission, fresnel_split, reflected_path,
+    FresnelSplit, fresnel_split, reflected_path, sheet_transmission_between_media,
 };
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
-use crate::integrators::transport::ray::{PathRay, PathState};
-use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
+use crate::integrators::transport::ray::{PathHistory, PathRay};
+use crate::integrators::transport::scatter::{ContinuationPolicy, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
 use crate::integrators::transport::walk::{
@@ -83,7 +83,7 @@ impl PhotonTracer<'_> {
             open: VertexBatch::empty(),
             open_behind: VertexBatch::empty(),
             interior_lists: InteriorLists::default(),
-            crossing: CrossingMemory::default(),
+            crossing: CrossingBuffers::default(),
             stored: PhotonChunk::default(),
             counters: RayCounters::default(),
         };
@@ -132,7 +132,7 @@ impl PhotonTracer<'_> {
     fn interiors_at(&self, point: Vec3, emitted: &EmittedPhoton) -> InteriorList {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
-        let around = |glass: &&Interior| world.encloses(glass.body, point);
+        let around = |glass: &&Interior| world.is_closed_shape_around_point(glass.body, point);
         let in_parts = self.bodies.iter().filter(|_| !is_from_infinite_light(emitted)).filter_map(|body| {
             let material = world.material_around(body, point, emitter())?;
             Some(Interior { body: body.body, material })
@@ -160,7 +160,7 @@ struct PhotonWavefront<'a> {
     open_behind: VertexBatch,
     /// Media at the individually queued vertices.
     interior_lists: InteriorLists,
-    crossing: CrossingMemory,
+    crossing: CrossingBuffers,
     stored: PhotonChunk,
     counters: RayCounters,
 }
@@ -170,7 +170,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         self.tracing.tile
     }
 
-    fn crossing_memory(&mut self) -> &mut CrossingMemory {
+    fn crossing_buffers(&mut self) -> &mut CrossingBuffers {
         &mut self.crossing
     }
 
@@ -252,7 +252,7 @@ impl PhotonWavefront<'_> {
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
                     interiors: tracing.interiors_at(ray.origin, &emitted),
-                    state: PathState::CAMERA,
+                    state: PathHistory::CAMERA,
                     cone: RayCone::default(),
                 };
                 self.references[offset] = max_flux_component(tile.world, &path);
@@ -292,7 +292,7 @@ impl PhotonWavefront<'_> {
         // Shade other surfaces one by one.
         for i in lane_indices(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.surface(surfaces, i)));
+                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.surface_unless_plain(surfaces, i)));
             }
         }
     }
@@ -409,7 +409,7 @@ impl PhotonWavefront<'_> {
             1.0 / (eta * eta)
         } else {
             // For a camera path, this is transmission from the other side.
-            diffusing_sheet_transmission(tile.world, far, &path.interiors)
+            sheet_transmission_between_media(tile.world, far, &path.interiors)
         };
         let interiors = self.interior_lists.insert(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
@@ -498,7 +498,8 @@ impl PhotonWavefront<'_> {
             set_lane(&mut row.normal, i, facet);
             row.shading_normal_cosine[i] = UNPERTURBED;
         }
-        let continuation = Continuation { continues: true, uses_roulette: false, lobes: SampledLobes::All };
+        let continuation =
+            ContinuationPolicy { continues: true, uses_roulette: false, lobes: SampledLobes::All };
         let used = row.used;
         SampleBsdf { tile: self.tracing.tile, row, used, continuation }.scatter(
             &self.interior_lists,

@@ -58,7 +58,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonSource};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBoundingBoxes, World, photon_source};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, photon_source};
 use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -366,7 +366,7 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxes| {
+    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxPair| {
         lamp.center_and_corners().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
     let mut bodies = world.compound_solids();

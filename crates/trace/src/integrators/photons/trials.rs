@@ -77,7 +77,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
     for _ in 0..LAYERS {
         let ray = Ray::segment(start, end);
         // Find the next surface below that may receive photons.
-        let Some(hit) = world.geometry.closest_hit_among(&ray, may_receive) else { return false };
+        let Some(hit) = world.geometry.closest_hit_on_objects_where(&ray, may_receive) else { return false };
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let surface = world.geometry.requested_surface(&ray, &hit, bare);
         // Succeed if the surface receives photons, has about the same normal, and is not occluded.

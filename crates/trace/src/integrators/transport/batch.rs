@@ -208,7 +208,7 @@ impl VertexBatch {
 
     /// Evaluates the BSDFs and cosines for light from the directions `wi`.
     #[inline(always)]
-    pub fn evaluate_bsdf(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfResponse {
+    pub fn evaluate_bsdf_and_cosines(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValuesAndCosines {
         let mut cosines = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             cosines[i] = lane(&self.normal, i).dot(lane(wi, i));
@@ -219,7 +219,7 @@ impl VertexBatch {
                 cosines[i] *= terminator_factor(cosines[i], smooth, self.shading_normal_cosine[i]);
             }
         }
-        BsdfResponse { bsdf: self.bsdf.f(wi, simd), cosines }
+        BsdfValuesAndCosines { bsdf: self.bsdf.f(wi, simd), cosines }
     }
 
     /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side in lanes where
@@ -319,7 +319,7 @@ impl VertexBatch {
     }
 
     /// Whether any vertex is in glass.
-    pub fn is_in_glass(&self) -> bool {
+    pub fn has_vertex_in_glass(&self) -> bool {
         lane_indices(self.used).any(|i| self.interiors[i] != 0)
     }
 
@@ -339,7 +339,7 @@ impl VertexBatch {
 
 /// BSDF values and cosines for a packet of vertices and one direction per vertex.
 #[repr(align(64))]
-pub struct BsdfResponse {
+pub struct BsdfValuesAndCosines {
     /// BSDF values.
     pub bsdf: BsdfValues,
     /// Cosines times the terminator factors. Not positive if the light is on the wrong side of a normal.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cone::RayCone;
 use super::interiors::{Interior, InteriorList};
-use super::ray::{PathRay, PathState};
+use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket};
@@ -67,7 +67,7 @@ impl TileContext<'_> {
         } else {
             self.camera_interiors(ray.origin)
         };
-        let state = PathState::CAMERA;
+        let state = PathHistory::CAMERA;
         let cone = RayCone { width: 0.0, spread: self.pixel_spread };
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, interiors, state, cone }
     }

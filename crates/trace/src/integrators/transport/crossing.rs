@@ -4,7 +4,7 @@ use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::SurfaceVertex;
-use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, Hit, OffsetPoints};
+use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, Hit, OffsetPoints};
 
 /// Surfaces and media crossed by a ray at a hit on glass.
 pub struct Crossing {
@@ -32,9 +32,9 @@ pub struct GlassBoundary {
 
 /// Buffers for the search for coincident surfaces.
 #[derive(Default)]
-pub struct CrossingMemory {
+pub struct CrossingBuffers {
     around: CoincidenceScratch,
-    near: Vec<CoincidentSurface>,
+    near: Vec<CoincidentOrEnclosingSurface>,
 }
 
 impl TileContext<'_> {
@@ -44,15 +44,15 @@ impl TileContext<'_> {
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
         hit: &Hit,
-        memory: &mut CrossingMemory,
+        memory: &mut CrossingBuffers,
     ) -> Crossing {
-        let CrossingMemory { around, near: found } = memory;
+        let CrossingBuffers { around, near: found } = memory;
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = CoincidenceQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.find_coincident_surfaces(&meeting, around, |near| found.push(near));
         let (before, far) = self.crossing_interiors(&path.interiors, found);
-        let opaque = found.iter().filter_map(|near| self.opaque_hit(near));
+        let opaque = found.iter().filter_map(|near| self.hit_if_opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         Crossing { sides, before, far, opaque }
     }
@@ -66,18 +66,18 @@ impl TileContext<'_> {
     fn crossing_interiors(
         &self,
         known: &InteriorList,
-        found: &[CoincidentSurface],
+        found: &[CoincidentOrEnclosingSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
         let is_told_by_record = |glass: Interior| !self.world.is_closed_shape(glass.body);
         // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
                 [] => return (None, known.retained(is_told_by_record)),
-                [CoincidentSurface::Around { object, material }] => {
+                [CoincidentOrEnclosingSurface::Around { object, material }] => {
                     let entered = Interior { body: object, material };
                     return (None, known.retained(is_told_by_record).entered(entered));
                 }
-                [CoincidentSurface::Surface { .. }] | [_, _, ..] => {}
+                [CoincidentOrEnclosingSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
         // Start with the recorded media, without open solids.
@@ -85,16 +85,19 @@ impl TileContext<'_> {
         let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
-                CoincidentSurface::Surface { hit, material, is_front } if is_front == as_front => {
+                CoincidentOrEnclosingSurface::Surface { hit, material, is_front } if is_front == as_front => {
                     let glass = Interior { body: self.world.solid_id(hit.object), material };
                     self.world.is_glass_material(material).then_some(glass)
                 }
-                CoincidentSurface::Surface { .. } | CoincidentSurface::Around { .. } => None,
+                CoincidentOrEnclosingSurface::Surface { .. }
+                | CoincidentOrEnclosingSurface::Around { .. } => None,
             })
         };
         let around = found.iter().filter_map(|thing| match *thing {
-            CoincidentSurface::Around { object, material } => Some(Interior { body: object, material }),
-            CoincidentSurface::Surface { .. } => None,
+            CoincidentOrEnclosingSurface::Around { object, material } => {
+                Some(Interior { body: object, material })
+            }
+            CoincidentOrEnclosingSurface::Surface { .. } => None,
         });
         // Leave the solids whose back faces are hit.
         for glass in crossed(false) {
@@ -119,7 +122,7 @@ impl TileContext<'_> {
         &self,
         hit: &Hit,
         [near, far]: [&InteriorList; 2],
-        memory: &CrossingMemory,
+        memory: &CrossingBuffers,
     ) -> Option<GlassBoundary> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
@@ -128,12 +131,12 @@ impl TileContext<'_> {
         }
         // The path hits a different coincident surface.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
-            CoincidentSurface::Surface { hit, material, .. } => {
+            CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {
                 let is_later =
                     self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(material);
                 is_later.then_some(GlassBoundary { material, hit: Some(hit) })
             }
-            CoincidentSurface::Around { .. } => None,
+            CoincidentOrEnclosingSurface::Around { .. } => None,
         });
         Some(of_body.unwrap_or(GlassBoundary { material: later.material, hit: None }))
     }
@@ -146,10 +149,10 @@ impl TileContext<'_> {
         interiors
     }
 
-    fn opaque_hit(&self, thing: &CoincidentSurface) -> Option<Hit> {
+    fn hit_if_opaque(&self, thing: &CoincidentOrEnclosingSurface) -> Option<Hit> {
         match *thing {
-            CoincidentSurface::Around { .. } => None,
-            CoincidentSurface::Surface { hit, material, .. } => {
+            CoincidentOrEnclosingSurface::Around { .. } => None,
+            CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {
                 (!self.world.is_glass_material(material)).then_some(hit)
             }
         }

@@ -45,7 +45,7 @@ pub fn reflected_path(
 /// In the denser medium, light spreads over fewer directions and would gain energy without this factor. In
 /// the opposite direction, radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport
 /// Simulation*, 1997, section 5.2).
-pub fn diffusing_sheet_transmission(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
+pub fn sheet_transmission_between_media(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
     let eta = medium_ior(world, far) / medium_ior(world, near);
     (eta * eta).min(1.0)
 }

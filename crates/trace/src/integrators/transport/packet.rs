@@ -7,7 +7,7 @@ use super::batch::{UNPERTURBED, VertexBatch};
 use super::camera::CameraRayPacket;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::measure_shadow_lift;
+use super::vertex::lift_significance_and_t_max;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -89,7 +89,7 @@ impl PacketHits {
     }
 
     /// Surface at a hit, or `None` if it is plain or not in the surface packet.
-    pub fn surface(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> Option<SurfacePoint> {
+    pub fn surface_unless_plain(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
             return None;
@@ -151,7 +151,7 @@ impl TileContext<'_> {
     /// Whether surface packets contain everything needed for shading a non-plain material. Surface packets
     /// have no texture coordinates or tangents.
     #[inline(always)]
-    fn supports_surface_packet(&self, material: usize) -> bool {
+    fn can_shade_material_in_packet(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
         self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
@@ -159,7 +159,7 @@ impl TileContext<'_> {
     /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
     #[inline(always)]
     pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
-        let (plain, rough) = self.world.packet_material(material)?;
+        let (plain, rough) = self.world.packet_material_and_bsdf(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
@@ -245,8 +245,8 @@ impl SimdKernel for PacketIntersection<'_> {
         let plain = self.fill_plain_surfaces(rows, (&hits, &object), in_air, simd);
         // Set the positions and normals of the plain vertices.
         let lifts = match tile.settings.render.shadows {
-            ShadowMode::Off => ShadowLiftMode::All,
-            ShadowMode::Hard | ShadowMode::Soft => ShadowLiftMode::IfFree(only_specular_before),
+            ShadowMode::Off => ShadowLiftSelection::All,
+            ShadowMode::Hard | ShadowMode::Soft => ShadowLiftSelection::IfFree(only_specular_before),
         };
         let front =
             if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, simd) };
@@ -279,7 +279,7 @@ impl PacketIntersection<'_> {
         while left != 0 {
             let (id, of_object) = lanes_with_same_index(object, left, simd);
             left &= !of_object;
-            if tile.world.has_vertex_colors(id) {
+            if tile.world.are_vertex_colors_used(id) {
                 continue;
             }
             // Skip materials that are not plain. The first plain material determines the kind of all BSDFs.
@@ -296,7 +296,7 @@ impl PacketIntersection<'_> {
                 } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
-                let own_uvs = material.row_texture.filter(|_| *are_lit && aov.is_colored());
+                let own_uvs = material.row_texture.filter(|_| *are_lit && aov.has_surface_colors_applied());
                 // Packets have room for one set of texture coordinates.
                 if own_uvs.is_some() && asked_uvs.is_some() && own_uvs != asked_uvs {
                     continue;
@@ -323,7 +323,7 @@ impl PacketIntersection<'_> {
                     }
                 }
                 Object::Mesh(mesh) => {
-                    row.set_start_triangles(of, &mesh.scene_triangle_numbers(&hits.primitive));
+                    row.set_start_triangles(of, &mesh.packet_scene_triangle_numbers(&hits.primitive));
                     mesh.fill_surfaces(surface, rows, hits, of, asked_uvs, simd);
                 }
             }
@@ -391,7 +391,7 @@ impl TileContext<'_> {
             while waiting != 0 {
                 let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
                 waiting &= !alike;
-                of |= if self.supports_surface_packet(material as usize) { alike } else { 0 };
+                of |= if self.can_shade_material_in_packet(material as usize) { alike } else { 0 };
             }
             if of == 0 {
                 continue;
@@ -411,7 +411,7 @@ impl TileContext<'_> {
 
 /// Selects the vertices on smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
-enum ShadowLiftMode {
+enum ShadowLiftSelection {
     /// All vertices.
     All,
     /// Only the vertices whose bits are set, and only if the segment to the vertex's lifted point is
@@ -432,7 +432,7 @@ impl VertexBatch {
         &mut self,
         rays: &RayPacket,
         surface: &SurfacePacket,
-        lifts: ShadowLiftMode,
+        lifts: ShadowLiftSelection,
         simd: impl Simd,
     ) {
         // Turn both normals toward the viewer.
@@ -451,7 +451,8 @@ impl VertexBatch {
         // Compute the lifted points above the facets.
         for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
-            let (is_above, end) = measure_shadow_lift(from, to, lane(&facets, i), lane(&surface.error, i));
+            let (is_above, end) =
+                lift_significance_and_t_max(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
@@ -459,8 +460,8 @@ impl VertexBatch {
         let of = mask_from_bits(surface.smooth);
         let above = simd.movemask(&above) & surface.smooth;
         let rises = match lifts {
-            ShadowLiftMode::All => mask_from_bits(above),
-            ShadowLiftMode::IfFree(only_specular_before) => {
+            ShadowLiftSelection::All => mask_from_bits(above),
+            ShadowLiftSelection::IfFree(only_specular_before) => {
                 self.has_horizon |= simd.movemask(&bent) & surface.smooth;
                 self.may_lift |= above & only_specular_before;
                 [0; PACKET_SIZE]
@@ -490,7 +491,7 @@ impl VertexBatch {
         paths: &PacketSource<'_>,
         rays: &RayPacket,
         surface: &SurfacePacket,
-        lifts: ShadowLiftMode,
+        lifts: ShadowLiftSelection,
         simd: impl Simd,
     ) -> u32 {
         // Place the vertices on the facets, on the viewer's side.

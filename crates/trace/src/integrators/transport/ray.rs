@@ -20,14 +20,14 @@ pub struct PathRay {
     /// The glass solids around the ray.
     pub interiors: InteriorList,
     /// Summary of the path before this ray.
-    pub state: PathState,
+    pub state: PathHistory,
     /// The ray cone, for texture filtering.
     pub cone: RayCone,
 }
 
 /// Summary of a path's earlier vertices, which determines how light found by the path is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathState {
+pub struct PathHistory {
     /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 if light samples cannot find the
     /// light: after the camera, a mirror or glass, or if the path has since passed through glass.
     pub pdf: f32,
@@ -43,7 +43,7 @@ pub struct PathState {
     pub is_after_gloss: bool,
 }
 
-impl PathState {
+impl PathHistory {
     /// State of camera rays.
     pub const CAMERA: Self = Self {
         pdf: 0.0,
@@ -105,7 +105,7 @@ mod tests {
             slot: 0,
             path,
             interiors: InteriorList::default(),
-            state: PathState::CAMERA,
+            state: PathHistory::CAMERA,
             cone: RayCone::default(),
         }
     }

@@ -1,10 +1,10 @@
 //! BSDF sampling at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
 
-use super::batch::{BsdfResponse, VertexBatch};
+use super::batch::{BsdfValuesAndCosines, VertexBatch};
 use super::cone::RayCone;
 use super::interface::SCATTERED;
 use super::interiors::InteriorLists;
-use super::ray::{PathRay, PathState};
+use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::lane_indices;
@@ -16,7 +16,7 @@ use crate::world::SimdKernel;
 
 /// How paths continue after a bounce.
 #[derive(Clone, Copy, Debug)]
-pub struct Continuation {
+pub struct ContinuationPolicy {
     /// Whether paths continue. After the last bounce, they continue only if they may hit a light.
     pub continues: bool,
     /// Whether Russian roulette applies.
@@ -25,7 +25,7 @@ pub struct Continuation {
     pub lobes: SampledLobes,
 }
 
-impl Continuation {
+impl ContinuationPolicy {
     /// Number of bounces before Russian roulette begins.
     const MIN_DEPTH: u32 = 3;
     /// Reciprocal of the throughput below which Russian roulette may end a path.
@@ -72,7 +72,7 @@ pub struct SampleBsdf<'a> {
     /// Mask of vertices whose paths continue.
     pub used: u32,
     /// How the paths continue.
-    pub continuation: Continuation,
+    pub continuation: ContinuationPolicy,
 }
 
 /// Sampled directions at a packet of vertices.
@@ -92,7 +92,7 @@ pub struct ScatteredDirections {
     pdfs: F32x16,
     /// Throughput factors.
     factors: Vec3x16,
-    /// New values of [`PathState::roulette_throughput`].
+    /// New values of [`PathHistory::roulette_throughput`].
     roulette_throughput: F32x16,
 }
 
@@ -117,7 +117,7 @@ impl SampleBsdf<'_> {
                 slot: row.slot[i],
                 path: row.path[i],
                 interiors: interior_lists.get(interiors),
-                state: PathState {
+                state: PathHistory {
                     pdf: scattered.pdfs[i],
                     normal,
                     roulette_throughput: scattered.roulette_throughput[i],
@@ -177,7 +177,7 @@ impl SampleBsdf<'_> {
         let Self { row, continuation, .. } = *self;
         let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.
-        let BsdfResponse { bsdf, cosines } = row.evaluate_bsdf(&wi, simd);
+        let BsdfValuesAndCosines { bsdf, cosines } = row.evaluate_bsdf_and_cosines(&wi, simd);
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {

@@ -1,7 +1,7 @@
 //! Buffers for queues of rays and hits.
 
 use super::camera::CameraRayPacket;
-use super::crossing::CrossingMemory;
+use super::crossing::CrossingBuffers;
 use super::ray::PathRay;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::world::Hit;
@@ -22,7 +22,7 @@ pub struct TraceBuffers {
     /// Queue indices of the rays, ordered by the object hit.
     pub object_order: HitsByObject,
     /// Buffers for the search for coincident surfaces.
-    pub crossing: CrossingMemory,
+    pub crossing: CrossingBuffers,
 }
 
 /// Queue indices grouped by the object hit, so that shading a packet takes few loop iterations.

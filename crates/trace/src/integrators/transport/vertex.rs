@@ -69,7 +69,10 @@ impl<'a> SurfaceVertex<'a> {
         (sides, hit): (OffsetPoints, &Hit),
         distance: f32,
     ) -> Self {
-        Self { sides: Some(sides), ..Self::from_ray_hit(tile, path, (&sides.ray(), hit), distance) }
+        Self {
+            sides: Some(sides),
+            ..Self::from_ray_hit(tile, path, (&sides.segment_from_before_to_beyond(), hit), distance)
+        }
     }
 
     fn from_ray_hit(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
@@ -265,12 +268,13 @@ impl<'a> SurfaceVertex<'a> {
         }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = tile.settings.render.shadows != ShadowMode::Off;
-        let (is_above, end) = measure_shadow_lift(on_facet, shadow_point, self.normal, error);
+        let (is_above, end) = lift_significance_and_t_max(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        let lift = (is_above && only_specular_before).then_some(ShadowOriginLift { to: shadow_point, end });
+        let lift =
+            (is_above && only_specular_before).then_some(ShadowOriginLiftSegment { to: shadow_point, end });
         ShadowOrigin { point: on_facet, start: self.start, horizon, lift }
     }
 }
@@ -278,7 +282,7 @@ impl<'a> SurfaceVertex<'a> {
 /// Returns whether the distance from a facet to the lifted point `to` is significant. Also returns the
 /// segment's `t_max`: 1 at the point, plus a margin for the error.
 #[inline(always)]
-pub fn measure_shadow_lift(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
+pub fn lift_significance_and_t_max(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
     (is_above, lift.extended_by_error(error).t_max)
@@ -299,12 +303,12 @@ pub struct ShadowOrigin {
     pub horizon: Option<Vec3>,
     /// A point above the facet. If the segment to this point is unoccluded, it is used as the origin for
     /// lights in all directions.
-    pub lift: Option<ShadowOriginLift>,
+    pub lift: Option<ShadowOriginLiftSegment>,
 }
 
 /// A segment from a facet to a point above it.
 #[derive(Clone, Copy, Debug)]
-pub struct ShadowOriginLift {
+pub struct ShadowOriginLiftSegment {
     /// The lifted point.
     pub to: Vec3,
     /// The segment's `t_max`: 1 at the point, plus a margin for the error.

@@ -4,7 +4,7 @@
 //! Thin panes and stochastically transparent surfaces are null interactions. They change neither the path
 //! vertex nor its pdf, just as for shadow rays.
 
-use super::crossing::{Crossing, CrossingMemory};
+use super::crossing::{Crossing, CrossingBuffers};
 use super::interface::PASSED;
 use super::interiors::{InteriorList, medium_ior, medium_transmittance};
 use super::ray::PathRay;
@@ -47,7 +47,7 @@ pub trait PathStepper<'a> {
     fn tile(&self) -> &'a TileContext<'a>;
 
     /// Buffers for the search for coincident surfaces.
-    fn crossing_memory(&mut self) -> &mut CrossingMemory;
+    fn crossing_buffers(&mut self) -> &mut CrossingBuffers;
 
     /// Records that the path crossed a surface. `next` is the next hit behind the surface.
     fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>);
@@ -171,7 +171,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             let mut far = path.interiors;
             if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
                 // The path may be inside glass that touches the surface.
-                let crossing = tile.find_crossing(path, &vertex, &hit, stepper.crossing_memory());
+                let crossing = tile.find_crossing(path, &vertex, &hit, stepper.crossing_buffers());
                 if let Some([_, near]) = crossing.before {
                     path.interiors = near;
                 }
@@ -187,7 +187,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         }
         // At glass, find all coincident surfaces.
         let Crossing { sides, before, far, opaque } =
-            tile.find_crossing(path, &vertex, &hit, stepper.crossing_memory());
+            tile.find_crossing(path, &vertex, &hit, stepper.crossing_buffers());
         let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
         path.throughput *= medium_transmittance(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
@@ -248,7 +248,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
-    let boundary = tile.boundary(hit, interior_lists, stepper.crossing_memory())?;
+    let boundary = tile.boundary(hit, interior_lists, stepper.crossing_buffers())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
@@ -335,7 +335,7 @@ fn path_past_surface(path: PathRay, vertex: &SurfaceVertex<'_>, part: Vec3) -> P
 impl TileContext<'_> {
     /// Returns the first opaque hit along a camera ray, starting with `hit`, and the path that reaches it.
     /// `None` if there is no opaque hit.
-    pub fn first_opaque_hit(
+    pub fn first_opaque_path_and_hit(
         &self,
         path: &PathRay,
         hit: &Hit,

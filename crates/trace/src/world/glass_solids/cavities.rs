@@ -55,7 +55,7 @@ pub(super) fn cavities(
         let surrounds = |solid: usize| {
             let parts = found.iter().filter(|(_, around)| *around == solid).map(|(cavity, _)| *cavity);
             let objects = parts.chain([solid]).flat_map(|body| closed[body].objects.iter().copied());
-            are_inside(&some, objects.flat_map(corners_of))
+            are_all_points_inside(&some, objects.flat_map(corners_of))
         };
         let is_fit = |solid: usize| {
             closed[solid].volume > -closed[hollow].volume
@@ -70,7 +70,7 @@ pub(super) fn cavities(
 
 /// Whether all points are inside closed surfaces, which means that rays from the points hit an odd number of
 /// triangles.
-fn are_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
+fn are_all_points_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
     let mut hits = vec![0_u32; points.len()];
     for corners in triangles {
         for (hits, &point) in hits.iter_mut().zip(points) {

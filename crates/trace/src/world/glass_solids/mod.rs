@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use cavities::{ClosedSolid, cavities};
 use parts::{GlassPart, GlassParts, RimEdge};
-use shared_edges::{OpenEdge, SharedEdge, SharedEdges, find_set_root};
+use shared_edges::{RimEdgeWithEndpointIds, SharedEdge, SharedEdges, find_set_root};
 
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -93,7 +93,7 @@ impl GlassSolids {
         // Reopen edges where the relative orientation of two parts differs from the rest of their common
         // border.
         let is_odd = |seam: &&SharedEdge| groups.have_opposite_orientations(seam.parts()) != seam.disagrees;
-        let odd: Vec<OpenEdge> =
+        let odd: Vec<RimEdgeWithEndpointIds> =
             shared_edges.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
         shared_edges.open.extend(odd);
         let mut solids = Self::default();
@@ -101,7 +101,7 @@ impl GlassSolids {
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
         let holes = Hole::find_all(&parts, &groups, &all, &shared_edges);
-        let covered = are_holes_covered(scene, meshes, &parts, &holes, token)?;
+        let covered = covered_flag_of_each_hole(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
@@ -118,7 +118,7 @@ impl GlassSolids {
             if hole.part <= NO_HOLE && groups.are_flat(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
             } else if hole.part <= SMALL_HOLE {
-                closed.extend(groups.closed_solid(scene, &parts, members));
+                closed.extend(groups.closed_solid_if_cavity_candidate(scene, &parts, members));
             }
         }
         for (cavity, around) in cavities(scene, meshes, parts.origin, &closed, token)? {
@@ -169,7 +169,7 @@ impl GlassSolids {
 
     /// Objects of closed solids that enclose no volume because every face is duplicated with the opposite
     /// orientation.
-    pub fn flat_objects(&self) -> &[u32] {
+    pub fn zero_volume_objects(&self) -> &[u32] {
         &self.flat
     }
 
@@ -180,7 +180,7 @@ impl GlassSolids {
 }
 
 /// Whether opaque surfaces surround each hole.
-fn are_holes_covered(
+fn covered_flag_of_each_hole(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
@@ -268,7 +268,12 @@ impl PartGroups {
 
     /// Returns the solid if it may be a cavity or contain one. `None` unless it consists only of consistently
     /// oriented meshes.
-    fn closed_solid(&self, scene: &Scene, parts: &GlassParts, members: &[u32]) -> Option<ClosedSolid> {
+    fn closed_solid_if_cavity_candidate(
+        &self,
+        scene: &Scene,
+        parts: &GlassParts,
+        members: &[u32],
+    ) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
         let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
         let do_agree = members.iter().all(|&part| !self.flips[part as usize]);
@@ -318,7 +323,7 @@ impl Hole {
         all: &[Vec<u32>],
         shared_edges: &SharedEdges,
     ) -> Vec<Self> {
-        let mut own: HashMap<u32, Vec<OpenEdge>> = HashMap::new();
+        let mut own: HashMap<u32, Vec<RimEdgeWithEndpointIds>> = HashMap::new();
         for open in &shared_edges.open {
             own.entry(groups.roots[open.0.part as usize]).or_default().push(*open);
         }
@@ -333,7 +338,7 @@ impl Hole {
         parts: &GlassParts,
         groups: &PartGroups,
         members: &[u32],
-        mut own: Vec<OpenEdge>,
+        mut own: Vec<RimEdgeWithEndpointIds>,
     ) -> Self {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };

@@ -67,7 +67,7 @@ impl GlassParts {
             let Some(glass) = object_glass_triangles(scene, meshes, object) else { continue };
             token.check()?;
             if parts.list.is_empty() {
-                parts.origin = reference_point(&object.shape, meshes);
+                parts.origin = point_on_or_inside_shape(&object.shape, meshes);
             }
             let first = parts.list.len();
             if let Some(mesh) = object.shape.mesh() {
@@ -78,7 +78,7 @@ impl GlassParts {
                 parts.add_open_surface(number, &sheet);
             }
             for part in &mut parts.list[first..] {
-                part.substance = find_glass_medium_key(scene, meshes, object);
+                part.substance = glass_medium_key_of_object(scene, meshes, object);
             }
         }
         Ok(parts)
@@ -202,7 +202,7 @@ impl GlassParts {
 }
 
 /// Returns a point on or inside a shape.
-fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
+fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     let of_mesh = |placed: &MeshReference| {
         let mesh = &meshes[placed.file].mesh;
         let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
@@ -236,7 +236,7 @@ pub(super) fn object_glass_triangles(
 }
 
 /// The type of glass that an object is made of.
-fn find_glass_medium_key(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassMediumKey {
+fn glass_medium_key_of_object(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassMediumKey {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.glass_medium_identity(),
         (None, Some(mesh)) => {

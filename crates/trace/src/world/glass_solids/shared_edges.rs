@@ -11,13 +11,13 @@ use crate::math::DVec3;
 const SAME_ANGLE: f64 = 1e-3;
 
 /// A rim edge with the ids of its endpoints.
-pub(super) type OpenEdge = (RimEdge, [u32; 2]);
+pub(super) type RimEdgeWithEndpointIds = (RimEdge, [u32; 2]);
 
 /// An edge shared by two parts, where the surface continues from one part to the other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SharedEdge {
     /// Both edges, and the ids of their endpoints.
-    pub rims: [OpenEdge; 2],
+    pub rims: [RimEdgeWithEndpointIds; 2],
     /// Whether the parts have opposite orientations.
     pub disagrees: bool,
 }
@@ -27,7 +27,7 @@ pub(super) struct SharedEdge {
 pub(super) struct SharedEdges {
     pub joined: Vec<SharedEdge>,
     /// Open edges, and the ids of their endpoints.
-    pub open: Vec<OpenEdge>,
+    pub open: Vec<RimEdgeWithEndpointIds>,
 }
 
 /// A rim edge normalized for matching.
@@ -42,7 +42,7 @@ struct NormalizedRimEdge {
 }
 
 impl NormalizedRimEdge {
-    fn open_edge(&self) -> OpenEdge {
+    fn open_edge(&self) -> RimEdgeWithEndpointIds {
         let [low, high] = self.places;
         (self.rim, if self.is_back { [high, low] } else { [low, high] })
     }
@@ -62,7 +62,7 @@ impl SharedEdges {
         let mut edges = Self::default();
         let sites = EdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
-        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.rim_endpoint_ids(i)));
+        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim(i)));
         let open = edges.match_equal_edges(parts, halves.collect());
         token.check()?;
         // Split the remaining edges at the endpoints of other edges, and match again.
@@ -72,8 +72,12 @@ impl SharedEdges {
     }
 
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
-    fn match_equal_edges(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
-        let half = |(rim, [from, to]): OpenEdge| NormalizedRimEdge {
+    fn match_equal_edges(
+        &mut self,
+        parts: &[GlassPart],
+        rims: Vec<RimEdgeWithEndpointIds>,
+    ) -> Vec<RimEdgeWithEndpointIds> {
+        let half = |(rim, [from, to]): RimEdgeWithEndpointIds| NormalizedRimEdge {
             places: [from.min(to), from.max(to)],
             is_back: from > to,
             substance: parts[rim.part as usize].substance,
@@ -189,7 +193,7 @@ impl EdgeEndpoints {
         Ok(Self { points, tolerances, ends })
     }
 
-    fn rim_endpoint_ids(&self, rim: usize) -> [u32; 2] {
+    fn endpoint_ids_of_rim(&self, rim: usize) -> [u32; 2] {
         self.ends[rim]
     }
 
@@ -197,9 +201,9 @@ impl EdgeEndpoints {
     fn split_at_endpoints(
         &self,
         parts: &[GlassPart],
-        rims: &[OpenEdge],
+        rims: &[RimEdgeWithEndpointIds],
         token: &CancelToken,
-    ) -> Result<Vec<OpenEdge>, Cancelled> {
+    ) -> Result<Vec<RimEdgeWithEndpointIds>, Cancelled> {
         let mut ends: Vec<u32> = rims.iter().flat_map(|&(_, ends)| ends).collect();
         ends.sort_unstable();
         ends.dedup();
