@@ -482,3 +482,18 @@ fn paths_may_be_invalid_utf8() {
     let written = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.png");
     assert!(dir.0.path().join(written).is_file());
 }
+
+#[test]
+fn models_with_invalid_names_are_rejected() {
+    use std::os::unix::ffi::OsStringExt;
+    let dir = TestDir::new();
+    let name = std::ffi::OsString::from_vec(b"\xff.obj".to_vec());
+    // Some file systems only allow UTF-8.
+    if fs::write(dir.0.path().join(&name), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").is_err() {
+        return;
+    }
+    let mut process = dir.glimt("--once -o ball.png");
+    let output = process.arg(&name).output().expect("it runs");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && stderr.contains("UTF-8"), "{stderr}");
+}

@@ -291,6 +291,19 @@ fn server_exit_code_depends_on_shutdown() {
 }
 
 #[test]
+fn pipes_as_documents_do_not_block_the_server() {
+    let dir = TestDir::new();
+    let pipe = dir.path("pipe.toml");
+    nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+    let open = format!(
+        r#"{{"jsonrpc":"2.0","method":"textDocument/didOpen","params":{{"textDocument":{{"uri":"file://{}","languageId":"toml","version":1,"text":""}}}}}}"#,
+        pipe.display()
+    );
+    let (code, said, _) = answers(&[INITIALIZE, &open, SHUTDOWN, EXIT]);
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
 fn excessive_content_length_is_an_error() {
     let (code, _, said) = answers(&[INITIALIZE, "Content-Length: 1000000000000\r\n\r\n{}"]);
     assert!(code == Some(1) && said.contains("1000000000000 bytes") && said.lines().count() == 1, "{said}");

@@ -33,6 +33,7 @@ use std::sync::Arc;
 pub use changes::{MOST_COMPARED_BYTES, list_changes};
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
+pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
 pub use other_content::detect_non_scene;

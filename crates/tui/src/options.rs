@@ -9,6 +9,7 @@ use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{ContentChange, ExternalChange, OutputChange, WatchEvent};
+use crate::system::describe_error;
 
 choice! {
     /// How to draw the preview.
@@ -115,7 +116,7 @@ pub enum TuiError {
         stream: &'static str,
     },
     /// The terminal could not be set up or written to.
-    #[error("cannot {action} the terminal: {source}; `--once` renders without one")]
+    #[error("cannot {action} the terminal: {}; `--once` renders without one", describe_error(source))]
     Terminal {
         /// The operation that failed.
         action: &'static str,

@@ -5,6 +5,7 @@
 //! is blocked.
 
 use std::cell::Cell;
+use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -158,7 +159,16 @@ pub(super) fn restore_modes() {
     }
 }
 
+/// The terminal, opened during setup, so that restoring it does not need another file descriptor.
+static OUTPUT: Mutex<Option<File>> = Mutex::new(None);
+
+fn take_output() -> Option<File> {
+    OUTPUT.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
 fn set_up_terminal() -> io::Result<()> {
+    let output = writer::open_output()?;
+    *OUTPUT.lock().unwrap_or_else(PoisonError::into_inner) = Some(output);
     enable_raw_mode()?;
     RAW.store(true, Ordering::Release);
     TAKEN.store(true, Ordering::Release);
@@ -189,7 +199,7 @@ fn leave_screen() {
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
-        .and_then(|()| writer::open_output())
+        .and_then(|()| take_output().map_or_else(writer::open_output, Ok))
         .and_then(|mut out| writer::write_until_given_up(&mut out, &bytes, is_late));
 }
 
@@ -202,8 +212,8 @@ pub(super) fn restore_from_other_thread() {
     if TAKEN.swap(false, Ordering::AcqRel) {
         writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
-            let tty = std::fs::OpenOptions::new().write(true).open("/dev/tty");
-            tty.and_then(|mut tty| write_restore(&mut tty))
+            let tty = File::options().write(true).open("/dev/tty");
+            tty.or_else(|error| take_output().ok_or(error)).and_then(|mut tty| write_restore(&mut tty))
         });
     }
 }

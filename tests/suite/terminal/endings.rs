@@ -41,6 +41,19 @@ fn keys_and_signals_restore_the_terminal() {
 }
 
 #[test]
+fn terminal_is_restored_without_free_descriptors() {
+    let folder = Folder::new();
+    for limit in 4..=16 {
+        let script = format!("ulimit -n {limit} && exec \"$0\" scene.toml");
+        let mut terminal = folder.terminal_with(&["sh", "-c", &script, folder.program()], &[]);
+        // The program either cannot start or, with more descriptors, runs until this key.
+        terminal.press("q");
+        let code = terminal.end();
+        assert!(code <= 2 || code == 127, "ulimit -n {limit}: exit code {code}");
+    }
+}
+
+#[test]
 fn abort_restores_the_terminal_and_is_reported() {
     let folder = Folder::new();
     let terminal = folder.terminal();

@@ -100,8 +100,8 @@ impl StagingFolder {
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // Ignore errors. The next writer tries again.
-        let _ = remove_folder_and_contents(&self.path);
+        // Ignore errors. The next writer tries again. Removing an empty folder needs no file descriptors.
+        let _ = fs::remove_dir(&self.path).or_else(|_| remove_folder_and_contents(&self.path));
     }
 }
 

@@ -502,6 +502,10 @@ impl Engine {
         let lookups = combined_texture_needs(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) =
             self.load_assets(&parsed, lookups, findings, table, &reading)?;
+        // Parts that were rendered from a half-written file could be merged.
+        if plan.shard.is_some() {
+            contents.wait_for_writers(token)?;
+        }
         verify_files_unchanged(contents, token)?;
         let estimate =
             MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);

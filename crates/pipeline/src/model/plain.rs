@@ -15,9 +15,10 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::quote_toml_string;
+use crate::scene::{MORE_LIKE_THESE, quote_toml_string};
 use crate::settings::{UpAxis, ViewSide};
 use crate::stages::containers::GltfContainers;
+use crate::stages::meshes::MAX_WARNINGS;
 
 /// Default up axis: z for STL (the CAD and 3D printing convention) and for PLY files exported by Blender, y
 /// for all others.
@@ -148,17 +149,33 @@ pub(super) fn scene_text(
     }
     write_ground(&mut toml, &mut names, bounds, &eye);
     // The generated material hides the fact that the file has no materials, so report it here.
-    let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
+    let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
     notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
     containers.store_mesh_for_next_load(path, loaded);
     Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })
 }
 
+/// Returns the first warnings, followed by the number of the others.
+fn first_warnings(warnings: &[String]) -> Vec<String> {
+    let more = warnings.len().saturating_sub(MAX_WARNINGS);
+    let rest = (more > 0).then(|| format!("and {more} {MORE_LIKE_THESE}"));
+    warnings.iter().take(MAX_WARNINGS).cloned().chain(rest).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::transform::rotation_xyz;
+
+    #[test]
+    fn long_lists_of_warnings_are_shortened() {
+        let warnings: Vec<_> = (0..MAX_WARNINGS + 7).map(|number| number.to_string()).collect();
+        let shown = first_warnings(&warnings);
+        assert_eq!(shown[..MAX_WARNINGS], warnings[..MAX_WARNINGS]);
+        assert_eq!(shown[MAX_WARNINGS..], [format!("and 7 {MORE_LIKE_THESE}")]);
+        assert_eq!(first_warnings(&warnings[..MAX_WARNINGS]), warnings[..MAX_WARNINGS]);
+    }
 
     #[test]
     fn up_axis_matches_scene_rotation() {

@@ -329,7 +329,7 @@ impl<'a> MeshWarnings<'a> {
 }
 
 /// Maximum number of warnings about all mesh files.
-const MAX_WARNINGS: usize = 100;
+pub(crate) const MAX_WARNINGS: usize = 100;
 
 fn add_warnings(loaded: &LoadedScene, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
     let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);

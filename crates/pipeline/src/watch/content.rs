@@ -1,10 +1,11 @@
 //! File contents, identified by hashes that are recomputed only if the file may have changed.
 
 use std::collections::HashMap;
+use std::fs;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use super::outputs::WrittenOutputs;
 use crate::assets::{Companion, FileHash};
@@ -179,6 +180,28 @@ impl Snapshot {
         Ok(())
     }
 
+    /// Waits until the last change to any file is at least [`SETTLE_TIME`] old, so that
+    /// [`Self::recheck_seen_files`] also detects a program that is still writing.
+    ///
+    /// # Errors
+    /// Returns [`Cancelled`] if the token is cancelled.
+    pub(crate) fn wait_for_writers(&self, token: &CancelToken) -> Result<(), Cancelled> {
+        let begun = Instant::now();
+        loop {
+            let now = SystemTime::now();
+            let is_young = |path: &PathBuf| {
+                let changed = fs::metadata(path).and_then(|found| found.modified());
+                let age = changed.ok().and_then(|changed| now.duration_since(changed).ok());
+                age.is_some_and(|age| age < SETTLE_TIME)
+            };
+            if begun.elapsed() > SETTLE_TIME || !self.lock_seen_files().keys().any(is_young) {
+                return Ok(());
+            }
+            token.check()?;
+            std::thread::sleep(SETTLE_TIME / 20);
+        }
+    }
+
     fn record_change(&self, path: &Path) {
         *self.changed.lock().unwrap_or_else(PoisonError::into_inner) = Some(path.to_owned());
     }
@@ -197,6 +220,9 @@ impl Snapshot {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+/// Time after which a file that has not changed is assumed to be complete.
+const SETTLE_TIME: Duration = Duration::from_millis(100);
 
 /// Content to use for a file that is too long to hash.
 fn content_id_from_stamp(stamp: &FileStamp) -> FileContentId {
@@ -425,6 +451,18 @@ mod tests {
             // A file with a settled stamp is not read again.
             assert_eq!(snapshot.changed_file(), (!is_settled).then(|| path.clone()));
         }
+    }
+
+    #[test]
+    fn new_files_settle_before_they_are_trusted() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        fs::write(&path, "half").expect("written");
+        let (snapshot, token) = (Snapshot::new(Arc::default()), CancelToken::new());
+        snapshot.read_content_id(&path, &token).expect("not cancelled");
+        snapshot.wait_for_writers(&token).expect("not cancelled");
+        let modified = fs::metadata(&path).and_then(|found| found.modified()).expect("metadata");
+        assert!(modified.elapsed().is_ok_and(|age| age >= SETTLE_TIME));
     }
 
     #[test]

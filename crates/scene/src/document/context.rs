@@ -215,7 +215,7 @@ impl<'a> FileContext<'a> {
 }
 
 /// End of the message that reports how many issues are not listed.
-pub(crate) const MORE_LIKE_THESE: &str = "more like these";
+pub const MORE_LIKE_THESE: &str = "more like these";
 
 /// Maximum number of issues listed.
 const MAX_ISSUES: usize = 500;

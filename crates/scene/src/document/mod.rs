@@ -30,8 +30,7 @@ use context::{FileContext, Issue};
 use table::TableReader;
 
 pub(super) use camera::FOV_DEGREES;
-#[cfg(test)]
-pub(super) use context::MORE_LIKE_THESE;
+pub use context::MORE_LIKE_THESE;
 #[cfg(test)]
 pub(super) use materials::ENERGY_GAIN;
 pub(super) use shapes::has_mesh_extension;

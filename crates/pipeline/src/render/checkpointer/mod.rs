@@ -4,6 +4,7 @@ mod lock;
 mod state;
 
 use std::cell::{Cell, OnceCell, RefCell};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -27,6 +28,7 @@ use crate::protocol::CheckpointUpdate;
 use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::StopReason;
+use crate::system::describe_error;
 
 /// Checkpointing may take at most `1/TIME_SHARE` of the render time.
 const TIME_SHARE: u32 = 100;
@@ -134,7 +136,7 @@ impl<'a> Checkpointer<'a> {
             ResumeMode::No | ResumeMode::Asked | ResumeMode::IfSame => {}
         }
         if resume != ResumeMode::Asked && !part::is_part(&self.path) {
-            self.report_failure(&format!("{} {}", self.path.display(), messages::NOT_A_CHECKPOINT));
+            self.report_failure(&format!("{} {}", self.path.display(), foreign_file_problem(&self.path)));
             return Ok(true);
         }
         if resume == ResumeMode::No {
@@ -442,7 +444,7 @@ impl<'a> Checkpointer<'a> {
                 Ok(_) if !part::is_part(at) || inputs.contain(at) => refused(format!(
                     "cannot write {}: the existing file {}",
                     path.display(),
-                    messages::NOT_A_CHECKPOINT
+                    foreign_file_problem(at)
                 )),
                 Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartKind::Part) => {
                     Err(OutputError::Refused { reason: finished_part_conflict_message(path) })
@@ -512,4 +514,11 @@ fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, SavedRenderState)> 
     file.check_kind(PartKind::Checkpoint).ok()?;
     let state: SavedRenderState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))
+}
+/// Describes why a file does not count as a checkpoint: its content, or an error when opening it.
+fn foreign_file_problem(path: &Path) -> String {
+    File::open(path).map_or_else(
+        |error| format!("cannot be read: {}", describe_error(&error)),
+        |_| messages::NOT_A_CHECKPOINT.to_owned(),
+    )
 }

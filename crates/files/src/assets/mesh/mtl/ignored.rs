@@ -70,6 +70,7 @@ const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for
 const TR_IGNORED: &str = "`Tr` is ignored because `d` takes precedence";
 const OPACITY_MAP: &str = "the opacity map replaces `d`";
 pub(super) const FILTER_IGNORED: &str = "`Tf` is ignored; use `tint` in a material of the scene";
+pub(super) const BLACK_EMISSION: &str = "`map_Ke` has no effect because `Ke` is 0";
 const NO_HIGHLIGHT: &str = "`Ks` has no effect unless `Ns` is above 0";
 pub(super) const GAINS_ENERGY: &str =
     "the material reflects more light than it receives; keep `Kd` and `Ks` at or below 1";
@@ -265,7 +266,12 @@ fn warn_about_map(
         MapKind::Bump if found.map(MapKind::Normal).is_some() => return add(line, SECOND_NORMAL_MAP),
         MapKind::Diffuse => converted.diffuse_texture.as_ref(),
         MapKind::Specular => converted.specular_texture.as_ref(),
-        MapKind::Emission => converted.emission_texture.as_ref(),
+        MapKind::Emission => {
+            if converted.emission == Vec3::ZERO {
+                return add(line, BLACK_EMISSION);
+            }
+            converted.emission_texture.as_ref()
+        }
         MapKind::Opacity => converted.opacity_texture.as_ref(),
         MapKind::Normal | MapKind::Bump => converted.normal_texture.as_ref(),
         MapKind::Roughness => physical.and_then(|own| own.roughness_texture.as_ref()),

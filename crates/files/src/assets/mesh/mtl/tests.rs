@@ -1,8 +1,9 @@
 //! Tests for MTL statements and their conversion to materials.
 
 use super::ignored::{
-    AMBIENT_MAP, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY, INVISIBLE_GLASS,
-    SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, ignored_statement_warning, unsupported_map_warning,
+    AMBIENT_MAP, BLACK_EMISSION, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY,
+    INVISIBLE_GLASS, SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, ignored_statement_warning,
+    unsupported_map_warning,
 };
 use super::map::ignored_option_warning;
 use super::statements::{
@@ -318,6 +319,7 @@ fn ignored_statements_are_reported_with_line() {
         ("illum 99\n", 2, UNKNOWN_MODEL.to_owned()),
         ("illum 4\n", 2, INVISIBLE_GLASS.to_owned()),
         ("d .5\nTf 1 0 0\n", 3, FILTER_IGNORED.to_owned()),
+        ("Ke 0 0 0\nmap_Ke a.png\n", 3, BLACK_EMISSION.to_owned()),
         ("Kd 1 1 1\nillum 2\nd 1\nTf 0 1 0\n", 5, FILTER_IGNORED.to_owned()),
         ("Kd 255 0 0\n", 2, GAINS_ENERGY.to_owned()),
         ("Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n", 2, GAINS_ENERGY.to_owned()),
