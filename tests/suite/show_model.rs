@@ -367,7 +367,7 @@ fn strict_import_rejects_approximations() {
     dir.write("a.glb", glb.finish(json!({
         "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [{"extensions": extensions}], "animations": [{}]
     })));
-    let said = dir.expect("import a.glb -o strict.toml --strict", 1);
+    let said = dir.expect("import a.glb -o strict.toml --strict", 2);
     assert_mentions(&said, &["materials[0]", "sheen", "2 approximations", "--strict"]);
     assert!(!dir.path("strict.toml").exists() && !dir.path("strict_files").exists());
     dir.expect("import a.glb", 0);

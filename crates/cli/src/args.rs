@@ -281,8 +281,8 @@ The scene renders like `glimt FILE`. Its meshes and images are in a folder with 
 that glimt lacks are approximated, with a warning and a comment in the scene. 1 cd is converted to 1 W/sr, 1 lx to \
 1 W/m2.
 
-Exit codes: 0 success; 1 the scene could not be written, or --strict and something is approximated; 2 the file is \
-invalid, or the scene exists already.";
+Exit codes: 0 success; 1 the scene could not be written; 2 the file is invalid, the scene exists already, or --strict \
+and something is approximated.";
 
 /// Arguments of `import`.
 #[derive(Clone, Debug, clap::Args)]

@@ -154,7 +154,8 @@ pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) 
 
 /// `64 samples`, or `16 to 32 samples`.
 fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> String {
-    if min == max { format!("{max} samples") } else { format!("{min} to {max} samples") }
+    let s = if max == 1 { "" } else { "s" };
+    if min == max { format!("{max} sample{s}") } else { format!("{min} to {max} sample{s}") }
 }
 
 fn view_prefix(view: ViewMode) -> String {

@@ -46,8 +46,11 @@ fn terminal_is_restored_without_free_descriptors() {
     for limit in 4..=16 {
         let script = format!("ulimit -n {limit} && exec \"$0\" scene.toml");
         let mut terminal = folder.terminal_with(&["sh", "-c", &script, folder.program()], &[]);
-        // The program either cannot start or, with more descriptors, runs until this key.
-        terminal.press("q");
+        // The program either cannot start or, with more descriptors, runs until it reads this key.
+        while !terminal.has_ended() {
+            terminal.press("q");
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
         let code = terminal.end();
         assert!(code <= 2 || code == 127, "ulimit -n {limit}: exit code {code}");
     }

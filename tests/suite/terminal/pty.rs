@@ -276,6 +276,11 @@ impl Terminal {
         self.is_reading.store(reading, Ordering::Release);
     }
 
+    /// Whether the program has exited.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_some()
+    }
+
     /// Waits for the program to exit, and returns its exit code.
     #[track_caller]
     pub fn code(&mut self) -> u32 {

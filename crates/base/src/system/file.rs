@@ -4,6 +4,7 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 /// Magic bytes of image parts and checkpoints, also recognized by readers of other file types.
 pub const PART_MAGIC: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
@@ -67,6 +68,13 @@ pub struct FileStamp {
 }
 
 impl FileStamp {
+    /// Time of the last change to the content or metadata. `None` for times before 1970.
+    pub fn last_change(&self) -> Option<SystemTime> {
+        let (seconds, nanoseconds) = self.modified.max(self.changed);
+        let since_1970 = Duration::new(seconds.try_into().ok()?, nanoseconds.try_into().ok()?);
+        SystemTime::UNIX_EPOCH.checked_add(since_1970)
+    }
+
     /// Creates the stamp from a file's metadata.
     pub fn new(metadata: &Metadata) -> Self {
         Self {

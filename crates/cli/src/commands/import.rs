@@ -57,7 +57,7 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     report_approximations(&args.file, &imported.notes, console);
     if args.strict && !imported.notes.is_empty() {
         let what = format_count(imported.notes.len() as u64, "approximation");
-        return console.print_error(Exit::FAILED, &format!("{what} with --strict: nothing was written"));
+        return console.print_error(Exit::WRONG, &format!("{what} with --strict: nothing was written"));
     }
     match write_all(&scene, &imported, token) {
         Ok(()) => {

@@ -103,10 +103,6 @@ pub(crate) fn scene_text(
     containers: &GltfContainers,
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
-    if path.file_name().is_some_and(|name| name.to_str().is_none()) {
-        let reason = "its name is not valid UTF-8; rename the file".to_owned();
-        return Err(AssetError::Unreadable { path: path.to_owned(), reason });
-    }
     if is_gltf(path) {
         if show.up.is_some_and(|up| up != UpAxis::Y) {
             let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();

@@ -1,7 +1,6 @@
 //! File contents, identified by hashes that are recomputed only if the file may have changed.
 
 use std::collections::HashMap;
-use std::fs;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -190,8 +189,8 @@ impl Snapshot {
         loop {
             let now = SystemTime::now();
             let is_young = |path: &PathBuf| {
-                let changed = fs::metadata(path).and_then(|found| found.modified());
-                let age = changed.ok().and_then(|changed| now.duration_since(changed).ok());
+                let last_change = FileStamp::from_path(path).and_then(|stamp| stamp.last_change());
+                let age = last_change.and_then(|change| now.duration_since(change).ok());
                 age.is_some_and(|age| age < SETTLE_TIME)
             };
             if begun.elapsed() > SETTLE_TIME || !self.lock_seen_files().keys().any(is_young) {

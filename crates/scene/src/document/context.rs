@@ -1,6 +1,7 @@
 //! Context shared by all readers of a file: its source text, its path, and the issues found so far.
 
 use std::cell::{Cell, OnceCell, RefCell};
+use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -173,6 +174,11 @@ impl<'a> FileContext<'a> {
 
     /// Resolves a path relative to the scene's folder.
     pub(super) fn resolve_path(&self, file: &str) -> PathBuf {
+        // The scene generated for a model refers to the model. Text cannot contain all names.
+        let is_own_name = |name: &OsStr| name.to_str().is_none() && name.to_string_lossy() == file;
+        if self.path.file_name().is_some_and(is_own_name) {
+            return self.path.to_owned();
+        }
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
