@@ -496,7 +496,7 @@ fn models_open_despite_names_that_are_not_utf8() {
     // The name that the others have if they are converted to text.
     dir.write("\u{fffd}.obj", "v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     let render = |name: &Path| {
-        let mut process = dir.glimt("--once --progress none --width 32 --samples 4 -o model.ppm");
+        let mut process = dir.glimt("--once --progress none --width 32 --height 24 --samples 4 -o model.ppm");
         let output = process.arg(name).output().expect("it runs");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let image = dir.bytes("model.ppm");
@@ -504,7 +504,7 @@ fn models_open_despite_names_that_are_not_utf8() {
         image
     };
     fs::copy(dir.0.path().join(names[0]), dir.path("plain.obj")).expect("copied");
-    let pixels = |image: Vec<u8>| image.into_iter().rev().take(32 * 16 * 3).collect::<Vec<_>>();
+    let pixels = |image: Vec<u8>| image.into_iter().rev().take(32 * 24 * 3).collect::<Vec<_>>();
     let [first, second, plain] =
         [names[0], names[1], Path::new("plain.obj")].map(|name| pixels(render(name)));
     assert!(first == plain && first != second);
