@@ -4,7 +4,6 @@ mod lock;
 mod state;
 
 use std::cell::{Cell, OnceCell, RefCell};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -29,6 +28,7 @@ use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::StopReason;
 use crate::system::describe_error;
+use crate::system::file::open_regular_file;
 
 /// Checkpointing may take at most `1/TIME_SHARE` of the render time.
 const TIME_SHARE: u32 = 100;
@@ -517,7 +517,8 @@ fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, SavedRenderState)> 
 }
 /// Describes why a file does not count as a checkpoint: its content, or an error when opening it.
 fn foreign_file_problem(path: &Path) -> String {
-    File::open(path).map_or_else(
+    // Opening a pipe would block.
+    open_regular_file(path).map_or_else(
         |error| format!("cannot be read: {}", describe_error(&error)),
         |_| messages::NOT_A_CHECKPOINT.to_owned(),
     )
