@@ -38,6 +38,7 @@ mod shell;
 mod show_model;
 mod stress;
 mod terminal;
+mod surfaces;
 mod test_dir;
 mod threads;
 mod turntable;

@@ -522,6 +522,11 @@ fn scheduler_scripts_are_valid() {
     assert_mentions(&said, &[".xyz", ".exr"]);
     let said = dir.expect("farm room.toml -o out.exr --shards 4 --engine slurm -- --sample 3", 2);
     assert_mentions(&said, &["`--`", "--sample"]);
+    let mut process = dir.glimt("farm room.toml --shards 4 --engine slurm -o");
+    let output = process.arg("a\u{1b}[31m.exr").output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(output.stdout.is_empty() && !said.contains('\u{1b}'), "control characters must be escaped: {said:?}");
     let said = dir.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
     assert_mentions(&said, &["error:", "none.toml"]);
 }
