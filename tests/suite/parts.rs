@@ -526,7 +526,10 @@ fn scheduler_scripts_are_valid() {
     let output = process.arg("a\u{1b}[31m.exr").output().expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(output.stdout.is_empty() && !said.contains('\u{1b}'), "control characters must be escaped: {said:?}");
+    assert!(
+        output.stdout.is_empty() && !said.contains('\u{1b}'),
+        "control characters must be escaped: {said:?}"
+    );
     let said = dir.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
     assert_mentions(&said, &["error:", "none.toml"]);
 }

@@ -94,7 +94,8 @@ fn huge_triangles_shade_like_planes() {
     };
     let plane = render(&dir, &scene("[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n"));
     for size in [1e4, 1e7] {
-        let triangle = format!("[[triangle]]\na = [-{size}, 0, {size}]\nb = [{size}, 0, {size}]\nc = [0, 0, -{size}]\n");
+        let triangle =
+            format!("[[triangle]]\na = [-{size}, 0, {size}]\nb = [{size}, 0, {size}]\nc = [0, 0, -{size}]\n");
         let image = render(&dir, &scene(&triangle));
         // Silhouettes against the horizon may differ, because the triangle ends.
         let differ = image.iter().zip(&plane).filter(|(a, b)| a.abs_diff(**b) > 2).count();

@@ -626,8 +626,8 @@ fn choice_long_help<C: Choice>(about: &str) -> String {
 /// Returns the long help for `--output`, with the extensions of all supported formats.
 fn outputs_help() -> String {
     // Skip jpeg: it is the same format as jpg.
-    let still: Vec<_> = Format::extensions().filter(|ending| *ending != "jpeg").collect();
-    let moving: Vec<_> = AnimationFormat::extensions().collect();
+    let still: Vec<_> = Format::known_extensions().filter(|ending| *ending != "jpeg").collect();
+    let moving: Vec<_> = AnimationFormat::known_extensions().collect();
     format!(
         "Output file; can be given several times\n\n\
          The extension determines the format: {}; with --turntable also {}. The default is the scene's `output`, relative to \

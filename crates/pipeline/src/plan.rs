@@ -111,9 +111,9 @@ pub(super) fn resolve_plan(
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
             outputs.iter().try_for_each(check)?;
             check_layers(&outputs, &moving, settings.view, overrides)?;
-            moving
-                .iter()
-                .try_for_each(|path| check_animation(path, (render.width, render.height), bit_depth))?;
+            moving.iter().try_for_each(|path| {
+                check_animation_format(path, (render.width, render.height), bit_depth)
+            })?;
         }
     }
     Ok(RenderPlan {
@@ -261,7 +261,7 @@ fn check_layers(
 }
 
 /// Checks that an animation format supports the image size and bit depth.
-fn check_animation(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+fn check_animation_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
         Err(error) => error.to_string(),
@@ -456,7 +456,7 @@ mod tests {
             std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
             crate::scene::load(&path, &[])
         };
-        for ending in Format::extensions() {
+        for ending in Format::known_extensions() {
             assert!(load(ending).is_ok(), "{ending}");
         }
         let wrong = format!("{:?}", load("xyz").expect_err("an unknown format"));
@@ -464,7 +464,7 @@ mod tests {
         for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
             assert_eq!(
                 offered.contains(ending),
-                Format::extensions().any(|known| known == ending),
+                Format::known_extensions().any(|known| known == ending),
                 "{ending}: {wrong}"
             );
         }

@@ -450,12 +450,12 @@ pub struct LatestPreview {
     /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview shows. `None` if the preview lacks light from photons.
-    pub source: Option<PreviewSource>,
+    pub source: Option<PreviewImageState>,
 }
 
 /// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PreviewSource {
+pub struct PreviewImageState {
     /// Previews with the same key show the same image, although their sizes and sample counts may differ.
     pub image: Fingerprint,
     /// Whether the image has all of its samples.

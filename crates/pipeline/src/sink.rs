@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, LatestPreview, NormalizedRect, PreviewSlot, PreviewSource,
+    AssetProgress, CheckpointUpdate, Event, LatestPreview, NormalizedRect, PreviewImageState, PreviewSlot,
     RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
 };
 use super::watch::content::FileRead;
@@ -94,7 +94,7 @@ impl EventSink {
         picture: Srgb8Image,
         range: Option<[f32; 2]>,
         section: Option<NormalizedRect>,
-        source: PreviewSource,
+        source: PreviewImageState,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
         self.replace_preview_and_notify(LatestPreview {

@@ -69,7 +69,7 @@ impl TileJob {
 }
 
 impl Tracer<'_> {
-    fn trace(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
+    fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
         let Self { kernel, world, settings, token, photons, first, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
         let begin = thread_cpu_seconds();
@@ -103,7 +103,7 @@ impl Tracer<'_> {
                     let (mut done, mut since) = (Vec::new(), Instant::now());
                     while !stopped.load(Ordering::Relaxed)
                         && let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed))
-                        && let Ok((samples, cost)) = self.trace(job)
+                        && let Ok((samples, cost)) = self.trace_tile(job)
                     {
                         done.push((job, keep(job, samples), cost));
                         if since.elapsed() >= AT_ONCE {

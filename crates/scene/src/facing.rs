@@ -71,14 +71,14 @@ fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
     shape.max_projection_onto(direction).unwrap_or_else(|| {
         let of = |mesh: &MeshReference| {
-            Some(bounding_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))
+            Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))
         };
         shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
     })
 }
 
 /// Returns the transformed corners of a mesh's bounding box.
-fn bounding_box_corners(mesh: &MeshReference, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
+fn transformed_box_corners(mesh: &MeshReference, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);

@@ -110,7 +110,7 @@ fn describe_files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
-            let names: Vec<_> = files.iter().map(WrittenFile::name).collect();
+            let names: Vec<_> = files.iter().map(WrittenFile::display_path).collect();
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
@@ -134,7 +134,7 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
             (true, true) => "; before that, wrote ",
             (false, _) => "; wrote an earlier image to ",
         };
-        words += &written.name();
+        words += &written.display_path();
     }
     words
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::film::Srgb8Image;
 use crate::messages;
-use crate::pipeline::protocol::{NormalizedRect, PreviewSource};
+use crate::pipeline::protocol::{NormalizedRect, PreviewImageState};
 use crate::rescale::resized;
 use crate::state::ImageProvenance;
 
@@ -28,7 +28,7 @@ pub(crate) struct ShownImage {
     /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview belongs to. `None` if unknown.
-    pub source: Option<PreviewSource>,
+    pub source: Option<PreviewImageState>,
 }
 
 impl ShownImage {
@@ -530,7 +530,7 @@ mod tests {
 
     /// A preview of a finished or unfinished image, and the image's origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageProvenance) {
-        let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
+        let source = Some(PreviewImageState { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
         let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageProvenance { is_unfinished: !is_finished, ..ImageProvenance::default() };

@@ -238,12 +238,12 @@ fn prepare_restore_on_abort() {
         let _ = write_image_deletion(&mut delete_images).and_then(|()| write_frame_end_and_leave(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
-    abort::set_terminal_restore(restore_on_abort);
+    abort::set_terminal_restore(restore_terminal_while_aborting);
 }
 
 /// Restores the terminal using only async-signal-safe calls, without locks or allocations. If the terminal
 /// does not accept output, waits no longer than [`STUCK`].
-fn restore_on_abort() {
+fn restore_terminal_while_aborting() {
     let Some(words) = LAST_WORDS.get() else { return };
     if TAKEN.swap(false, Ordering::AcqRel) {
         let out = io::stdout();

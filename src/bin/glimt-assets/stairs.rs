@@ -28,7 +28,7 @@ pub(crate) fn stair_meshes() -> Vec<(&'static str, Surface)> {
         ("stairs/tread.ply", tread()),
         ("stairs/flight1.ply", first_flight()),
         ("stairs/flight2.ply", second_flight()),
-        ("stairs/gallery.ply", gallery()),
+        ("stairs/gallery.ply", gallery_floor()),
         ("stairs/baluster.ply", baluster()),
         ("stairs/newel.ply", newel()),
         ("stairs/rail1.ply", rail(FOOT, LANDING)),
@@ -83,7 +83,7 @@ fn second_flight() -> Surface {
 }
 
 /// The floor at the top, with a molding along its edge.
-fn gallery() -> Surface {
+fn gallery_floor() -> Surface {
     let [x, y, z] = GALLERY;
     join([
         beveled_box([x, y - 0.25, BACK_WALL], [RIGHT_WALL, y, z], 0.004),

@@ -21,8 +21,8 @@ use glimt::scene::description::{
     Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, NeededTextureRoleSet, World, WorldInputs, build_lights,
-    choose_origin_near_camera_target, separate_coincident_emitters, sky_map, textures_needed,
+    Geometry, Image, MeshTree, NeededTextureRoleSet, World, WorldInputs, build_environment_map, build_lights,
+    choose_origin_near_camera_target, separate_coincident_emitters, textures_needed,
 };
 
 use super::v;
@@ -244,7 +244,7 @@ impl Build {
         let origin = choose_origin_near_camera_target(&self.scene.camera, None);
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not cancelled"));
-        let sky = self.sky.as_ref().and_then(sky_map);
+        let sky = self.sky.as_ref().and_then(build_environment_map);
         let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
             .expect("not cancelled");
         World::new(&self.scene, &parts, geometry, lights)

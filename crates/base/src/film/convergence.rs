@@ -303,7 +303,7 @@ impl Convergence {
         level: usize,
         halves: &[usize],
     ) -> f64 {
-        expected_variance_reduction(
+        predict_variance_reduction(
             Self::variance_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
@@ -316,7 +316,7 @@ impl Convergence {
     /// the last step with a prediction from the two previous steps, because each step is noisy. However,
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
-    pub(super) fn variance(
+    pub(super) fn half_cell_variance(
         steps: &SquaredMeanChanges,
         (cell, half): (usize, usize),
         count: u32,
@@ -326,7 +326,7 @@ impl Convergence {
         let StepPair { last, before } = steps.step_pair(level, (cell, half), is_relative)?;
         let fall = Self::variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = expected_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
+        let rate = predict_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);
         let variance = match Self::estimate_variance_from_quadrupling(steps, level, (cell, half), is_relative)
         {
@@ -355,7 +355,7 @@ impl Convergence {
 
 /// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
 /// confidence in this measurement.
-fn expected_variance_reduction(fall: f64, trust: f64) -> f64 {
+fn predict_variance_reduction(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 

@@ -129,7 +129,8 @@ impl Film {
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
-        let (variance, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), samples, false)?;
+        let (variance, rate) =
+            Convergence::half_cell_variance(&tile.steps, (number % CELLS, half), samples, false)?;
         Some(CellHalfNoise {
             variance: variance / pixels,
             mean: sum / pixels,
@@ -140,7 +141,7 @@ impl Film {
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
     /// completed that doubling. `None` if there are not enough steps.
-    pub fn tile_variance_reduction(&self, tile: usize) -> Option<f64> {
+    pub fn last_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.lock_tile(tile);
         tile.steps.measured_variance_reduction(tile.steps.level_count(), &[0, 1])
     }
@@ -174,10 +175,10 @@ impl Film {
     /// `count` is a power of two. The error is the mean over the pixels of luminance variance / (luminance² +
     /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)). `None` if `count` is less than two or exceeds
     /// the pixels' sample count, or if the half has no pixels.
-    pub fn cell_half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
+    pub fn cell_half_relative_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
         let pixels = self.cell_half_pixel_count(number, half);
-        let (sum, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), count, true)?;
+        let (sum, rate) = Convergence::half_cell_variance(&tile.steps, (number % CELLS, half), count, true)?;
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
@@ -254,8 +255,8 @@ mod tests {
     fn halves_with_fewer_samples_are_ignored() {
         // Two pixels in different halves: one with steps of 1 and 0.5, the other with a single step of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
-        assert_eq!(film.tile_variance_reduction(0), Some(4.0));
-        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_variance_reduction(0), None, "one step");
+        assert_eq!(film.last_variance_reduction(0), Some(4.0));
+        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).last_variance_reduction(0), None, "one step");
     }
 
     #[test]

@@ -88,7 +88,7 @@ impl Previewer {
     /// Processes changed tiles until `deadline`, and returns whether all of them were processed. The next
     /// call continues with the remaining tiles. Without a deadline, processes all changes. Different calls
     /// may pass different films.
-    pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
+    pub fn refresh_changed_tiles(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
             self.shares = vec![TileContribution::default(); film.tile_count()];
@@ -254,7 +254,7 @@ mod tests {
 
     fn preview(film: &Film, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
         let mut previewer = Previewer::new(width, height);
-        assert!(previewer.update(film, None));
+        assert!(previewer.refresh_changed_tiles(film, None));
         previewer.build_image(base)
     }
 
@@ -306,7 +306,7 @@ mod tests {
         let mut previewer = Previewer::new(9, 5);
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
         let mut picture = |film: &Film| {
-            previewer.update(film, None);
+            previewer.refresh_changed_tiles(film, None);
             previewer.build_image(None)
         };
         assert_eq!(picture(&first), preview(&first, 9, 5, None));
@@ -366,12 +366,12 @@ mod tests {
         let slices = film.tile_count().div_ceil(TILES_AT_ONCE);
         for slice in 1..=slices {
             assert!(!previewer.has_processed_all_tiles());
-            assert!(!previewer.update(&film, Some(past)), "slice {slice}");
+            assert!(!previewer.refresh_changed_tiles(&film, Some(past)), "slice {slice}");
         }
         assert!(previewer.has_processed_all_tiles());
         assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
         // Changes to tiles before the current position are processed in the next pass.
-        previewer.update(&film, Some(past));
+        previewer.refresh_changed_tiles(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
         film.add_samples(
             0,
@@ -383,10 +383,10 @@ mod tests {
             },
         );
         for _ in 0..slices {
-            previewer.update(&film, Some(past));
+            previewer.refresh_changed_tiles(&film, Some(past));
         }
         assert!(previewer.has_processed_all_tiles());
         assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
-        assert!(previewer.update(&film, None));
+        assert!(previewer.refresh_changed_tiles(&film, None));
     }
 }

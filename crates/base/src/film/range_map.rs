@@ -63,7 +63,7 @@ impl RangeMap {
     }
 
     /// Maps the values of a pixel to brightness.
-    pub fn apply(&self, numbers: Vec3) -> Vec3 {
+    pub fn map_to_brightness(&self, numbers: Vec3) -> Vec3 {
         let each = |of: &dyn Fn(f32) -> f32| Vec3::from_array(numbers.to_array().map(of));
         match self {
             Self::None => numbers,
@@ -145,7 +145,7 @@ mod tests {
 
     fn shown(kind: DataKind, numbers: &[f32]) -> Vec<f32> {
         let map = RangeMap::Unresolved(kind).with_image_range(&picture(numbers));
-        numbers.iter().map(|x| map.apply(Vec3::splat(*x)).x).collect()
+        numbers.iter().map(|x| map.map_to_brightness(Vec3::splat(*x)).x).collect()
     }
 
     fn assert_near(values: &[f32], expected: &[f32]) {

@@ -159,7 +159,7 @@ impl Tile {
 
     /// Adds consecutive samples to a pixel in the specified cell and half. Returns the number of non-finite
     /// samples. `lobes` contains the weight of the negative lobes and one flag per sample.
-    fn add_samples(
+    fn add_pixel_samples(
         &mut self,
         (index, cell, half): (usize, usize, usize),
         radiances: &[Vec3],
@@ -344,7 +344,7 @@ impl Film {
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
             let half = pixel_index_in_rect(inside, x, y)
                 .map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
-            non_finite += tile.add_samples((index, cell, half), pixel, lobes, self.blocks);
+            non_finite += tile.add_pixel_samples((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;
         drop(guard);

@@ -201,7 +201,7 @@ fn snapshots_are_consistent_during_rendering() {
             while !done.load(Ordering::Acquire) {
                 let whole = film.radiance();
                 assert!(whole.pixels.iter().all(|p| *p == Vec3::ZERO || *p == Vec3::splat(2.0)));
-                previewer.update(&film, None);
+                previewer.refresh_changed_tiles(&film, None);
                 let small = previewer.build_image(None);
                 assert!(small.pixels.iter().all(|p| *p == Vec3::ZERO || (p.x - 2.0).abs() < 1e-5));
             }

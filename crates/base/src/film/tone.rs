@@ -78,7 +78,7 @@ impl ToneMapping {
     }
 
     fn apply_with_exposure(&self, radiance: Vec3, factor: f32) -> Vec3 {
-        let radiance = self.range_map.apply(radiance);
+        let radiance = self.range_map.map_to_brightness(radiance);
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
         match self.curve {

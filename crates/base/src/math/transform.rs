@@ -29,7 +29,7 @@ impl Transform {
     }
 
     /// Applies an invertible linear map, then translates.
-    pub fn affine(linear: DMat3, translation: DVec3) -> Self {
+    pub fn from_mat3_translation(linear: DMat3, translation: DVec3) -> Self {
         Self { linear, translation, inverse_linear: linear.inverse() }
     }
 

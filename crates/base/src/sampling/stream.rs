@@ -149,11 +149,11 @@ fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> 
     }
     let mut points = [[0.0; N]; 2];
     for i in 0..N {
-        points[0][i] = bits_to_unit_float(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
+        points[0][i] = reversed_bits_to_unit(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
     }
     for i in 0..N {
-        points[1][i] = bits_to_unit_float(owen_scramble(
-            second_sobol_coordinate(places[i]),
+        points[1][i] = reversed_bits_to_unit(owen_scramble(
+            reversed_second_sobol(places[i]),
             mix_bits(seeds[i] ^ 0x02e5_be93),
         ));
     }
@@ -163,14 +163,14 @@ fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> 
 /// Converts the upper 24 bits, in reversed order, to a fraction in [0, 1). 24 bits allow signed conversion,
 /// which vector units support.
 #[inline(always)]
-fn bits_to_unit_float(bits: u32) -> f32 {
+fn reversed_bits_to_unit(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
 /// Bit-reversed second Sobol coordinate. Bit j is the sum (mod 2) of the index bits k with odd C(k, j), which
 /// means that k has every bit of j set. The bit-reversed first coordinate is the index itself.
 #[inline(always)]
-fn second_sobol_coordinate(mut bits: u32) -> u32 {
+fn reversed_second_sobol(mut bits: u32) -> u32 {
     for (shift, lacking) in
         [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)]
     {
@@ -261,7 +261,7 @@ mod tests {
                 sum ^= if index >> bit & 1 == 1 { direction } else { 0 };
                 direction ^= direction >> 1;
             }
-            assert_eq!(second_sobol_coordinate(index).reverse_bits(), sum, "{index}");
+            assert_eq!(reversed_second_sobol(index).reverse_bits(), sum, "{index}");
         }
     }
 

@@ -51,7 +51,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let (news, work) = spawn_benchmark(order, token.clone())
         .map_err(|error| console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
     report_events(&news, &mut progress);
-    let results = work.join().unwrap_or_else(|_| Err(Box::new(panic_result())));
+    let results = work.join().unwrap_or_else(|_| Err(Box::new(unfinished_after_panic())));
     progress.clear();
     match results {
         Ok(results) => {
@@ -116,7 +116,7 @@ fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
 }
 
 /// Returns the result for a benchmark that panicked. The panic handler has already printed a message.
-fn panic_result() -> UnfinishedBenchmark {
+fn unfinished_after_panic() -> UnfinishedBenchmark {
     let what = "internal error: the renderer panicked".to_owned();
     UnfinishedBenchmark { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }

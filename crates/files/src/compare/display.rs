@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::plane::{Plane, gaussian, normalized};
+use super::plane::{Plane, gaussian_kernel, normalized};
 use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
@@ -44,7 +44,7 @@ impl DisplayErrorSums {
 
 pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
-    let window = normalized(&gaussian(SIGMA, RADIUS));
+    let window = normalized(&gaussian_kernel(SIGMA, RADIUS));
     let band_sums = |band| {
         let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)
@@ -60,8 +60,8 @@ fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
     let mean = |plane: &Plane| plane.filtered(window, window);
     let (mean_a, mean_b) = (mean(&a), mean(&b));
     let (mean_aa, mean_bb, mean_ab) = (mean(&a.times(&a)), mean(&b.times(&b)), mean(&a.times(&b)));
-    let columns = window_weights_inside_image(tile.x, tile.width, pair.width(), window);
-    let rows = window_weights_inside_image(tile.y, tile.height, pair.height(), window);
+    let columns = window_weight_sums(tile.x, tile.width, pair.width(), window);
+    let rows = window_weight_sums(tile.y, tile.height, pair.height(), window);
     let mut sums = DisplayErrorSums { square, ..DisplayErrorSums::default() };
     for (y, row) in rows.iter().enumerate() {
         for (x, column) in columns.iter().enumerate() {
@@ -89,9 +89,9 @@ fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let mut square = 0.0;
     let width = side(tile.width);
     for row in 0..side(tile.height) {
-        let Some(y) = image_position(tile.y, row, pair.height()) else { continue };
+        let Some(y) = tile_to_image_coordinate(tile.y, row, pair.height()) else { continue };
         for column in 0..width {
-            let Some(x) = image_position(tile.x, column, pair.width()) else { continue };
+            let Some(x) = tile_to_image_coordinate(tile.x, column, pair.width()) else { continue };
             let [a, b] = pair.pixel_pair(x, y).map(encode_srgb);
             lumas[0].values[row * width + column] = luma(a);
             lumas[1].values[row * width + column] = luma(b);
@@ -105,7 +105,7 @@ fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
 
 /// Converts a position in the tile, including its margin, to a position in the image. `None` outside the
 /// image.
-fn image_position(start: u32, offset: usize, length: usize) -> Option<usize> {
+fn tile_to_image_coordinate(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 
@@ -115,7 +115,7 @@ fn is_inside_tile(offset: usize, length: u32) -> bool {
 
 /// For each position along one side of the tile, the sum of the window's weights inside the image. `None` if
 /// the window is excluded.
-fn window_weights_inside_image(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
+fn window_weight_sums(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
     let weight = |position: usize| {
         let is_complete = position >= RADIUS && position + RADIUS < length;
         let taps = (position..).zip(window).filter(|(tap, _)| (RADIUS..RADIUS + length).contains(tap));

@@ -57,7 +57,7 @@ impl Format {
     ];
 
     /// All known extensions, without the dot.
-    pub fn extensions() -> impl Iterator<Item = &'static str> {
+    pub fn known_extensions() -> impl Iterator<Item = &'static str> {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
@@ -129,7 +129,7 @@ impl AnimationFormat {
     const EXTENSIONS: [(&'static str, Self); 2] = [("gif", Self::Gif), ("apng", Self::Apng)];
 
     /// All known extensions, without the dot.
-    pub fn extensions() -> impl Iterator<Item = &'static str> {
+    pub fn known_extensions() -> impl Iterator<Item = &'static str> {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 

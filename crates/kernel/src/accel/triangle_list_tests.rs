@@ -68,7 +68,7 @@ fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
         .collect()
 }
 
-fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
+fn single_ray_hit(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
     let (sheared, mut best) = (ShearedRay::new(ray.origin, ray.direction), None);
     for (number, corners) in
         (0..).zip(triangles).filter(|&(number, _)| number != ray.start && number != except)
@@ -125,7 +125,8 @@ fn decided_packets_match_single_rays() {
             let (found, [open, hits_any, open_any]) =
                 instructions.run(TriangleListQueryKernel { facets: &facets, rays: &rays, except: &except });
             for (i, ray) in rays.iter().enumerate() {
-                let (own, other) = (alone(&triangles, ray, u32::MAX), alone(&triangles, ray, except[i]));
+                let (own, other) =
+                    (single_ray_hit(&triangles, ray, u32::MAX), single_ray_hit(&triangles, ray, except[i]));
                 let is = |bits: u32| bits & 1 << i != 0;
                 let what = || format!("round {round}, {instructions:?}, {ray:?}, except {}", except[i]);
                 if is(open) {
@@ -162,7 +163,7 @@ fn nan_rays_are_undecided() {
                     rays: &[ray],
                     except: &[u32::MAX; PACKET_SIZE],
                 });
-                let own = alone(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
+                let own = single_ray_hit(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
                 assert!(open & 1 == 1 || found.get(0) == own, "{ray:?}");
                 assert!(open_any & 1 == 1 || (any & 1 == 1) == own.is_some(), "{ray:?}");
             }

@@ -188,7 +188,7 @@ impl Cone {
     }
 
     /// Areas of the parts.
-    pub fn areas(&self) -> [f64; 2] {
+    pub fn part_areas(&self) -> [f64; 2] {
         let cap = if self.capped { PI * self.radius * self.radius } else { 0.0 };
         [PI * self.radius * self.slant, cap]
     }
@@ -207,14 +207,14 @@ impl Cone {
 
     /// Centroid of the surface.
     pub fn centroid(&self) -> DVec3 {
-        let [side, cap] = self.areas();
+        let [side, cap] = self.part_areas();
         self.frame.point_to_world(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
-        let [side, cap] = self.areas();
+        let [side, cap] = self.part_areas();
         // Components of the side's normals perpendicular to the axis and toward the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
         projected_area_of_normal_ring(side, cosine * sine_from_cosine(along), -sine * along)

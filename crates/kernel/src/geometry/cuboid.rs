@@ -175,7 +175,7 @@ impl Cuboid {
     }
 
     /// Areas of the faces.
-    pub fn areas(&self) -> [f64; 6] {
+    pub fn part_areas(&self) -> [f64; 6] {
         let [x, y, z] = (self.half * 2.0).to_array();
         [y * z, y * z, x * z, x * z, x * y, x * y]
     }
@@ -200,7 +200,7 @@ impl Cuboid {
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
-        let [x, _, y, _, z, _] = self.areas();
+        let [x, _, y, _, z, _] = self.part_areas();
         DVec3::new(x, y, z).dot(along)
     }
 }

@@ -171,7 +171,7 @@ impl Cylinder {
     }
 
     /// Areas of the parts.
-    pub fn areas(&self) -> [f64; 3] {
+    pub fn part_areas(&self) -> [f64; 3] {
         let cap = if self.capped { PI * self.radius * self.radius } else { 0.0 };
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
@@ -195,7 +195,7 @@ impl Cylinder {
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
-        let [side, cap, _] = self.areas();
+        let [side, cap, _] = self.part_areas();
         projected_area_of_normal_ring(side, sine_from_cosine(along), 0.0) + cap * along.abs()
     }
 

@@ -119,7 +119,7 @@ impl Disk {
     }
 
     /// Area of each part.
-    pub fn areas(&self) -> [f64; 1] {
+    pub fn part_areas(&self) -> [f64; 1] {
         [PI * self.radius * self.radius]
     }
 
@@ -150,7 +150,7 @@ impl Disk {
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
-        let [area] = self.areas();
+        let [area] = self.part_areas();
         area * self.normal().dot(direction).max(0.0)
     }
 

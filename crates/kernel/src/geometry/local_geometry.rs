@@ -11,7 +11,7 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon).
+    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::flat_polygon).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {
@@ -50,7 +50,7 @@ pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
 
 impl LocalGeometry {
     /// A curved surface. Only its distance is known.
-    pub(super) fn curved(distance: f64) -> Self {
+    pub(super) fn curved_at_distance(distance: f64) -> Self {
         Self::Surface { distance, ground: None }
     }
 }

@@ -212,8 +212,8 @@ impl Shape {
     }
 
     /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite.
-    pub fn areas(&self) -> Vec<f64> {
-        for_shape!(self, it => it.areas().to_vec())
+    pub fn part_areas(&self) -> Vec<f64> {
+        for_shape!(self, it => it.part_areas().to_vec())
     }
 
     /// Samples a point uniformly over the area of a part. `u` is uniform in [0, 1)².
@@ -292,16 +292,16 @@ impl Shape {
             Self::Sphere(sphere) => sphere.local_geometry(point),
             Self::Plane(plane) => plane.local_geometry(point),
             Self::Disk(disk) => disk.local_geometry(point),
-            Self::Cylinder(cylinder) => LocalGeometry::curved(cylinder.distance(point)),
-            Self::Cone(cone) => LocalGeometry::curved(cone.distance(point)),
-            Self::Torus(torus) => LocalGeometry::curved(torus.distance(point)),
+            Self::Cylinder(cylinder) => LocalGeometry::curved_at_distance(cylinder.distance(point)),
+            Self::Cone(cone) => LocalGeometry::curved_at_distance(cone.distance(point)),
+            Self::Torus(torus) => LocalGeometry::curved_at_distance(torus.distance(point)),
         }
     }
 
     /// Flat polygon with the given index. `None` if the index is out of range or the shape is not made of
     /// flat polygons.
     #[inline]
-    pub fn polygon(&self, number: u32) -> Option<FlatPolygon> {
+    pub fn flat_polygon(&self, number: u32) -> Option<FlatPolygon> {
         match self {
             Self::Quad(quad) => (number < 1).then(|| parallelogram((quad.corner, quad.u, quad.v))),
             Self::Triangle(triangle) => {
@@ -371,7 +371,7 @@ mod tests {
             let sum: f64 = (0..SIDE * SIDE).map(|i| asked(&shape.sample(part, grid(i)))).sum();
             sum * area / f64::from(SIDE * SIDE)
         };
-        (0..).zip(shape.areas()).map(over_part).sum()
+        (0..).zip(shape.part_areas()).map(over_part).sum()
     }
 
     /// Hits of rays aimed at the shape from a surrounding sphere.
@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn sampled_points_are_on_the_shape() {
         for shape in shapes() {
-            for (part, _) in (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0) {
+            for (part, _) in (0_u32..).zip(shape.part_areas()).filter(|(_, area)| *area > 0.0) {
                 for i in 0..200_u32 {
                     let u = Vec2::new((i as f32 + 0.5) * 0.618_034 % 1.0, (i as f32 + 0.5) / 200.0);
                     let place = shape.sample(part, u);
@@ -426,10 +426,10 @@ mod tests {
 
     #[test]
     fn projected_area_integrates_the_cosines() {
-        for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
+        for shape in shapes().into_iter().filter(|shape| !shape.part_areas().is_empty()) {
             let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];
             let shown = |direction: DVec3| integral(&shape, |place| place.normal.dot(direction).max(0.0));
-            let area: f64 = shape.areas().iter().sum();
+            let area: f64 = shape.part_areas().iter().sum();
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
                     // For a torus, only the mean over all directions is computed (Cauchy's formula).
@@ -444,8 +444,8 @@ mod tests {
 
     #[test]
     fn centroid_is_the_mean_of_the_points() {
-        for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
-            let area: f64 = shape.areas().iter().sum();
+        for shape in shapes().into_iter().filter(|shape| !shape.part_areas().is_empty()) {
+            let area: f64 = shape.part_areas().iter().sum();
             for axis in 0..3 {
                 let mean = integral(&shape, |place| place.point[axis]) / area;
                 assert!((mean - shape.centroid()[axis]).abs() < 2e-3, "{shape:?}: {mean}");
@@ -460,7 +460,7 @@ mod tests {
             LocalGeometry::Polygons(_) => None,
         };
         for shape in shapes() {
-            let parts = (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0);
+            let parts = (0_u32..).zip(shape.part_areas()).filter(|(_, area)| *area > 0.0);
             let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
             let places: Vec<DVec3> = parts
                 .flat_map(|(part, _)| (0..SIDE * SIDE).map(move |i| (part, grid(i))))
@@ -483,7 +483,7 @@ mod tests {
             // A tube or an open cone also contains points, although its surface is open.
             let is_closed = match shape {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
-                Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),
+                Shape::Cylinder(_) | Shape::Cone(_) => shape.part_areas().iter().all(|&area| area > 0.0),
                 Shape::Quad(_) | Shape::Plane(_) | Shape::Triangle(_) | Shape::Disk(_) => false,
             };
             for (ray, hit) in hits(&shape) {

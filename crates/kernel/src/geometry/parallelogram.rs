@@ -111,7 +111,7 @@ impl Parallelogram {
     }
 
     /// Area of each part.
-    pub fn areas(&self) -> [f64; 1] {
+    pub fn part_areas(&self) -> [f64; 1] {
         [self.normal.length()]
     }
 

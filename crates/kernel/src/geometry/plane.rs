@@ -79,7 +79,7 @@ impl Plane {
     }
 
     /// Areas of the parts. Empty because the area is infinite.
-    pub fn areas(&self) -> [f64; 0] {
+    pub fn part_areas(&self) -> [f64; 0] {
         []
     }
 

@@ -93,7 +93,7 @@ impl Sphere {
     }
 
     /// Area of each part.
-    pub fn areas(&self) -> [f64; 1] {
+    pub fn part_areas(&self) -> [f64; 1] {
         [4.0 * PI * self.radius * self.radius]
     }
 

@@ -87,7 +87,7 @@ impl Triangle {
     }
 
     /// Area of each part.
-    pub fn areas(&self) -> [f64; 1] {
+    pub fn part_areas(&self) -> [f64; 1] {
         [0.5 * self.unnormalized_normal().length()]
     }
 

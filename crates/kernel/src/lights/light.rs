@@ -174,7 +174,7 @@ impl Light {
             LightFamily::Infinite(light) => {
                 (LightCenter::Towards(light.direction_to_center()?), LightGeometry::Nothing)
             }
-            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.scene_geometry()),
+            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.scene_object()),
         })
     }
 

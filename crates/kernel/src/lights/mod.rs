@@ -54,7 +54,7 @@ pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightTransportKind, Lights};
+pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightSamplingMode, Lights};
 pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightTransportKind {
+pub enum LightSamplingMode {
     /// Only direct lighting. Light sampling is the only source of noise.
     Eye,
     /// Path tracing. The image also has noise from other sources.
@@ -135,14 +135,14 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
-    pub fn sampler(&self, receivers: LightTransportKind) -> Option<LightSampler<'_>> {
+    pub fn sampler_for_mode(&self, receivers: LightSamplingMode) -> Option<LightSampler<'_>> {
         match receivers {
-            LightTransportKind::Eye => {
+            LightSamplingMode::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            LightTransportKind::Paths => {
+            LightSamplingMode::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -155,14 +155,14 @@ impl Lights {
     #[inline]
     pub fn expected_sample_counts(
         &self,
-        receivers: LightTransportKind,
+        receivers: LightSamplingMode,
         point: Vec3,
         normal: Vec3,
     ) -> ExpectedSampleCounts<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler(receivers) else { return ExpectedSampleCounts(None) };
+        let Some(sampler) = self.sampler_for_mode(receivers) else { return ExpectedSampleCounts(None) };
         let mut cut = sampler.picks.new_tree_cut(sampler.tree);
-        cut.adapt_to_receiver(&Receiver::without_lobe(point, normal));
+        cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
         ExpectedSampleCounts(Some((sampler, cut)))
     }
 

@@ -320,7 +320,7 @@ fn mesh_triangles_map_to_their_lights() {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
         let mesh =
             MeshEmitter::new(triangles, &CancelToken::new()).expect("never canceled").expect("an area");
-        let bounds = mesh.bounds().scaled_by(Vec3::splat(radiance));
+        let bounds = mesh.light_bounds().scaled_by(Vec3::splat(radiance));
         Light::Area(AreaLight {
             bounds,
             shape: Emitter::Mesh(mesh),
@@ -357,7 +357,7 @@ fn mesh_triangles_map_to_their_lights() {
 fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let numbered = triangles.iter().copied().zip(5..).collect();
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("never canceled").expect("an area");
-    let bounds = mesh.bounds();
+    let bounds = mesh.light_bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
     let (side, part) = (Side::Front, EmittingPart::Listed);
     AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }

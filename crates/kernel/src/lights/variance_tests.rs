@@ -94,7 +94,7 @@ fn area_light_variance_is_bounded() {
                 if !(mean > 1e-9) {
                     continue;
                 }
-                let (ball, cosines) = sphere_deviation(&shape, from);
+                let (ball, cosines) = sphere_cosine_deviations(&shape, from);
                 // For elongated lights, cosines at the receiver vary regardless of the sampling method.
                 let verdict = if scatter > (2.0 * ball).max(1.2 * cosines) + 0.04 { "TOO HIGH" } else { "" };
                 let line = format!(
@@ -113,7 +113,7 @@ fn area_light_variance_is_bounded() {
 /// Computes two relative standard deviations. The first is for a sphere with the same mean direction and
 /// solid angle as the shape (above and below the floor). The second is for the cosine at the receiver if
 /// directions are uniform over the shape's solid angle.
-fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
+fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     // Trace rays in a cone around the shape's center, and keep the rays that hit its front.
     let frame = Frame::from_normal((shape.centroid().as_vec3() - from).normalize());
     let (mut solid_angle, mut sum, mut cosines) = (0.0, Vec3::ZERO, Vec::new());

@@ -90,7 +90,7 @@ pub trait Bxdf: Soa + Default {
     type View: Soa + Default;
 
     /// Whether shading normals are rotated to face the viewer. See
-    /// [`rotate_toward_viewer`](super::microfacet::rotate_toward_viewer).
+    /// [`rotate_toward_viewer`](super::microfacet::rotate_normal_to_viewer).
     const TURNS_NORMALS: bool = true;
 
     /// Whether the BSDF is for light from behind the surface.

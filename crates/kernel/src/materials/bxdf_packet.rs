@@ -2,7 +2,7 @@
 
 use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes, UvPacket};
 use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
-use super::microfacet::rotate_toward_viewer;
+use super::microfacet::rotate_normal_to_viewer;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
 use crate::math::Vec3;
@@ -71,7 +71,7 @@ fn specialize_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
 impl<B: Bxdf> BxdfPacket<B> {
     /// Prepares the packet for reuse with other surfaces.
     #[inline(always)]
-    pub fn reset(&mut self) {
+    pub fn reset_flags(&mut self) {
         (self.any, self.shows_all) = (B::ALWAYS, true);
     }
 
@@ -149,7 +149,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     ) {
         if B::TURNS_NORMALS {
             for i in 0..PACKET_SIZE {
-                let turned = rotate_toward_viewer(lane(normals, i), -lane(directions, i));
+                let turned = rotate_normal_to_viewer(lane(normals, i), -lane(directions, i));
                 set_lane(normals, i, turned);
             }
         }

@@ -48,7 +48,7 @@ fn dielectric_from_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
 /// Computes the transmittance of a boundary for unpolarized light from the cosines and the indices of
 /// refraction on both sides. Avoids cancellation. The result is bit-identical in both directions.
 #[inline(always)]
-pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
+pub fn fresnel_transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     let (parallel, perpendicular) = (n_2 * cos_1 + n_1 * cos_2, n_1 * cos_1 + n_2 * cos_2);
     let inverse = 1.0 / (parallel * parallel) + 1.0 / (perpendicular * perpendicular);
     2.0 * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse
@@ -121,9 +121,9 @@ mod tests {
                 let (exact, through) = dielectric(cosine, eta);
                 assert!((exact - dielectric_from_either_side(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
                 let Some(beyond) = through else { continue };
-                let there = transmittance([cosine, beyond], [1.0, eta]);
+                let there = fresnel_transmittance([cosine, beyond], [1.0, eta]);
                 assert!((1.0 - exact - there).abs() < 2e-5, "{eta} {cosine}: {there}");
-                assert_eq!(there, transmittance([beyond, cosine], [eta, 1.0]));
+                assert_eq!(there, fresnel_transmittance([beyond, cosine], [eta, 1.0]));
             }
         }
     }

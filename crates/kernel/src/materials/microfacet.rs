@@ -20,7 +20,7 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer. See [`rotate_toward_viewer`].
+/// Minimum cosine between a normal and the direction to the viewer. See [`rotate_normal_to_viewer`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
@@ -35,7 +35,7 @@ pub fn alphas_from_roughness(roughness: f32, anisotropy: f32) -> [f32; 2] {
 /// Rotates the unit normal just enough to face the viewer. Shading normals may face away from the viewer near
 /// silhouettes of smooth meshes.
 #[inline(always)]
-pub fn rotate_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn rotate_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let missing = MIN_FACING_COSINE - normal.dot(to_eye);
     let turned = normal + to_eye * missing;
     let turned = turned * (1.0 / turned.length_squared().sqrt());
@@ -43,10 +43,10 @@ pub fn rotate_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`rotate_toward_viewer`] for a single normal. Optimized for normals that do not need rotation.
+/// [`rotate_normal_to_viewer`] for a single normal. Optimized for normals that do not need rotation.
 #[inline(always)]
 pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
-    if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_toward_viewer(normal, to_eye) } else { normal }
+    if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_normal_to_viewer(normal, to_eye) } else { normal }
 }
 
 /// The unnormalized half vector of two unit directions.
@@ -93,20 +93,20 @@ impl HalfVector {
     #[inline(always)]
     pub fn isotropic_ggx(&self, alpha: f32) -> f32 {
         let squared = alpha * alpha;
-        self.distribution(self.across.length_squared() / squared, squared)
+        self.ggx_from_stretched(self.across.length_squared() / squared, squared)
     }
 
     /// Anisotropic D in sr⁻¹, with a separate α along each tangent of a frame.
     #[inline(always)]
     pub fn anisotropic_ggx(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
-        self.distribution(x * x + y * y, u * v)
+        self.ggx_from_stretched(x * x + y * y, u * v)
     }
 
     /// Computes D from two values: the squared perpendicular component divided by α², and the product of both
     /// α values.
     #[inline(always)]
-    fn distribution(&self, stretched: f32, product: f32) -> f32 {
+    fn ggx_from_stretched(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
         self.squared * self.squared * FRAC_1_PI / (product * slope * slope)
     }

@@ -71,7 +71,7 @@ impl<'a> ImageHalver<'a> {
     }
 
     /// Number of rows in the smaller image.
-    pub fn rows(&self) -> u32 {
+    pub fn halved_height(&self) -> u32 {
         self.height
     }
 
@@ -146,7 +146,7 @@ mod tests {
     fn halved(of: &Texels) -> Result<Texels, ()> {
         let halving = ImageHalver::new(of);
         let mut rows = halving.empty_rows();
-        (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
+        (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
         Ok(halving.assemble_image(rows))
     }
 

@@ -21,7 +21,7 @@ impl Opacity {
         match &self.value {
             ScalarParameter::Texture(texture) if self.cutoff > 0.0 && texture.mipmaps.is_some() => {
                 *lookups += 1;
-                texture.cutoff_coverage(at, self.cutoff)
+                texture.coverage_above_cutoff(at, self.cutoff)
             }
             value => self.apply_cutoff(value.evaluate(at, lookups)),
         }

@@ -417,7 +417,7 @@ impl Texture {
 
     /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
     /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold_red_channel`].
-    pub fn cutoff_coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
+    pub fn coverage_above_cutoff(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tile_coordinates(at);
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
@@ -800,7 +800,7 @@ mod tests {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
             let mut rows = halving.empty_rows();
-            (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
+            (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
             Ok(halving.assemble_image(rows))
         };
         Mipmaps::build(image, halved).ok().map(Arc::new)
@@ -858,15 +858,16 @@ mod tests {
             TexturePoint { footprint, ..TexturePoint::from_uv(DVec2::new(u, 0.5)) }
         };
         for u in [0.1, 0.3, 0.9] {
-            let coverage = texture.cutoff_coverage(&at(u, 1e3), 0.5);
+            let coverage = texture.coverage_above_cutoff(&at(u, 1e3), 0.5);
             assert!((coverage - 0.4).abs() < 1e-6, "{coverage}");
         }
         // In the original image, coverage is 0 or 1.
         for (u, expected) in [(0.05, 1.0), (0.25, 0.0), (0.35, 0.0), (0.55, 1.0)] {
-            assert_eq!(texture.cutoff_coverage(&at(u, 0.0), 0.5), expected, "{u}");
+            assert_eq!(texture.coverage_above_cutoff(&at(u, 0.0), 0.5), expected, "{u}");
         }
         // Coverage is continuous between the original image and its first mip level.
-        let near = [1.0 + 1e-4, 1.0].map(|texels| texture.cutoff_coverage(&at(0.05, texels * 0.1), 0.5));
+        let near =
+            [1.0 + 1e-4, 1.0].map(|texels| texture.coverage_above_cutoff(&at(0.05, texels * 0.1), 0.5));
         assert!((near[0] - near[1]).abs() < 1e-2, "{near:?}");
     }
 }

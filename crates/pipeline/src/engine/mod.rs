@@ -19,7 +19,7 @@ use std::sync::Arc;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
-use self::outcome::Outcome;
+use self::outcome::RequestOutcome;
 pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
 use self::own::{SavedSceneImage, combined_texture_needs, saved_scene_plan};
@@ -212,7 +212,7 @@ impl Engine {
         let outcome = self.run_request(request, sink, context);
         let is_broken = matches!(outcome, Err(StopReason::Failed(Failure::Scene(_))));
         sink.send(match outcome {
-            Ok(Outcome { report, conflicts, warnings, unchanged }) => {
+            Ok(RequestOutcome { report, conflicts, warnings, unchanged }) => {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
@@ -230,7 +230,7 @@ impl Engine {
         request: &Request,
         sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Outcome, StopReason> {
+    ) -> Result<RequestOutcome, StopReason> {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
@@ -262,7 +262,7 @@ impl Engine {
         let unchanged =
             self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
-        Ok(Outcome { report, conflicts, warnings, unchanged })
+        Ok(RequestOutcome { report, conflicts, warnings, unchanged })
     }
 
     /// Returns the current image's key and view.

@@ -53,7 +53,7 @@ impl Error for RenderFailure {}
 const COLUMNS: usize = 120;
 
 /// Outcome of a finished request.
-pub(super) struct Outcome {
+pub(super) struct RequestOutcome {
     pub(super) report: Report,
     /// Reasons why the image is not written.
     pub(super) conflicts: Vec<Diagnostic>,
@@ -76,7 +76,7 @@ impl Engine {
     ) -> Result<RenderedImage, RenderFailure> {
         match self.run_request(request, sink, context) {
             // An in-memory image is not written, so there are no conflicts.
-            Ok(Outcome { report, conflicts: _, warnings, unchanged: _ }) => {
+            Ok(RequestOutcome { report, conflicts: _, warnings, unchanged: _ }) => {
                 let state = self.films.current();
                 let gone = || RenderFailure::Failed(Failure::Work("the film is missing".to_owned()));
                 let state = state.ok_or_else(gone)?;

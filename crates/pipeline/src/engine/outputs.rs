@@ -6,7 +6,9 @@ use super::super::protocol::{ImageReport, Report, Request, WriteMode, reasons};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::EventSink;
-use super::super::stages::write::{ImageWriteContext, write_animation, write_if_wanted, write_on_request};
+use super::super::stages::write::{
+    ImageWriteContext, add_animation_frame, write_if_wanted, write_on_request,
+};
 use super::super::stages::{Findings, StageResult, StopReason};
 use super::super::targets::conflicts;
 use super::Engine;
@@ -158,6 +160,6 @@ impl Engine {
         written.own = own.map(|own| own.image);
         let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
         let frames = &mut self.frames;
-        pool.install(|| write_animation(state, to, (turn, frames), token))
+        pool.install(|| add_animation_frame(state, to, (turn, frames), token))
     }
 }

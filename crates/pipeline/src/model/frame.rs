@@ -104,7 +104,7 @@ pub(super) const KEY: f64 = 1.5;
 
 /// Ground reflectance that makes level ground as bright as the sky, which hides the horizon. The ground's
 /// irradiance is π·`SKY` plus the key light's contribution.
-pub(super) fn ground_reflectance() -> f64 {
+pub(super) fn sky_matching_reflectance() -> f64 {
     let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
     round_significant(SKY / (SKY + key), 3)
 }
@@ -174,7 +174,7 @@ mod tests {
         let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (ViewSide::Iso, 1), 1.0);
         let direction = key_light_travel_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
-        let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
+        let radiance = sky_matching_reflectance() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
         let to_eye = (eye.position - eye.look_at).normalize();
         assert!((-direction).dot(to_eye) > 0.3, "the key light and the camera should be on the same side");

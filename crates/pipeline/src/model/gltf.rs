@@ -89,7 +89,7 @@ pub(super) fn scene_text(
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
     }
-    Ok(GeneratedScene { text: toml.finish(), hash: container.hash(), companions, notes, assets })
+    Ok(GeneratedScene { text: toml.finish(), hash: container.file_hash(), companions, notes, assets })
 }
 
 struct SceneWriter<'a> {

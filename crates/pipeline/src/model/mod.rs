@@ -11,7 +11,7 @@ mod toml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_travel_direction};
+use self::frame::{CameraPose, FOV, KEY, SKY, key_light_travel_direction, sky_matching_reflectance};
 use self::gltf::{ExportStorage, ExportedFile};
 use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
 use super::settings::{Overrides, UpAxis, ViewSide};
@@ -229,7 +229,7 @@ fn write_ground(
     }
     let name = names.make_unique("ground", "ground");
     toml.table(&format!("[materials.{name}]"));
-    toml.key("diffuse", format_number(ground_reflectance()));
+    toml.key("diffuse", format_number(sky_matching_reflectance()));
     toml.table("[[plane]]");
     toml.key(
         "point",

@@ -302,8 +302,8 @@ impl FilmState {
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
     /// noise among them.
-    pub(crate) fn tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
-        self.goals.tiles_above_target(&self.film, error)
+    pub(crate) fn count_tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
+        self.goals.count_tiles_above_target(&self.film, error)
     }
 
     /// Returns the number of samples rendered so far, summed over all pixels.
@@ -342,8 +342,8 @@ impl FilmState {
                 continue;
             }
             let of_cell = cost.samples_including_overhead(self.pixel_share);
-            seconds += lacking * cost.seconds() / of_cell;
-            known += cost.seconds();
+            seconds += lacking * cost.recorded_seconds() / of_cell;
+            known += cost.recorded_seconds();
             worth += of_cell;
         }
         // Without measurements, assume that all samples cost the same.

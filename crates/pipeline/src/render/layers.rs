@@ -37,7 +37,7 @@ impl OutputLayer {
             Self::Albedo => (LayerSource::View(ViewMode::Albedo), COLOR),
             Self::Normal => (LayerSource::View(ViewMode::Normal), DIRECTION),
             Self::Depth => (LayerSource::View(ViewMode::Depth), DISTANCE),
-            Self::Variance => (LayerSource::Film(mean_luminance_variance), NUMBER),
+            Self::Variance => (LayerSource::Film(luminance_variance_image), NUMBER),
             Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
             Self::Ambient => (LayerSource::View(ViewMode::Ambient), COLOR),
             Self::Diffuse => (LayerSource::View(ViewMode::Diffuse), COLOR),
@@ -57,7 +57,7 @@ impl OutputLayer {
 }
 
 /// Returns the squared standard error of each pixel's mean luminance.
-fn mean_luminance_variance(state: &FilmState) -> RadianceImage {
+fn luminance_variance_image(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
@@ -89,7 +89,7 @@ pub(crate) fn render_layers(
         let image = match source {
             LayerSource::Film(image) => image(state),
             LayerSource::View(view) => {
-                render_view(view, state, rendering, progress_range(layers, Some(number)))?
+                render_matching_view(view, state, rendering, progress_range(layers, Some(number)))?
             }
         };
         images.push(LayerImage { name: crate::choice::Choice::name(*layer), channels, image });
@@ -98,7 +98,7 @@ pub(crate) fn render_layers(
 }
 
 /// Renders a view with the same number of samples in each pixel as the image.
-fn render_view(
+fn render_matching_view(
     view: ViewMode,
     picture: &FilmState,
     rendering: &RenderStageInputs<'_>,

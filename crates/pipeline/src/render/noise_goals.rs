@@ -90,7 +90,7 @@ impl SampleGoals {
     /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
     /// their goals, and the highest noise among them. Such tiles exist because a half's own noise does not
     /// affect its goal.
-    pub(crate) fn tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+    pub(crate) fn count_tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
@@ -177,7 +177,7 @@ impl TileNoise {
                 ..noise
             })
         };
-        Self { halves: [0, 1].map(noise), fall: film.tile_variance_reduction(tile) }
+        Self { halves: [0, 1].map(noise), fall: film.last_variance_reduction(tile) }
     }
 }
 
@@ -254,11 +254,11 @@ pub(crate) mod tests {
     fn noise_in_only_one_half_is_reported() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.tiles_above_target(&rough, 0.01), None, "the first half should continue");
+        assert_eq!(goals.count_tiles_above_target(&rough, 0.01), None, "the first half should continue");
         let clean = judged([(1.0, 0.0); 2], 16, 0.01);
-        assert_eq!(clean.tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        assert_eq!(clean.count_tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
         // One of the two halves has a standard error of √(1/12/16).
-        let Some((tiles, worst)) = clean.tiles_above_target(&rough, 0.01) else {
+        let Some((tiles, worst)) = clean.count_tiles_above_target(&rough, 0.01) else {
             panic!("one tile should be reported")
         };
         assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");

@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{ImagePosition, NormalizedRect, PreviewSize, PreviewSource};
+use crate::protocol::{ImagePosition, NormalizedRect, PreviewImageState, PreviewSize};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for orders.
@@ -98,7 +98,7 @@ impl PreviewTarget<'_> {
         section: Option<NormalizedRect>,
     ) {
         let range = tone.range_map.range().map(|range| range.limits());
-        let source = PreviewSource {
+        let source = PreviewImageState {
             image: keys::developed_image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };
@@ -139,7 +139,7 @@ impl PreviewTarget<'_> {
 fn update_previewer(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::with_quantity(quantity, width, height));
-    previewer.update(&state.film, Some(Instant::now() + PATIENCE))
+    previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.

@@ -110,7 +110,7 @@ fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler(light_sampling_purpose(settings, are_gathered));
+    let selection = lights.sampler_for_mode(light_sampling_purpose(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (SampledLightSet::Picked, samples * u64::from(selection.picks.count)),
         None => (SampledLightSet::All, 0),

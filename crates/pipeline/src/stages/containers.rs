@@ -79,7 +79,7 @@ impl GltfContainers {
             ImageLocation::Inside(bytes) => ImageInput::Bytes(bytes.into()),
             ImageLocation::File(path) => ImageInput::File(path),
         };
-        Ok((input, container.hash()))
+        Ok((input, container.file_hash()))
     }
 }
 

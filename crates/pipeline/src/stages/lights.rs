@@ -9,7 +9,7 @@ use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
-use crate::lights::{LightTransportKind, Lights};
+use crate::lights::{LightSamplingMode, Lights};
 use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, Geometry, TextureSource};
@@ -39,8 +39,8 @@ pub(crate) fn collect_lights(
         0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
         1 => StageResult::done(lights, "1 light"),
         count => {
-            let are_picked = |receivers| lights.sampler(receivers).is_some();
-            let picked = match (are_picked(LightTransportKind::Eye), are_picked(LightTransportKind::Paths)) {
+            let are_picked = |receivers| lights.sampler_for_mode(receivers).is_some();
+            let picked = match (are_picked(LightSamplingMode::Eye), are_picked(LightSamplingMode::Paths)) {
                 (true, _) => describe_light_tree("a subset is sampled", &lights),
                 (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
                 (false, false) => String::new(),
@@ -81,7 +81,7 @@ fn sky_map(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap
     if let Some(sky) = memo.get(*key) {
         return sky.clone();
     }
-    let sky = world::sky_map(texels);
+    let sky = world::build_environment_map(texels);
     memo.set(*key, sky.clone());
     sky
 }

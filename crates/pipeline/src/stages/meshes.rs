@@ -82,7 +82,7 @@ pub(crate) fn load_meshes(
     let mut meshes = Vec::new();
     let mut counts = FileCounts::default();
     let mut warnings = MeshWarnings::default();
-    let file_materials = uses_file_materials(&loaded.scene);
+    let file_materials = are_file_materials_used(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.add_file(file));
@@ -265,7 +265,7 @@ fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
 }
 
 /// Returns, for each mesh file, whether any object uses the file's own materials.
-fn uses_file_materials(scene: &Scene) -> Vec<bool> {
+fn are_file_materials_used(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
     plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);

@@ -73,9 +73,10 @@ pub(crate) fn render(
             StageResult::done(rays, reasons::TIME_LIMIT_REACHED)
         }
         (false, _) if state.goals.is_any_below(wanted) => {
-            let missed = state.tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
-                format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
-            });
+            let missed =
+                state.count_tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
+                    format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
+                });
             StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }
         (false, 0) => StageResult::done(rays, ""),

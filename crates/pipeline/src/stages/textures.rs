@@ -18,7 +18,7 @@ use super::{FileCounts, FileReadContext, Findings, StageResult, StopReason, load
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, build_coverage_mipmaps,
-    load_embedded, load_hashed, mipmaps, size, size_embedded,
+    load_embedded, load_hashed, mipmaps, read_dimensions, read_embedded_dimensions,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -226,7 +226,7 @@ pub(crate) fn load_textures(
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
-                    substitute_texture(loaded, one, &error, &mut textures.images, findings);
+                    replace_unreadable_image(loaded, one, &error, &mut textures.images, findings);
                 }
             }
             Err(error) => {
@@ -260,7 +260,7 @@ pub(crate) fn load_textures(
 /// Warns about an unreadable image in a model and replaces it with a constant. Preserves the material's
 /// factors, except that emission is dropped. Materials from mesh files provide their own values for use
 /// without a texture.
-fn substitute_texture(
+fn replace_unreadable_image(
     loaded: &LoadedScene,
     one: &NeededTexture,
     error: &AssetError,
@@ -583,10 +583,13 @@ fn image_dimensions(
 ) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
     match image_input(source, reading)? {
-        ImageInput::File(path) => size(&path, encoding, limits, reading.token),
-        ImageInput::Bytes(bytes) => {
-            size_embedded(EmbeddedImage { path: &source.path, bytes }, encoding, limits, reading.token)
-        }
+        ImageInput::File(path) => read_dimensions(&path, encoding, limits, reading.token),
+        ImageInput::Bytes(bytes) => read_embedded_dimensions(
+            EmbeddedImage { path: &source.path, bytes },
+            encoding,
+            limits,
+            reading.token,
+        ),
     }
 }
 

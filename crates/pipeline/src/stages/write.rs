@@ -276,7 +276,7 @@ pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 ///
 /// # Errors
 /// The token is cancelled, or a file could not be written.
-pub(crate) fn write_animation(
+pub(crate) fn add_animation_frame(
     state: &FilmState,
     to: ImageWriteContext<'_>,
     (turn, frames): (TurntableFrame, &mut TurntableFrames),
@@ -302,7 +302,7 @@ pub(crate) fn write_animation(
     for path in &plan.moving {
         let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
-            let metadata = develop_settings_for(plan, path).metadata_with_samples(samples);
+            let metadata = develop_settings_for_path(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
             let write =
                 |guard: &WritePolicy<'_>| output::write::atomic_with_policy(path, &bytes, guard, token);
@@ -325,7 +325,7 @@ fn write_one(
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let mut finish = develop_settings_for(plan, path);
+    let mut finish = develop_settings_for_path(plan, path);
     // Record the time limit only if it ended the render.
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
@@ -370,7 +370,7 @@ pub(crate) fn develop_settings(plan: &RenderPlan) -> DevelopSettings {
 }
 
 /// Like [`develop_settings`], but with the scene's path relative to the image.
-fn develop_settings_for(plan: &RenderPlan, path: &Path) -> DevelopSettings {
+fn develop_settings_for_path(plan: &RenderPlan, path: &Path) -> DevelopSettings {
     let mut finish = develop_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {

@@ -257,8 +257,11 @@ impl FileHashCache {
         if let Some(content) = known {
             return Ok(content);
         }
-        let content =
-            if stamp.len > MAX_HASHED { content_id_from_stamp(&stamp) } else { self.hash(path, token)? };
+        let content = if stamp.len > MAX_HASHED {
+            content_id_from_stamp(&stamp)
+        } else {
+            self.hash_uncached(path, token)?
+        };
         if is_stamp_reliable(&stamp, now) {
             self.lock_entries().insert(path.to_owned(), (stamp, content));
         } else {
@@ -272,10 +275,10 @@ impl FileHashCache {
         self.lock_entries().retain(|path, _| keep(path));
     }
 
-    fn hash(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    fn hash_uncached(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         #[cfg(test)]
         self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
-        let content = hash(path, token);
+        let content = hash_file_contents(path, token);
         #[cfg(test)]
         let replacement = self.replacements.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
         #[cfg(test)]
@@ -294,7 +297,7 @@ fn unreadable(error: &io::Error) -> FileContentId {
     FileContentId::Unusable(UnreadableReason::Error(error.kind()))
 }
 
-fn hash(path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
     let mut file = match file::open_regular_file(path) {
         Ok(Ok((file, _))) => file,
         // In these cases, the file has been replaced since its metadata was read.

@@ -197,7 +197,7 @@ impl MeshTransform {
                 Transform::scale_rotate_translate(scale, rotate, translate)
             }
             Self::Matrix { linear: [x, y, z], translate } => {
-                Transform::affine(DMat3::from_cols(x, y, z), translate)
+                Transform::from_mat3_translation(DMat3::from_cols(x, y, z), translate)
             }
         }
     }

@@ -26,7 +26,7 @@ pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
     let table = root.table("camera")?;
     let camera =
         if uses_orbiter_file(&table) { read_orbiter_camera(&table) } else { read_look_at_camera(&table) };
-    table.report_invalid_keys();
+    table.report_key_errors();
     camera
 }
 

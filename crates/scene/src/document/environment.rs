@@ -18,7 +18,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     let radiance = if color.is_present() { color.color() } else { Some(default) };
     let rotate = table.optional_key("rotate");
     let degrees = if rotate.is_present() { rotate.number(table.key_limits("rotate")) } else { Some(0.0) };
-    table.report_invalid_keys();
+    table.report_key_errors();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
             .with_label("this scales the map in `file`");

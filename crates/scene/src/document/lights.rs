@@ -35,7 +35,7 @@ fn read_light(table: &TableReader<'_>) -> Option<Light> {
         LightKind::Spot => read_spot_light(table).map(Light::Spot),
         LightKind::Directional => read_directional_light(table).map(Light::Directional),
     };
-    table.report_invalid_keys();
+    table.report_key_errors();
     light
 }
 

@@ -80,7 +80,7 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
     } else {
         common::read_opacity(table, textures)
     };
-    table.report_invalid_keys();
+    table.report_key_errors();
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 

@@ -15,6 +15,6 @@ pub(super) fn read_photons(root: &TableReader<'_>) -> Option<PhotonOptions> {
             .integer(table.integer_range("bounces"))
             .unwrap_or(default.bounces),
     };
-    table.report_invalid_keys();
+    table.report_key_errors();
     Some(photons)
 }

@@ -50,7 +50,7 @@ pub(super) fn read_render_table(root: &TableReader<'_>) -> (Option<RenderOptions
     let render = read_settings(&table);
     let output = read_output_path(&table);
     check_image_size(&table, &render);
-    table.report_invalid_keys();
+    table.report_key_errors();
     (Some(render), output)
 }
 

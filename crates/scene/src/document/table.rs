@@ -41,7 +41,7 @@ impl fmt::Display for TableTitle<'_> {
     }
 }
 
-/// A table in the file. Read its keys, then call [`TableReader::report_invalid_keys`].
+/// A table in the file. Read its keys, then call [`TableReader::report_key_errors`].
 pub(super) struct TableReader<'a> {
     pub(super) context: &'a FileContext<'a>,
     /// Byte range of the header or the braces.
@@ -108,7 +108,7 @@ impl<'a> TableReader<'a> {
 
     /// Returns the range defined for the key `name`, which has the form `KEY` or `TYPE.KEY`.
     pub(super) fn key_limits(&self, name: &str) -> Limits {
-        match self.value_kind(name) {
+        match self.expected_kind(name) {
             Some(
                 ValueKind::Number(limits)
                 | ValueKind::Color(limits)
@@ -134,14 +134,14 @@ impl<'a> TableReader<'a> {
 
     /// Returns the range defined for an integer key.
     pub(super) fn integer_range(&self, name: &str) -> RangeInclusive<i128> {
-        match self.value_kind(name) {
+        match self.expected_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
         }
     }
 
     /// Returns the type defined for a key. A test checks that the definitions match the keys that are read.
-    fn value_kind(&self, name: &str) -> Option<ValueKind> {
+    fn expected_kind(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
                 table_info(table)?
@@ -208,7 +208,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
-    pub(super) fn report_invalid_keys(&self) {
+    pub(super) fn report_key_errors(&self) {
         let known = self.known.borrow();
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {

@@ -43,7 +43,7 @@ fn read_texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
     let uv = if uv == Some(1) { UvSet::Second } else { UvSet::First };
     let factor = table.optional_key("factor");
     let factor = if factor.is_present() { factor.color() } else { Some(Vec3::ONE) };
-    table.report_invalid_keys();
+    table.report_key_errors();
     let (file, image, factor) = (file?, image?, factor?);
     Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }

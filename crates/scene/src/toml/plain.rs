@@ -18,7 +18,7 @@ pub(super) fn read_plain_line<'s>(
     at: usize,
     assembly: &mut DocumentBuilder<'s>,
 ) -> Option<usize> {
-    let mut line = LineScanner { source, at };
+    let mut line = LineCursor { source, at };
     line.skip_whitespace();
     match line.peek() {
         b'[' => {
@@ -59,12 +59,12 @@ struct ScannedValue {
 }
 
 /// A cursor within a line.
-struct LineScanner<'s> {
+struct LineCursor<'s> {
     source: &'s str,
     at: usize,
 }
 
-impl<'s> LineScanner<'s> {
+impl<'s> LineCursor<'s> {
     /// The current byte, or 0 at the end.
     fn peek(&self) -> u8 {
         self.source.as_bytes().get(self.at).copied().unwrap_or(0)

@@ -2,7 +2,7 @@
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
-use crate::lights::LightTransportKind;
+use crate::lights::LightSamplingMode;
 use crate::scene::description::IntegratorProperties;
 
 /// How camera paths continue at surfaces.
@@ -19,7 +19,7 @@ pub struct PathBehavior {
     /// glass ignores this light.
     pub gathers: bool,
     /// How lights are sampled.
-    pub receivers: LightTransportKind,
+    pub receivers: LightSamplingMode,
 }
 
 impl PathBehavior {
@@ -34,11 +34,11 @@ impl PathBehavior {
                 scatters: gathers,
                 mirrors: false,
                 gathers,
-                receivers: LightTransportKind::Eye,
+                receivers: LightSamplingMode::Eye,
             },
             LightAov::Radiance(_) | LightAov::TraversalCost => {
                 let scatters = scatters || gathers;
-                let receivers = if scatters { LightTransportKind::Paths } else { LightTransportKind::Eye };
+                let receivers = if scatters { LightSamplingMode::Paths } else { LightSamplingMode::Eye };
                 Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
@@ -46,6 +46,6 @@ impl PathBehavior {
 }
 
 /// Determines how lights are sampled, based on the settings and on whether photons are gathered.
-pub fn light_sampling_purpose(settings: &RenderSettings, are_gathered: bool) -> LightTransportKind {
+pub fn light_sampling_purpose(settings: &RenderSettings, are_gathered: bool) -> LightSamplingMode {
     PathBehavior::from_settings(settings, are_gathered).receivers
 }

@@ -83,7 +83,7 @@ pub fn trace_camera_paths(
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
-            wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
+            wavefront.trace_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
     // Compute direct lighting at the vertices, and add it to the accumulator.
@@ -98,11 +98,11 @@ pub fn trace_camera_paths(
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
             for places in object_order.indices().chunks(PACKET_SIZE) {
-                wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
+                wavefront.trace_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
             for (paths, first) in rays.chunks(PACKET_SIZE).zip((0..).step_by(PACKET_SIZE)) {
-                wavefront.shade_packet(PacketSource::Paths(paths, first))?;
+                wavefront.trace_packet(PacketSource::Paths(paths, first))?;
             }
         }
         let slots: &[PathRay] = rays;
@@ -252,7 +252,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Shades the hit of one ray in a packet. The path is large, so it is moved only here.
     #[inline(never)]
-    fn shade(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
+    fn shade_ray(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
         let (tile, bit) = (self.tile, 1 << lane);
         match packet.hit(lane) {
             Some(hit) if packet.plain & bit != 0 => {
@@ -263,14 +263,14 @@ impl CameraWavefront<'_, '_> {
                 walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
-                let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
+                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance(lane));
                 self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
             }
         }
     }
 
     /// Intersects and shades a packet of rays.
-    fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
+    fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
         if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
             tile.token.check()?;
@@ -318,7 +318,7 @@ impl CameraWavefront<'_, '_> {
         // Shade in path order because the contributions to a sample are added in this order.
         for lane in lane_indices(wanted) {
             self.place = rays.queue_index(lane);
-            self.shade(packet.path(tile, &rays, lane), (&packet, lane));
+            self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
         }
         // Compute direct lighting at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
@@ -344,7 +344,7 @@ impl CameraWavefront<'_, '_> {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
-                known = tile.plain_material(index).map(|plain| (index, plain));
+                known = tile.plain_packet_material(index).map(|plain| (index, plain));
             }
             let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
@@ -359,7 +359,7 @@ impl CameraWavefront<'_, '_> {
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
         for lane in lane_indices(beyond) {
-            let sky = lights.environment().map(|_| packet.sky(lane));
+            let sky = lights.environment().map(|_| packet.sky_radiance(lane));
             let beyond =
                 lights.radiance_from_infinity_with_sky(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
             self.accumulator.add_non_reflected(
@@ -373,7 +373,7 @@ impl CameraWavefront<'_, '_> {
     /// Adds a plain surface's emission and ambient light.
     fn add_emission_and_ambient(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
-        let Some((material, _)) = self.tile.plain_material(index) else { return };
+        let Some((material, _)) = self.tile.plain_packet_material(index) else { return };
         if is_shining {
             self.add_weighted_emission(path, material.emission, self.tile.emitter_weight(path, hit));
         }
@@ -439,7 +439,7 @@ impl CameraWavefront<'_, '_> {
         if vertex.emits() {
             let weight = match hit {
                 OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                OpaqueHit::Touching(hit) => self.tile.coincident_emitter_weight(path, &hit),
+                OpaqueHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);

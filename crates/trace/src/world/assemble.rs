@@ -16,7 +16,7 @@ impl World {
     pub fn new(scene: &Scene, inputs: &WorldInputs, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, inputs);
         let camera = inputs.camera.as_ref().unwrap_or(&scene.camera);
-        let camera = Camera::new(camera, inputs.orbiter.as_ref()).relative_to(geometry.origin());
+        let camera = Camera::from_description(camera, inputs.orbiter.as_ref()).relative_to(geometry.origin());
         let is_rough =
             |material: &Material| material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);

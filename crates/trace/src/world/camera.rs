@@ -26,7 +26,7 @@ pub struct Camera {
 
 impl Camera {
     /// Creates the camera described by the scene, using the contents of the orbiter file if there is one.
-    pub fn new(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Self {
+    pub fn from_description(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Self {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
                 let forward = (*look_at - *position).normalize();
@@ -80,7 +80,8 @@ impl Camera {
             },
             description::Camera::Orbiter { fov, focus, .. } => {
                 let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
-                let Self { position, up, forward, aperture, .. } = Self::new(camera, Some(&file));
+                let Self { position, up, forward, aperture, .. } =
+                    Self::from_description(camera, Some(&file));
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
                     DVec3::from_array(
@@ -187,7 +188,7 @@ mod tests {
             aperture,
             focus: 4.0,
         };
-        Camera::new(&camera, None)
+        Camera::from_description(&camera, None)
     }
 
     #[test]
@@ -242,9 +243,9 @@ mod tests {
             };
             let scene =
                 description::Camera::Orbiter { file: file.clone(), fov: None, aperture: 0.1, focus: None };
-            let of_file = Camera::new(&scene, Some(&orbiter));
+            let of_file = Camera::from_description(&scene, Some(&orbiter));
             let view = Camera::viewpoint(&scene, Some(&orbiter));
-            let by_vectors = Camera::new(&view.into(), None);
+            let by_vectors = Camera::from_description(&view.into(), None);
             for (a, b) in [
                 (of_file.position, by_vectors.position),
                 (of_file.right, by_vectors.right),

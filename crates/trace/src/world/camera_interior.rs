@@ -154,7 +154,7 @@ impl Object {
     fn surface_point_by_number(&self, number: usize) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
-                let areas = shape.areas();
+                let areas = shape.part_areas();
                 let parts: Vec<usize> = (0..areas.len()).filter(|&part| areas[part] > 0.0).collect();
                 let part = *parts.get(number % parts.len().max(1))?;
                 let u = Vec2::new(0.618_034, 0.754_877_7) * (number as f32 + 0.5);

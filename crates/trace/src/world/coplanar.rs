@@ -179,7 +179,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
                 let is_reported = is_lifted
                     || face.object <= light.object && !must_lift(face, light) && !light.is_duplicate_of(face);
                 if is_reported && are_coplanar_and_overlap(light, face) {
-                    add_coplanar_pair(&mut found, (light, face), is_lifted);
+                    record_coplanar_light(&mut found, (light, face), is_lifted);
                 }
             }
         });
@@ -217,7 +217,7 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
 
 /// Adds a light and the surface that it overlaps. If the pair already exists, updates its lift in this
 /// direction to the maximum over all faces. The lift is above the rounding error of both faces.
-fn add_coplanar_pair(
+fn record_coplanar_light(
     found: &mut BTreeMap<(usize, usize), Vec<CoplanarLight>>,
     (light, face): (&FlatFace, &FlatFace),
     is_lifted: bool,

@@ -51,7 +51,7 @@ pub fn separate_coincident_emitters(
     for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
         mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
     }
-    let (lifts, height) = find_triangles_to_lift(&mesh, emits, emits_in_file, token)?;
+    let (lifts, height) = find_triangle_lifts(&mesh, emits, emits_in_file, token)?;
     if !lifts.is_empty() {
         lift_triangles(mesh.to_mut(), &lifts, height);
     }
@@ -81,7 +81,7 @@ pub(super) fn duplicate_emissive_triangles(
 
 /// Finds the emissive triangles that must be moved off the plane of other faces. Returns their normals and
 /// the distance to move them.
-fn find_triangles_to_lift(
+fn find_triangle_lifts(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
     emits_in_file: impl Fn(u32) -> bool,

@@ -23,7 +23,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
 /// Sampling tables for the environment map. `None` if the image is black.
-pub fn sky_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
+pub fn build_environment_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
@@ -226,7 +226,7 @@ fn mesh_lights(
             let triangles = distinct.map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = emissive.emission.scale;
-            let bounds = emissive.scale_bounds_by_mean(emitter.bounds().scaled_by(radiance));
+            let bounds = emissive.scale_bounds_by_mean(emitter.light_bounds().scaled_by(radiance));
             let patches = || {
                 let patch = |id| UvTriangle {
                     primitive: id,

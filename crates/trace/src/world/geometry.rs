@@ -220,7 +220,7 @@ impl Geometry {
 
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_hit_in_tree(self.traced_tree(), ray, |id, segment| {
+        self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
             match self.merged_meshes_with_tree_id(id) {
                 Some(merged) => {
                     let shape = merged.closest_hit(segment)?;
@@ -235,7 +235,7 @@ impl Geometry {
     /// Returns the nearest hit among the objects for which `counts` returns true. At equal distances, the
     /// lowest object id wins.
     pub fn closest_hit_on_objects_where(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
-        self.closest_hit_in_tree(&self.tree, ray, |id, segment| {
+        self.closest_hit_with_unbounded(&self.tree, ray, |id, segment| {
             if counts(id) { self.intersect_object(id, segment) } else { None }
         })
     }
@@ -243,7 +243,7 @@ impl Geometry {
     /// Returns the nearest hit among a tree's objects and the infinite objects. `hit` intersects one object
     /// with a ray segment.
     #[inline]
-    fn closest_hit_in_tree(
+    fn closest_hit_with_unbounded(
         &self,
         tree: &Bvh,
         ray: &Ray,

@@ -105,7 +105,7 @@ fn sphere_mesh(steps: u32) -> TriangleMesh {
 }
 
 /// Scenes with touching and non-touching surfaces, each with target points for rays.
-fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
+fn contact_scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
     let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
     let cube = |x: f64, size: f64| Shape::Box {
         center: v(x, 0.0, 0.0),
@@ -237,7 +237,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
 fn isolated_regions_match_the_full_search() {
     let mut random = SceneRandom(1);
     let (mut isolated, mut asked, mut touching) = (0, 0, 0);
-    for (number, (world, places)) in scenes(&mut random).into_iter().enumerate() {
+    for (number, (world, places)) in contact_scenes(&mut random).into_iter().enumerate() {
         for round in 0..30_000 {
             // Aim at a target point, between two target points, near one, or at a random point.
             let pick = |random: &mut SceneRandom| places[(random.unit() * places.len() as f64) as usize];

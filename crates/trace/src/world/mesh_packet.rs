@@ -58,9 +58,9 @@ impl MeshInstance {
         let doubtful = simd.movemask(&doubtful) & of;
         let mut on_ray = 0;
         if doubtful != 0 {
-            on_ray = correct_points(&placed, &corners, (rays, hits), doubtful, &mut found);
+            on_ray = correct_doubtful_points(&placed, &corners, (rays, hits), doubtful, &mut found);
         }
-        surface.copy_points(of, &found);
+        surface.copy_points_from(of, &found);
         if self.smooth {
             let normals = gather_vertex_attributes(&vertices, self.tree.file_or_computed_normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
@@ -137,7 +137,7 @@ impl SimdKernel for FillSurfaces<'_> {
 /// inlined, to keep the SIMD code small.
 #[cold]
 #[inline(never)]
-fn correct_points(
+fn correct_doubtful_points(
     placed: &PlacedMesh<impl MeshPlacement>,
     corners: &[Vec3x16; 3],
     (rays, hits): (&RayPacket, &HitPacket),

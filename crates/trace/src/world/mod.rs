@@ -40,13 +40,13 @@ pub use contact::{
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
 pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
-pub use emitters::{build_lights, photon_source, sky_map};
+pub use emitters::{build_environment_map, build_lights, photon_source};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
-pub use null_interaction::{MAX_NULL_INTERACTIONS, TransmittancePacket};
+pub use null_interaction::{MAX_NULL_INTERACTIONS, ShadowTransmittancePacket};
 pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;

@@ -54,7 +54,7 @@ impl SeeThroughObjects {
 
 /// Transmittance along the shadow rays in a packet.
 #[repr(align(64))]
-pub struct TransmittancePacket {
+pub struct ShadowTransmittancePacket {
     /// Mask of rays with zero transmittance.
     pub occluded: u32,
     /// Transmittance of each ray.
@@ -63,7 +63,7 @@ pub struct TransmittancePacket {
     pub lookups: u64,
 }
 
-impl TransmittancePacket {
+impl ShadowTransmittancePacket {
     /// Sets the transmittance along a lane's ray.
     fn set(&mut self, lane: usize, left: Vec3) {
         set_lane(&mut self.left, lane, left);
@@ -88,7 +88,7 @@ impl World {
         ends: &F32x16,
         traced: u32,
         sources: &LightGeometryPacket,
-    ) -> TransmittancePacket {
+    ) -> ShadowTransmittancePacket {
         self.geometry.instruction_set().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
     }
 
@@ -111,11 +111,11 @@ impl World {
         if self.geometry.closest_hit_on_objects_where(ray, stops).is_some() {
             return Vec3::ZERO;
         }
-        self.see_through_transmittance(see_through, ray, source, lookups)
+        self.transmittance_along_ray(see_through, ray, source, lookups)
     }
 
     /// Transmittance of the surface at a hit, and the ray's continuation beyond the surface.
-    pub fn continue_past(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
+    pub fn continue_ray_past(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];
         let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
@@ -131,7 +131,7 @@ impl World {
     }
 
     /// Product of the transmittances of all see-through surfaces along a shadow ray.
-    fn see_through_transmittance(
+    fn transmittance_along_ray(
         &self,
         see_through: &SeeThroughObjects,
         ray: &Ray,
@@ -149,7 +149,7 @@ impl World {
             if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
-            let (part, beyond) = self.continue_past(&ray, &hit, lookups);
+            let (part, beyond) = self.continue_ray_past(&ray, &hit, lookups);
             ray = beyond;
             // A light does not occlude itself.
             if source == LightGeometry::Primitive(hit.object, hit.shape.primitive) {
@@ -177,13 +177,13 @@ struct TransmittanceKernel<'a> {
 }
 
 impl SimdKernel for TransmittanceKernel<'_> {
-    type Output = TransmittancePacket;
+    type Output = ShadowTransmittancePacket;
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> TransmittancePacket {
+    fn run(self, simd: impl Simd) -> ShadowTransmittancePacket {
         let Self { world, rows, ends, traced, sources } = self;
         let mut transmittance =
-            TransmittancePacket { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
+            ShadowTransmittancePacket { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
         let Some(see_through) = &world.see_through else { return transmittance };
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
@@ -205,7 +205,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
         // Trace the rays that may cross see-through surfaces.
         for lane in lane_indices(traced & !transmittance.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
-            let left = world.see_through_transmittance(
+            let left = world.transmittance_along_ray(
                 see_through,
                 &ray,
                 sources.geometry(lane),

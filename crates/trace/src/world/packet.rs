@@ -173,7 +173,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
                 merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
-                objects = renumber_by_object(merged, &mut found);
+                objects = resolve_merged_hits(merged, &mut found);
             }
             None => {
                 let object = &self.geometry.objects()[id as usize];
@@ -197,7 +197,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
 
 /// Returns the objects of hits on merged meshes, and renumbers the hit triangles per object.
 #[inline(always)]
-fn renumber_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
+fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
     let mut objects = [NONE; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         // Lanes without a hit look up triangle 0. The result is not used.

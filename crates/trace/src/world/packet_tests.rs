@@ -59,7 +59,7 @@ impl HostileRandom {
 }
 
 /// One axis-aligned and one tilted shape of each kind, all of this size.
-fn shapes(scale: f64) -> Vec<Object> {
+fn test_shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
         Shape::Quad(Parallelogram::new(corner * scale, u * scale, v * scale))
@@ -148,7 +148,7 @@ fn assert_packet_matches_rays(
 fn packet_and_single_hits_are_bit_identical() {
     let mut random = HostileRandom(11);
     for scale in [1.0_f32, 1e-18, 1e15] {
-        for object in shapes(f64::from(scale)) {
+        for object in test_shapes(f64::from(scale)) {
             let (mut hits, mut rays_in_all) = (0, 0);
             for i in 0..2000 {
                 let kind = random.below(6);

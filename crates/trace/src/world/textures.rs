@@ -33,7 +33,7 @@ pub struct CutoffBits(u32);
 impl CutoffBits {
     /// Converts a cutoff for opacity to a cutoff for pixel values. `factor` is the factor applied to the
     /// image.
-    pub fn new(cutoff: f32, factor: f32) -> Self {
+    pub fn from_opacity_cutoff(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
     }
 
@@ -163,7 +163,7 @@ pub fn textures_needed(
             known.normals_of = known.normals_of.take().or(texture.normals_of);
         }
     };
-    let (used_materials, own_materials) = materials_in_use(scene);
+    let (used_materials, own_materials) = used_material_flags(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
@@ -228,7 +228,7 @@ fn environment_source_from_file(file: &Path) -> TextureSource {
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
 /// instances.
-fn materials_in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
+fn used_material_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
@@ -267,7 +267,7 @@ pub fn material_texture_source(
 /// Cutoff at which an opacity texture's mip levels preserve coverage. `None` without a cutoff or mip levels.
 pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<CutoffBits> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
-    is_covered.then(|| CutoffBits::new(cutoff, scene.textures[texture].factor.x))
+    is_covered.then(|| CutoffBits::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
 }
 
 /// How a scene material's texture is used in this role.
@@ -291,7 +291,7 @@ pub fn texture_use(
             if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
         }
         PixelInterpretation::Number(ChannelSelector::Opacity)
-            if !is_used_as_color(scene, material, texture) =>
+            if !uses_image_as_color(scene, material, texture) =>
         {
             PixelInterpretation::Number(ChannelSelector::Mask { of_any_color: false })
         }
@@ -300,7 +300,7 @@ pub fn texture_use(
 }
 
 /// Whether the material also uses the texture's image for a color.
-fn is_used_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
+fn uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
     material.textures().into_iter().any(|(other, role)| {
         role.pixel_interpretation() == PixelInterpretation::Color && image(other) == image(texture)

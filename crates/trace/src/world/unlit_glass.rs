@@ -26,7 +26,7 @@ impl LightBoundingBoxPair {
     }
 
     /// Center and corners of the smaller box.
-    pub fn center_and_corners(&self) -> impl Iterator<Item = Vec3> {
+    pub fn smaller_box_points(&self) -> impl Iterator<Item = Vec3> {
         let own = self.of_object.unwrap_or(self.of_ball);
         let corner = move |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { own.min[axis] } else { own.max[axis] };

@@ -151,7 +151,7 @@ impl Perform for InputPerformer {
             // The end marker of a paste that has already expired.
             ([], '~') if first == 201 => {}
             ([], '~') => {
-                if let Some(code) = numbered_key(first) {
+                if let Some(code) = key_from_csi_number(first) {
                     self.push_key(code, modifiers(second));
                 }
             }
@@ -217,7 +217,7 @@ fn letter_key(letter: char) -> Option<KeyCode> {
     })
 }
 
-fn numbered_key(number: u16) -> Option<KeyCode> {
+fn key_from_csi_number(number: u16) -> Option<KeyCode> {
     let function = |first: u16, key: u8| KeyCode::F(u8::try_from(number - first).map_or(key, |it| key + it));
     Some(match number {
         1 | 7 => KeyCode::Home,

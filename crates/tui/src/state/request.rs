@@ -336,7 +336,7 @@ impl RequestState {
         self.command_line.view.unwrap_or(ViewMode::Beauty)
     }
 
-    pub(crate) fn view(&self) -> ViewMode {
+    pub(crate) fn view_mode(&self) -> ViewMode {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 

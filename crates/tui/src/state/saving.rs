@@ -46,7 +46,7 @@ pub(crate) struct WrittenFile {
 
 impl WrittenFile {
     /// The file's path, safe to display.
-    pub(crate) fn name(&self) -> String {
+    pub(crate) fn display_path(&self) -> String {
         escape_invisible_chars(&self.path.to_string_lossy()).into_owned()
     }
 
@@ -59,7 +59,7 @@ impl WrittenFile {
                 messages::output_modified_externally
             }
         };
-        self.lost.map(|lost| describe(lost)(&self.name(), lost.describe()))
+        self.lost.map(|lost| describe(lost)(&self.display_path(), lost.describe()))
     }
 
     /// Describes the changes made with keys that the file includes.

@@ -6,7 +6,7 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneOutcome, PreviewSource, Stage, Status,
+    self, CameraSaveResult, LastValidSceneOutcome, PreviewImageState, Stage, Status,
 };
 use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -24,7 +24,7 @@ fn save_broken_scene(ui: &mut TestUi) {
 /// Sends a preview of a finished or unfinished image.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
-    let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
+    let source = Some(PreviewImageState { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });

@@ -132,7 +132,7 @@ fn digits_select_views() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         ui.press_character('5');
-        assert_eq!(ui.state.request.view(), ViewMode::Beauty, "digits should only work in the list");
+        assert_eq!(ui.state.request.view_mode(), ViewMode::Beauty, "digits should only work in the list");
         ui.press_character('v');
         let text = ui.screen_text();
         assert!(
@@ -149,11 +149,11 @@ fn digits_select_views() {
         }
         assert!(ui.screen_text().contains("▸  emission"), "{}", ui.screen_text());
         ui.press_character('9');
-        assert_eq!(ui.state.request.view(), ViewMode::Specular);
+        assert_eq!(ui.state.request.view_mode(), ViewMode::Specular);
         ui.press_key(ESCAPE);
         assert!(!ui.screen_text().contains("▸"));
         ui.press_character('1');
-        assert_eq!(ui.state.request.view(), ViewMode::Specular, "digits should only work in the list");
+        assert_eq!(ui.state.request.view_mode(), ViewMode::Specular, "digits should only work in the list");
     }
 }
 
@@ -198,19 +198,19 @@ fn views_are_found_by_name() {
     ui.press_character('v');
     assert!(ui.press_character('/').is_empty());
     ui.press_character('d');
-    assert_eq!(ui.state.request.view(), ViewMode::Depth, "expected the first match");
+    assert_eq!(ui.state.request.view_mode(), ViewMode::Depth, "expected the first match");
     ui.press_character('i');
-    assert_eq!(ui.state.request.view(), ViewMode::Diffuse);
+    assert_eq!(ui.state.request.view_mode(), ViewMode::Diffuse);
     assert!(ui.screen_text().contains("/ di"), "{}", ui.screen_text());
     ui.press_key(KeyPress::special(KeyCode::Backspace));
-    assert_eq!(ui.state.request.view(), ViewMode::Depth);
+    assert_eq!(ui.state.request.view_mode(), ViewMode::Depth);
     for letter in "qqq".chars() {
         assert!(ui.press_character(letter).is_empty(), "q should not quit while searching");
     }
-    assert_eq!(ui.state.request.view(), ViewMode::Depth, "no match");
+    assert_eq!(ui.state.request.view_mode(), ViewMode::Depth, "no match");
     ui.press_key(KeyPress::special(KeyCode::Enter));
     assert!(ui.state.overlays.views.is_none());
-    assert_eq!(ui.state.request.view(), ViewMode::Depth);
+    assert_eq!(ui.state.request.view_mode(), ViewMode::Depth);
 }
 
 #[test]

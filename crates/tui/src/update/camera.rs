@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::notices::{notify, prompt, show_key_change, show_notice};
+use super::notices::{prompt, show_key_change, show_notice, show_notice_only};
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
@@ -46,7 +46,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
-        return notify(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
+        return show_notice_only(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
     }
     move_camera(state, |_| pose)
 }
@@ -56,10 +56,10 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
     let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return notify(state, &messages::fov_limit(fov));
+        return show_notice_only(state, &messages::fov_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
-    handle_camera_step(state)
+    render_camera_step(state)
 }
 
 /// Increases the exposure by a number of steps.
@@ -69,7 +69,7 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
-        return notify(state, &messages::exposure_limit(&format_stops(stops)));
+        return show_notice_only(state, &messages::exposure_limit(&format_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = render_or_delay_step(state);
@@ -80,14 +80,14 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
 fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
-    handle_camera_step(state)
+    render_camera_step(state)
 }
 
 fn report_unknown_camera(state: &mut State) -> Vec<Effect> {
-    notify(state, messages::NO_SCENE)
+    show_notice_only(state, messages::NO_SCENE)
 }
 
-pub(super) fn handle_camera_step(state: &mut State) -> Vec<Effect> {
+pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
     drop_redundant_camera_changes(state);
     let effects = render_or_delay_step(state);
     show_key_change(
@@ -119,7 +119,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
     if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
-        return notify(state, messages::NOTHING_TO_KEEP);
+        return show_notice_only(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.describe_camera_conflicts();
     // Models do not contain a camera that could be overwritten.
@@ -176,8 +176,8 @@ pub(super) fn handle_saved_camera(
 pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
-        None if state.saving.camera_of_model.is_some() => notify(state, messages::NEW_SCENE_STAYS),
-        None => notify(state, messages::NOTHING_TO_UNDO),
+        None if state.saving.camera_of_model.is_some() => show_notice_only(state, messages::NEW_SCENE_STAYS),
+        None => show_notice_only(state, messages::NOTHING_TO_UNDO),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{notify, show_notice, show_until_key};
+use super::notices::{show_notice, show_notice_only, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{RenderState, State};
@@ -40,7 +40,9 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     }
     match state.picture.history.step_back_by(steps, newest) {
         Some(shown) => show_older_render(state, shown),
-        None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
+        None => {
+            show_notice_only(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER })
+        }
     }
 }
 
@@ -72,7 +74,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => notify(state, messages::NO_EARLIER_RENDER),
+        None => show_notice_only(state, messages::NO_EARLIER_RENDER),
     }
 }
 
@@ -88,7 +90,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 /// Explains why the history, which consists of previews, has no image.
 fn report_no_newest_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
-    notify(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
+    show_notice_only(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
 fn newest_image(state: &State) -> Option<crate::history::ShownImage> {

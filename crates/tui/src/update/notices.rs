@@ -33,7 +33,7 @@ fn set_message(state: &mut State, message: Message) {
 }
 
 /// Shows a notice. Returns no effects.
-pub(super) fn notify(state: &mut State, words: &str) -> Vec<Effect> {
+pub(super) fn show_notice_only(state: &mut State, words: &str) -> Vec<Effect> {
     show_notice(state, words);
     Vec::new()
 }

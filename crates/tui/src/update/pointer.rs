@@ -1,6 +1,6 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{notify, prompt, show_key_change, show_notice};
+use super::notices::{prompt, show_key_change, show_notice, show_notice_only};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
@@ -83,7 +83,7 @@ fn drag_to_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 
 fn handle_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return notify(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
@@ -101,13 +101,13 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 }
 
 /// Waits for a click that sets the focus. If already waiting, sets the focus at the crosshair.
-pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
+pub(super) fn pick_focus(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return notify(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return notify(state, messages::PINHOLE);
+        return show_notice_only(state, messages::PINHOLE);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
@@ -119,10 +119,10 @@ pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return notify(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
-        return notify(state, messages::NO_SCENE);
+        return show_notice_only(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -149,12 +149,12 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
             let facts = inspected_values(picked);
-            state.selection.clicked = Some(values_with_pixel(picked, &facts));
+            state.selection.clicked = Some(format_picked_values(picked, &facts));
             state.selection.facts = Some(facts);
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => notify(state, messages::NOTHING_TO_FOCUS),
+        (PickPurpose::Focus, None) => show_notice_only(state, messages::NOTHING_TO_FOCUS),
         (PickPurpose::Focus, Some(thing)) => focus_at_depth(state, thing.depth),
     }
 }
@@ -162,14 +162,14 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = round_to_step(depth, coordinate_step_at_distance(depth));
     if !(distance > 0.0) {
-        return notify(state, messages::NOTHING_TO_FOCUS);
+        return show_notice_only(state, messages::NOTHING_TO_FOCUS);
     }
     // The scene may have been edited after the click.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return notify(state, messages::PINHOLE);
+        return show_notice_only(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
-    let effects = camera::handle_camera_step(state);
+    let effects = camera::render_camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
         show_key_change(state, messages::focus_moved(distance));
     }
@@ -177,7 +177,7 @@ fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
 }
 
 /// Formats the inspected values and the pixel position on one line.
-fn values_with_pixel(PickResult { thing, pixel: [x, y], .. }: &PickResult, facts: &[String]) -> String {
+fn format_picked_values(PickResult { thing, pixel: [x, y], .. }: &PickResult, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
@@ -185,14 +185,14 @@ fn values_with_pixel(PickResult { thing, pixel: [x, y], .. }: &PickResult, facts
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return notify(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
-        return notify(state, messages::NOTHING_TO_COPY);
+        return show_notice_only(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
         // The message contains the text so that the user can select it.
-        return notify(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
+        return show_notice_only(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]

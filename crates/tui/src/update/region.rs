@@ -23,7 +23,7 @@ pub(super) fn handle_region_key(state: &mut State) -> Vec<Effect> {
         state.selection.is_marking = true;
         return prompt(state, messages::DRAG_REGION);
     }
-    render_section(state, section_around(state.selection.crosshair))
+    render_section(state, section_around_point(state.selection.crosshair))
 }
 
 /// Stops waiting for a drag and cancels any drag in progress.
@@ -43,12 +43,12 @@ pub(super) fn update_dragged_region(state: &mut State, from: ImagePosition, to: 
 pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => render_section(state, marked),
-        (None, Some(spot)) => render_section(state, section_around(spot)),
+        (None, Some(spot)) => render_section(state, section_around_point(spot)),
         (None, None) => Vec::new(),
     }
 }
 
-fn section_around(spot: ImagePosition) -> NormalizedRect {
+fn section_around_point(spot: ImagePosition) -> NormalizedRect {
     let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
     NormalizedRect { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
 }

@@ -17,7 +17,7 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }
-    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view_mode()).unwrap_or(0);
     let last = ViewMode::ALL.len() - 1;
     let column = views_per_column(state);
     let chosen = match action {
@@ -99,7 +99,7 @@ fn close_list(state: &mut State) {
 /// Selects a view unless it is already selected.
 fn select_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
     state.open_view_list();
-    if view == state.request.view() {
+    if view == state.request.view_mode() {
         return Vec::new();
     }
     state.overlays.message = None;

@@ -64,7 +64,7 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
     let rule = "─".repeat(usize::from(area.width));
     put_text(buffer, area, &[(&rule, tone)], state.display.depth);
     let words = match &state.overlays.problems {
-        Some(_) => super::header::format_error_count(state),
+        Some(_) => super::header::format_problem_count(state),
         None => report::summarize_counts(&reported),
     };
     let mut room = area;
@@ -126,7 +126,7 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
     let mut lines: Vec<StyledLine> =
-        faults.iter().take(MAX).flat_map(|fault| format_diagnostic_group(fault, width)).collect();
+        faults.iter().take(MAX).flat_map(|fault| format_repeated_diagnostic(fault, width)).collect();
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
@@ -136,7 +136,7 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
 }
 
 /// Formats the first position in full and the others only as line and column. An empty line follows.
-fn format_diagnostic_group(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
+fn format_repeated_diagnostic(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         SpanRole::Text => TextRole::Plain,
         SpanRole::Error => TextRole::Error,

@@ -62,7 +62,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 
 /// Draws the state block. Returns the number of columns used.
 fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
-    let (sign, word, tone) = activity_label(state);
+    let (sign, word, tone) = activity_indicator(state);
     let mut text = format!(" {sign} {word} ");
     if area.width >= WIDE {
         text = format!("{text:<BLOCK$}");
@@ -77,7 +77,7 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 }
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
-pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, TextRole) {
+pub(super) fn activity_indicator(state: &State) -> (&'static str, &'static str, TextRole) {
     if state.picture.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
@@ -131,7 +131,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 fn view_label(state: &State) -> String {
     let open = state.picture.history.viewed_provenance();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
-    let view = of_open.unwrap_or_else(|| state.request.view());
+    let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
         return String::new();
     }
@@ -215,7 +215,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         (WorkerActivity::Broken, _, _) if state.overlays.is_scene_missing() => {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
-        (WorkerActivity::Broken, _, _) => vec![format_error_count(state)],
+        (WorkerActivity::Broken, _, _) => vec![format_problem_count(state)],
         (WorkerActivity::Done | WorkerActivity::Cancelled, _, _) => Vec::new(),
     }
 }
@@ -243,7 +243,7 @@ fn format_eta(state: &State, progress: &RenderProgress) -> String {
 }
 
 /// Formats the number of errors and warnings.
-pub(super) fn format_error_count(state: &State) -> String {
+pub(super) fn format_problem_count(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
     let errors = format_count(count(Severity::Error) + usize::from(problems.work.is_some()), "error");

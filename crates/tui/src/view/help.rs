@@ -77,7 +77,7 @@ fn help_lines(width: u16) -> Vec<(String, String)> {
         let count = label.len().max(help.len());
         (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()
     };
-    help_entries().flat_map(both).collect()
+    all_help_entries().flat_map(both).collect()
 }
 
 /// Returns the number of lines per page and the maximum scroll position.
@@ -87,14 +87,14 @@ pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
     (page, help_lines(inner.width).len().saturating_sub(page))
 }
 
-fn help_entries() -> impl Iterator<Item = (&'static str, &'static str)> {
+fn all_help_entries() -> impl Iterator<Item = (&'static str, &'static str)> {
     let keys = KEYMAP.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
     let overlay = OVERLAY.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
     keys.chain(overlay).chain(NOTES.iter().copied())
 }
 
 fn widest_entry(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
-    help_entries().map(|entry| text_columns(part(entry))).max().unwrap_or(0)
+    all_help_entries().map(|entry| text_columns(part(entry))).max().unwrap_or(0)
 }
 
 fn help_area(state: &State) -> Rect {

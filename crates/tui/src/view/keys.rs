@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::header::activity_label;
+use super::header::activity_indicator;
 use super::layout::Layout;
 use super::message;
 use super::text::{TextRole, put_text, right_part, text_columns};
@@ -114,7 +114,7 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
         (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
         (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
         (Action::ToggleDepthOfField, "dof", on_off(has_depth_of_field(state)).to_owned(), keys.dof.is_some()),
-        (Action::NextView, "view", state.request.view().name().to_owned(), keys.view.is_some()),
+        (Action::NextView, "view", state.request.view_mode().name().to_owned(), keys.view.is_some()),
         (
             Action::CycleIntegrator,
             "",
@@ -253,7 +253,7 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     let key = keymap::binding_for(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
-        Some(_) => (super::header::format_error_count(state), activity_label(state).2),
+        Some(_) => (super::header::format_problem_count(state), activity_indicator(state).2),
         None => match state.warnings_and_write_failure() {
             none if none.is_empty() => return None,
             reported => (summarize_counts(&reported), TextRole::Warning),

@@ -52,7 +52,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> FileLinksAndDelayedTex
     // A long message covers everything drawn before it.
     message::draw(state, &layout, buffer);
     if state.overlays.views.is_some() {
-        views::draw_view_list(state, &layout, buffer);
+        views::draw_view_mode_list(state, &layout, buffer);
     }
     if state.overlays.help.open {
         help::draw(state, buffer);

@@ -204,7 +204,7 @@ fn draw_summary(
 /// Name and size of each written file. Empty if the panel lists the files.
 fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextRole)>> {
     let pieces = |written: &WrittenFile| {
-        let name = written.name();
+        let name = written.display_path();
         let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), TextRole::Faint), (name, TextRole::File), (size, TextRole::Faint)]
     };
@@ -235,21 +235,22 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     if state.request.has_no_key_overrides() {
         let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
         let words = |file: &WrittenFile| {
-            messages::written_image_differs(&file.name(), &file.describe_key_changes().join(", "))
+            messages::written_image_differs(&file.display_path(), &file.describe_key_changes().join(", "))
         };
         return by_hand.map(words).into_iter().collect();
     }
     if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
-        return vec![messages::written_image_unfinished(&file.name())];
+        return vec![messages::written_image_unfinished(&file.display_path())];
     }
     if !state.can_overwrite_outputs() {
         return vec![messages::NOT_SAVED_WITH_CONFLICT.to_owned()];
     }
     let image_name = exit_summary::output_file_names(state);
     let other = match (saving.own, by_hand, image_name) {
-        (_, Some(file), _) => {
-            Some(messages::image_written_with_changes(&file.name(), &file.describe_key_changes().join(", ")))
-        }
+        (_, Some(file), _) => Some(messages::image_written_with_changes(
+            &file.display_path(),
+            &file.describe_key_changes().join(", "),
+        )),
         (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
         (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {
             Some(messages::scene_image_unfinished(&name, floor_percent(fraction)))

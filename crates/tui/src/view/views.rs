@@ -15,8 +15,8 @@ const WIDTH: u16 = 16;
 /// Number of views that can be selected with a digit.
 pub(crate) const DIGITS: usize = 9;
 
-pub(super) fn draw_view_list(state: &State, layout: &Layout, buffer: &mut Buffer) {
-    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+pub(super) fn draw_view_mode_list(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let current = ViewMode::ALL.iter().position(|view| *view == state.request.view_mode()).unwrap_or(0);
     let area = list_area(layout).intersection(buffer.area);
     if area.is_empty() {
         return;

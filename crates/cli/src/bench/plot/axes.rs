@@ -58,7 +58,7 @@ pub(super) fn format_power_of_ten(mark: f64) -> String {
     if whole == 0 {
         return factor.to_string();
     }
-    let digits = format!("{whole}").chars().map(superscript).collect::<String>();
+    let digits = format!("{whole}").chars().map(to_superscript).collect::<String>();
     if factor == 1 { format!("10{digits}") } else { format!("{factor}·10{digits}") }
 }
 
@@ -79,7 +79,7 @@ fn digit_and_exponent(mark: f64) -> (i32, i32) {
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
 }
 
-fn superscript(digit: char) -> char {
+fn to_superscript(digit: char) -> char {
     match digit {
         '-' => '⁻',
         '1' => '¹',

@@ -168,7 +168,7 @@ impl<'t> EnclosingTable<'t> {
         let (mut at, mut open) = (0, 0);
         for line in text.split_inclusive('\n') {
             // A key or a header ends an unclosed array.
-            if starts_with_key(line) || header_name(line).is_some() {
+            if starts_with_assignment(line) || header_name(line).is_some() {
                 open = 0;
             }
             let (start, end) = (at, at + line.len());
@@ -190,7 +190,7 @@ impl<'t> EnclosingTable<'t> {
 }
 
 /// Whether a line starts with a key and `=`.
-fn starts_with_key(line: &str) -> bool {
+fn starts_with_assignment(line: &str) -> bool {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     let rest = line.trim_start().trim_start_matches(is_bare);
     rest.trim_start().starts_with('=')

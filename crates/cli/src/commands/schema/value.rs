@@ -37,13 +37,17 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
             let scale = json!({ "anyOf": color_schemas(Limits::AtLeast(0.0), draft) });
             any_of(color_schemas(limits, draft), texture_reference_schema(json!({ "scale": scale })))
         }
-        ValueKind::NumberOrTexture(limits) => any_of(vec![number_schema(limits, draft)], channel_schema()),
+        ValueKind::NumberOrTexture(limits) => {
+            any_of(vec![number_schema(limits, draft)], texture_channel_schema())
+        }
         ValueKind::Numbers(count, _, limits) => number_array_schema(count, limits, draft),
         ValueKind::Scale(limits) => {
             json!({ "anyOf": [number_schema(limits, draft), number_array_schema(3, limits, draft)] })
         }
         ValueKind::Texture | ValueKind::Material => json!({ "type": "string", "minLength": 1 }),
-        ValueKind::Heights => any_of(vec![json!({ "type": "string", "minLength": 1 })], channel_schema()),
+        ValueKind::Heights => {
+            any_of(vec![json!({ "type": "string", "minLength": 1 })], texture_channel_schema())
+        }
     }
 }
 
@@ -137,7 +141,7 @@ fn texture_reference_schema(more: Value) -> Value {
 }
 
 /// Returns the schema for `{ texture = "name", channel = "r" }`.
-fn channel_schema() -> Value {
+fn texture_channel_schema() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
     let doc = "The channel to read. The default is luminance, or alpha for opacity.";
     texture_reference_schema(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))

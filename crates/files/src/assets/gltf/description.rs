@@ -173,7 +173,7 @@ pub struct ModelMaterial {
 
 impl ModelMaterial {
     /// A gray dielectric material.
-    pub(super) fn default_with_name(name: &str) -> Self {
+    pub(super) fn named_gray_dielectric(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             color: TexturedValue::from_scalar(0.8),

@@ -90,7 +90,7 @@ impl MaterialReader<'_> {
 
     fn convert_material(&mut self, json: &JsonMaterial) -> Result<ModelMaterial, GltfError> {
         let (pbr, extensions) = (&json.pbr_metallic_roughness, &json.extensions);
-        let mut material = ModelMaterial::default_with_name(&json.name);
+        let mut material = ModelMaterial::named_gray_dielectric(&json.name);
         // Convert the core parameters.
         let [red, green, blue, alpha] = pbr.base_color_factor;
         let mut base = (DVec3::new(red, green, blue), alpha, &pbr.base_color_texture);

@@ -173,7 +173,7 @@ impl GltfFile {
     }
 
     /// Hash of the glTF file.
-    pub fn hash(&self) -> FileHash {
+    pub fn file_hash(&self) -> FileHash {
         self.hash
     }
 
@@ -288,10 +288,10 @@ impl GltfFile {
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {
-            ImageLocation::File(file) => image::size(&file, encoding, limits, token),
+            ImageLocation::File(file) => image::read_dimensions(&file, encoding, limits, token),
             ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
-                image::size_embedded(image, encoding, limits, token)
+                image::read_embedded_dimensions(image, encoding, limits, token)
             }
         };
         size.map(drop).map_err(|error| self.add_image_context(number, error))

@@ -282,7 +282,7 @@ impl SceneWalk<'_> {
                 convert_material(self.container, number, sets, &mut self.notes)?
             }
             Some(number) => return Err(GltfError::index_out_of_range("materials", number, materials.len())),
-            None => ModelMaterial::default_with_name("default"),
+            None => ModelMaterial::named_gray_dielectric("default"),
         };
         self.scene.materials.push(read);
         let index = self.scene.materials.len() - 1;

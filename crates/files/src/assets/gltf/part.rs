@@ -93,7 +93,7 @@ impl GltfFile {
             let reason = wrong_component_count_message(width);
             return Err(GltfError::new(reason).add_location("POSITION"));
         }
-        let (corners, vertices) = self.corner_indices(primitive, positions.count)?;
+        let (corners, vertices) = self.read_corner_indices(primitive, positions.count)?;
         // Read the vertex attributes.
         let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
         let normals = self.attribute(primitive, "NORMAL")?.filter(is_complete);
@@ -150,7 +150,7 @@ impl GltfFile {
 
     /// Returns each corner's index into a list of vertices, and that list. The list contains all vertices, or
     /// only the used ones if there are few corners.
-    fn corner_indices(
+    fn read_corner_indices(
         &self,
         primitive: &Primitive,
         vertices: usize,

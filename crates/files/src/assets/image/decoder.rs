@@ -141,7 +141,7 @@ pub(super) fn max_decompression_ratio(format: Option<ImageFormat>) -> u64 {
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
 /// size of the file data kept by the decoder. `in_memory` is the size of the in-memory copy of the file,
 /// which is freed before the texels are complete.
-pub(super) fn check_size(
+pub(super) fn checked_texel_bytes(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],

@@ -34,7 +34,7 @@ use crate::system::describe_error;
 use counting_reader::CountingReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    OpenedImage, bytes_per_texel, check_size, create_decoder, max_decompression_ratio, orientation,
+    OpenedImage, bytes_per_texel, checked_texel_bytes, create_decoder, max_decompression_ratio, orientation,
 };
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
@@ -181,7 +181,7 @@ pub fn load_hashed(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<(LoadedImage, FileHash), AssetError> {
-    let (source, hash) = ImageSource::read(path, encoding, limits, token)?;
+    let (source, hash) = ImageSource::read_hashed(path, encoding, limits, token)?;
     Ok((load_source(source, encoding, Monitor { progress, token })?, hash))
 }
 
@@ -211,7 +211,7 @@ fn load_source(
 ///
 /// # Errors
 /// Any error from [`load`] that can be detected at the start of the file.
-pub fn size(
+pub fn read_dimensions(
     path: &Path,
     encoding: ImageEncoding,
     limits: ImageLimits,
@@ -259,11 +259,11 @@ pub fn load_embedded(
     load_source(ImageSource::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
-/// Like [`size`], but for an embedded image.
+/// Like [`read_dimensions`], but for an embedded image.
 ///
 /// # Errors
-/// Same as [`size`].
-pub fn size_embedded(
+/// Same as [`read_dimensions`].
+pub fn read_embedded_dimensions(
     image: EmbeddedImage<'_>,
     encoding: ImageEncoding,
     limits: ImageLimits,
@@ -284,7 +284,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     Mipmaps::build(texels, |level| {
         let halving = ImageHalver::new(level);
         let mut rows = halving.empty_rows();
-        for y in 0..halving.rows() {
+        for y in 0..halving.halved_height() {
             token.check()?;
             halving.append_row(y, &mut rows);
         }
@@ -357,7 +357,7 @@ impl ImageSource {
 
     /// Reads a file into memory and hashes it. The hash matches the decoded bytes even if the file is
     /// replaced in the meantime.
-    fn read(
+    fn read_hashed(
         path: &Path,
         encoding: ImageEncoding,
         limits: ImageLimits,
@@ -366,7 +366,7 @@ impl ImageSource {
         let (file, length) = read::open(path, FILE_LIMIT)?;
         if length > CHECKED_FIRST {
             // Avoid reading a large file that will be rejected.
-            size(path, encoding, limits, token)?;
+            read_dimensions(path, encoding, limits, token)?;
         }
         let unreadable = |error: io::Error| AssetError::from_io(path, &error);
         let without_text = match length > CHECKED_FIRST {
@@ -491,8 +491,13 @@ impl ImageSource {
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
-        let texel_bytes =
-            check_size(&*decoder, texel, [self.length, held_bytes, in_memory], self.limits, expansion)?;
+        let texel_bytes = checked_texel_bytes(
+            &*decoder,
+            texel,
+            [self.length, held_bytes, in_memory],
+            self.limits,
+            expansion,
+        )?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible_size(width, height, self.length)?;

@@ -59,10 +59,10 @@ impl TransferFunction {
     pub(super) fn decode(&self, x: f64) -> f64 {
         match self {
             Self::Srgb => f64::from(srgb_to_linear(x as f32)),
-            Self::Power(exponent) => power(x, *exponent),
+            Self::Power(exponent) => pow_or_zero(x, *exponent),
             Self::Parametric { g, a, b, c, d, e, f } => {
                 if x >= *d {
-                    power(a * x + b, *g) + e
+                    pow_or_zero(a * x + b, *g) + e
                 } else {
                     c * x + f
                 }
@@ -85,7 +85,7 @@ impl TransferFunction {
 }
 
 /// xʸ, or 0 for x ≤ 0.
-fn power(x: f64, exponent: f64) -> f64 {
+fn pow_or_zero(x: f64, exponent: f64) -> f64 {
     match x {
         _ if x < f64::MIN_POSITIVE => 0.0,
         _ if exponent == 1.0 => x,
@@ -101,8 +101,8 @@ fn decode_pq(x: f64) -> f64 {
     const C1: f64 = 3424.0 / 4096.0;
     const C2: f64 = 2413.0 / 128.0;
     const C3: f64 = 2392.0 / 128.0;
-    let root = power(x, 1.0 / M2);
-    MOST * power((root - C1) / (C2 - C3 * root), 1.0 / M1)
+    let root = pow_or_zero(x, 1.0 / M2);
+    MOST * pow_or_zero((root - C1) / (C2 - C3 * root), 1.0 / M1)
 }
 
 /// Decodes an HLG signal to [0, 1].

@@ -29,7 +29,7 @@ pub(super) fn assemble_text_mesh(
     mut parsed: ParsedMesh,
     start_of: impl Fn(usize) -> Option<usize>,
 ) -> Result<LoadedMesh, AssetError> {
-    corners::split_vertices(&mut parsed, source.monitor.token)?;
+    corners::split_vertices_at_seams(&mut parsed, source.monitor.token)?;
     let ParsedMesh {
         positions,
         normals,
@@ -48,7 +48,7 @@ pub(super) fn assemble_text_mesh(
         companions,
         pictures,
     } = parsed;
-    let (origin, positions) = relative_to_origin(positions, &faces);
+    let (origin, positions) = recenter_positions(positions, &faces);
     if has_separate_corners {
         faces.merge_coincident_vertices(&positions, source.monitor.token)?;
     }
@@ -61,8 +61,8 @@ pub(super) fn assemble_text_mesh(
     if triangles.is_empty() {
         return Err(source.malformed_error(no_usable_face_message(faces.len(), dropped)));
     }
-    let bad_uvs = [&uvs, &second_uvs].map(|uvs| non_finite_vertices(uvs, |uv| uv.is_finite()));
-    let bad_normals = non_finite_vertices(&normals, |normal| normal.is_finite());
+    let bad_uvs = [&uvs, &second_uvs].map(|uvs| find_non_finite_vertices(uvs, |uv| uv.is_finite()));
+    let bad_normals = find_non_finite_vertices(&normals, |normal| normal.is_finite());
     warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
     warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
     let materials_of = triangle_materials;
@@ -88,7 +88,7 @@ pub(super) fn assemble_text_mesh(
 
 /// Converts positions to offsets from an origin near the vertices that faces use. Offsets too large for `f32`
 /// become infinite.
-fn relative_to_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
+fn recenter_positions(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
     let place = |corner: &u32| positions.get(*corner as usize).copied().unwrap_or(DVec3::NAN);
     let held = |place: &DVec3| place.cmpge(least).all() && place.cmple(-least).all();
@@ -123,7 +123,7 @@ const NON_FINITE_UVS: &str = "has non-finite texture coordinates; such coordinat
 const NON_FINITE_NORMALS: &str = "has non-finite normals; they are recomputed";
 
 /// Returns the vertices whose attribute is not finite.
-fn non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
+fn find_non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
     (0_u32..).zip(values).filter(|(_, value)| !is_finite(value)).map(|(vertex, _)| vertex).collect()
 }
 

@@ -15,7 +15,7 @@ type VertexUvColorKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates one vertex for each combination of vertex, texture coordinates and color that occurs at a corner.
 /// New vertices keep the normal of the original vertex.
-pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
+pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;

@@ -134,7 +134,7 @@ fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result
         triangles
             .par_iter()
             .with_min_len(1 << 10)
-            .map(|triangle| corner_weights(corners(triangle)))
+            .map(|triangle| corner_angles(corners(triangle)))
             .collect_into_vec(&mut weighted);
         sums.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
             let first = part * share;
@@ -152,7 +152,7 @@ fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result
 
 /// Returns a triangle's unit normal (0 if it has no area) and the angle at each corner. Unlike the arccosine,
 /// the arctangent is accurate for the tiny angles in slivers.
-fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
+fn corner_angles([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let cross = ca.cross(ab);
@@ -206,7 +206,7 @@ fn replace_canceled_normals(
         token.check()?;
         for triangle in triangles {
             if triangle.iter().any(|&vertex| normals[vertex as usize] == Vec3::ZERO) {
-                let (normal, _) = corner_weights(triangle.map(|vertex| mesh.positions[vertex as usize]));
+                let (normal, _) = corner_angles(triangle.map(|vertex| mesh.positions[vertex as usize]));
                 for &vertex in triangle {
                     let own = &mut normals[vertex as usize];
                     *own = if *own == Vec3::ZERO { normal.as_vec3() } else { *own };

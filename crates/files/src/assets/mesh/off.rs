@@ -126,7 +126,7 @@ struct OffColors {
 
 impl OffColors {
     /// Adds the same color for `times` vertices or corners.
-    fn push(&mut self, color: &[f64], times: usize, at: usize) {
+    fn push_repeated(&mut self, color: &[f64], times: usize, at: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied();
         color.iter().for_each(|color| self.range.add(*color, at));
         self.all.extend(std::iter::repeat_n(color, times));
@@ -316,7 +316,7 @@ impl OffReader<'_> {
 
     /// Adds a color from the end of a line to `times` vertices or corners.
     fn add_color_repeatedly(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
-        colors.push(color, times, self.cursor.offset());
+        colors.push_repeated(color, times, self.cursor.offset());
         match color {
             [_, _, _, alpha] => colors.track_lowest_alpha(*alpha, self.cursor.offset()),
             [_] => self.indices.add(self.cursor.offset()),

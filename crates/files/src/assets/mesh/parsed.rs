@@ -150,7 +150,7 @@ impl ComponentExtremes {
 
     /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
     pub(super) fn fraction_in_integers_warning(&self) -> Option<(usize, String)> {
-        self.fraction.map(|(value, at)| (at, fractional_color_warning(value)))
+        self.fraction.map(|(value, at)| (at, dropped_fractions_warning(value)))
     }
 }
 
@@ -160,7 +160,7 @@ pub(super) fn clamped_color_warning(value: f64, one: f64) -> String {
 }
 
 /// Warning about fractions in colors declared as integers.
-pub(super) fn fractional_color_warning(value: f64) -> String {
+pub(super) fn dropped_fractions_warning(value: f64) -> String {
     format!("the header declares integer colors, but a component is {value}; fractions are dropped")
 }
 

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, gaussian, normalized, offsets};
+use super::super::plane::{Plane, gaussian_kernel, normalized, offsets};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
@@ -56,7 +56,7 @@ impl Filters {
             blurs.iter_mut().for_each(|blur| blur.taps = padded(&blur.taps, blur_radius));
             blurs
         });
-        let bell = gaussian(sigma, feature_radius);
+        let bell = gaussian_kernel(sigma, feature_radius);
         let slope: Vec<_> = offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
         let curvature: Vec<_> =
             offsets(feature_radius).zip(&bell).map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g).collect();
@@ -112,7 +112,7 @@ fn contrast_sensitivity_blurs(
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
-        let taps = gaussian(sigma, radius);
+        let taps = gaussian_kernel(sigma, radius);
         let sum: f64 = taps.iter().sum();
         WeightedBlur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized(&taps) }
     });

@@ -195,12 +195,12 @@ impl Torus {
 
     /// Projected area averaged over all directions, which is a quarter of the area.
     pub fn projected_area(&self, _: DVec3) -> f64 {
-        let [area] = self.areas();
+        let [area] = self.part_areas();
         area / 4.0
     }
 
     /// Area of each part.
-    pub fn areas(&self) -> [f64; 1] {
+    pub fn part_areas(&self) -> [f64; 1] {
         [4.0 * PI * PI * self.radius * self.tube]
     }
 

@@ -22,12 +22,12 @@ struct BoxView {
     signs: [f32; 3],
     /// The faces on the positive sides of the axes. Each face's coordinates are along the next two axes in
     /// cyclic order.
-    faces: [BoxFace; 3],
+    faces: [BoxFaceView; 3],
 }
 
 /// A face seen from a point.
 #[derive(Clone, Copy)]
-struct BoxFace {
+struct BoxFaceView {
     rectangle: SphericalRectangle,
     /// Solid angle in sr. Approximate for small faces, and 0 if the face is seen from behind.
     solid_angle: f32,
@@ -48,7 +48,7 @@ impl ShapeEmitter for BoxEmitter {
             let rest = if is_second { values[1] } else { values[2] };
             if is_first { values[0] } else { rest }
         };
-        let face = BoxFace {
+        let face = BoxFaceView {
             rectangle: SphericalRectangle::combine_three_by_field(faces.map(|face| face.rectangle), of),
             solid_angle: of([a, b, c]),
         };
@@ -104,13 +104,13 @@ impl BoxEmitter {
         let local = self.axes.map(|axis| from_center.dot(axis));
         let face = |k: usize| {
             let side = |i: usize| [-self.half[i] - local[i].abs(), self.half[i] - local[i].abs()];
-            BoxFace::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
+            BoxFaceView::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
         };
         BoxView { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
     }
 }
 
-impl BoxFace {
+impl BoxFaceView {
     /// Creates a face from its coordinate ranges relative to the point. z is negative if the point is in
     /// front of the face.
     #[inline(always)]

@@ -48,7 +48,7 @@ const ALL_AROUND: f32 = 4.0 * PI;
 impl InwardEmitter {
     /// Creates an emitter for a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
-        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.areas())? })
+        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.part_areas())? })
     }
 
     /// Samples a direction uniformly from a point inside the shape.

@@ -111,7 +111,7 @@ impl MeshEmitter {
     }
 
     /// Bounds on the triangles' positions and emission, for a radiance of 1.
-    pub fn bounds(&self) -> LightBounds {
+    pub fn light_bounds(&self) -> LightBounds {
         self.bounds
     }
 
@@ -157,7 +157,7 @@ impl MeshEmitter {
                 (arrival, facets.sampled_primitive(u[0]))
             }
             MeshSampling::Tree(tree) => {
-                let pick = tree.pick(&Receiver::without_lobe(point, normal), f64::from(u[0]))?;
+                let pick = tree.pick(&Receiver::with_unknown_lobe(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
                 let LightSamplePoint { direction, target, factor } =
@@ -183,7 +183,7 @@ impl MeshEmitter {
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, triangle_emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
-            tree.probability(&Receiver::without_lobe(from, normal), index as u32) * own.pdf(from, met)
+            tree.probability(&Receiver::with_unknown_lobe(from, normal), index as u32) * own.pdf(from, met)
         })
     }
 

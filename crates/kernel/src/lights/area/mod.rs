@@ -247,7 +247,7 @@ fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
         | Shape::Cone(_)
         | Shape::Torus(_) => None,
     };
-    let area: f64 = shape.areas().iter().sum();
+    let area: f64 = shape.part_areas().iter().sum();
     let (shown, cone) = match normal.map(DVec3::normalize) {
         Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
@@ -295,7 +295,7 @@ impl AreaLight {
     pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry());
+            let (end, source) = (ShadowRayEnd::At(target), self.scene_object());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -304,7 +304,7 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn scene_geometry(&self) -> LightGeometry {
+    pub(super) fn scene_object(&self) -> LightGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }

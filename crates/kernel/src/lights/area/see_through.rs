@@ -22,7 +22,7 @@ impl SeeThroughSideEmitter {
             Side::Front => 1.0,
             Side::Back => -1.0,
         };
-        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.areas())?, outwards })
+        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.part_areas())?, outwards })
     }
 }
 

@@ -75,7 +75,7 @@ impl EmissiveSurface {
     pub fn new(light: &AreaLight, emitter_geometry: &EmissiveObjectGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
             EmissiveObjectGeometry::Shape(shape) => {
-                let areas = shape.areas();
+                let areas = shape.part_areas();
                 let most = if light.texture.is_some() { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;

@@ -90,7 +90,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     all.push((Light::Environment(Environment::Constant(COLOR)), None, 4.0 * PI * disk));
     for shape in shapes() {
         let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
-        all.push((Light::Area(light), Some(shape), PI * shape.areas().iter().sum::<f64>()));
+        all.push((Light::Area(light), Some(shape), PI * shape.part_areas().iter().sum::<f64>()));
     }
     all
 }
@@ -255,7 +255,7 @@ fn photons_from_one_light_carry_its_power() {
 #[test]
 fn photons_leave_convex_lights() {
     for shape in shapes() {
-        let is_open = shape.areas().last() == Some(&0.0);
+        let is_open = shape.part_areas().last() == Some(&0.0);
         if is_open || matches!(shape, Shape::Torus(_)) {
             continue;
         }

@@ -211,7 +211,7 @@ fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
         for leaf in &*leaves {
             bins[bin_of(leaf)].add(leaf);
         }
-        let last = cheapest_split(&bins);
+        let last = cheapest_split_index(&bins);
         let count = bins[..last].iter().map(|bin| bin.count).sum();
         if count > 0 {
             leaves.sort_by_key(|leaf| bin_of(leaf) >= last);
@@ -221,12 +221,12 @@ fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
     // A stable sort makes the tree identical on all machines.
     leaves.sort_by(|a, b| a.bounds.center[axis].total_cmp(&b.bounds.center[axis]));
     let parts: Vec<LeafSums> = leaves.chunks(unit).map(LeafSums::from_leaves).collect();
-    cheapest_split(&parts) * unit
+    cheapest_split_index(&parts) * unit
 }
 
 /// Finds the split with the lowest total cost for a sequence of parts. Returns the number of parts in the
 /// first half. Neither half is empty.
-fn cheapest_split(parts: &[LeafSums]) -> usize {
+fn cheapest_split_index(parts: &[LeafSums]) -> usize {
     let mut right = parts.to_vec();
     for i in (0..parts.len() - 1).rev() {
         right[i] = right[i].plus(&right[i + 1]);

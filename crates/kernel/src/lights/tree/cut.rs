@@ -37,7 +37,7 @@ impl<'a> LightTreeCut<'a> {
     /// Creates a cut with at most `room` nodes. [`LightTreeCut::adapt_to_receiver`] must be called before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
-        let receiver = Receiver::without_lobe(Vec3::ZERO, Vec3::ZERO);
+        let receiver = Receiver::with_unknown_lobe(Vec3::ZERO, Vec3::ZERO);
         let room = room.clamp(1, Self::MOST);
         Self {
             tree,
@@ -96,7 +96,7 @@ impl<'a> LightTreeCut<'a> {
     /// Picks lights like [`LightTree::pick`], for numbers `u` in increasing order. `picked` receives the
     /// index of each number, the picked light, and the light's probability.
     #[inline(always)]
-    pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
+    pub fn pick_sorted_batch(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total_importance();
         if !(all > 0.0) {
             return;
@@ -139,7 +139,7 @@ impl<'a> LightTreeCut<'a> {
         (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
-    /// Probability that [`LightTreeCut::pick`] picks a light.
+    /// Probability that [`LightTreeCut::pick_sorted_batch`] picks a light.
     #[inline]
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.positions[light as usize];

@@ -61,7 +61,7 @@ impl LightBoundsPacket {
 
     /// Broadcasts one lane to all lanes.
     #[inline(always)]
-    fn splat(&self, i: usize) -> Self {
+    fn splat_lane(&self, i: usize) -> Self {
         Self {
             center: splat3(lane(&self.center, i)),
             radius: [self.radius[i]; PACKET_SIZE],
@@ -128,7 +128,7 @@ pub struct ReceiverLobe {
 impl Receiver {
     /// Creates a receiver from its position and normal. The glossy lobe is unknown.
     #[inline(always)]
-    pub fn without_lobe(point: Vec3, normal: Vec3) -> Self {
+    pub fn with_unknown_lobe(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
     }
 }
@@ -157,7 +157,7 @@ struct LobePacket {
 impl ReceiverPacket {
     /// Creates receivers from their positions and normals. The glossy lobes are unknown.
     #[inline(always)]
-    pub fn without_lobe(point: &Vec3x16, normal: &Vec3x16) -> Self {
+    pub fn with_unknown_lobe(point: &Vec3x16, normal: &Vec3x16) -> Self {
         Self { point: *point, normal: *normal, lobes: LobePacket::NONE }
     }
 
@@ -172,7 +172,7 @@ impl ReceiverPacket {
     /// A packet with the same receiver in all lanes.
     #[inline(always)]
     fn splat(receiver: &Receiver) -> Self {
-        let mut row = Self::without_lobe(&splat3(receiver.point), &splat3(receiver.normal));
+        let mut row = Self::with_unknown_lobe(&splat3(receiver.point), &splat3(receiver.normal));
         if let Some(ReceiverLobe { axis, shininess, peak, diffuse }) = receiver.lobe {
             row.lobes = LobePacket {
                 axis: splat3(axis),
@@ -269,7 +269,7 @@ impl LightTreeNode {
         receivers: &ReceiverPacket,
         has_lobes: bool,
     ) -> F32x16 {
-        expected_contributions(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
+        expected_contributions(&self.bounds.splat_lane(child), receivers, self.is_plain, has_lobes).importance
     }
 
     /// The child that contains the leaf at `place` in tree order.

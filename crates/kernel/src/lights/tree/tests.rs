@@ -68,15 +68,17 @@ const NODES: usize = 12;
 fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
     let mut cut = LightTreeCut::new(tree, nodes);
     // Visit another point first, which should not affect the result.
-    cut.adapt_to_receiver(&Receiver::without_lobe(normal, point));
-    cut.adapt_to_receiver(&Receiver::without_lobe(point, normal));
+    cut.adapt_to_receiver(&Receiver::with_unknown_lobe(normal, point));
+    cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
     cut
 }
 
 /// The light that [`LightTreeCut::pick`] picks for each number, and its probability.
 fn picks_of<const N: usize>(cut: &LightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
-    cut.pick(u.iter().copied(), |place, light, probability| picks[place] = Some((light, probability)));
+    cut.pick_sorted_batch(u.iter().copied(), |place, light, probability| {
+        picks[place] = Some((light, probability));
+    });
     picks
 }
 
@@ -98,9 +100,9 @@ proptest! {
             let cut = cut_for(&tree, point, normal, NODES);
             let mut dark = [0.0; 2];
             for (k, u) in evenly_spaced::<512>().into_iter().enumerate() {
-                let alone = tree.pick(&Receiver::without_lobe(point, normal), u);
+                let alone = tree.pick(&Receiver::with_unknown_lobe(point, normal), u);
                 if let Some(pick) = alone {
-                    prop_assert_eq!(pick.probability, tree.probability(&Receiver::without_lobe(point, normal), pick.light));
+                    prop_assert_eq!(pick.probability, tree.probability(&Receiver::with_unknown_lobe(point, normal), pick.light));
                     prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
                 } else {
                     dark[0] += 1.0 / 512.0;
@@ -118,7 +120,7 @@ proptest! {
             }
             // The missing probability belongs to nodes whose bounds predict light although their children
             // contribute none.
-            let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::without_lobe(point, normal), light)).sum();
+            let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::with_unknown_lobe(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
             prop_assert!((cut + dark[1] - 1.0).abs() < 0.02, "{} {}", cut, dark[1]);
@@ -143,7 +145,7 @@ proptest! {
                     sample.is_some_and(|sample| sample.direction.dot(normal) > 0.0 && sample.weight.element_sum() > 0.0)
                 });
                 if arrives {
-                    prop_assert!(tree.probability(&Receiver::without_lobe(point, normal), number) > 0.0, "{:?} from {}, {}", light, point, normal);
+                    prop_assert!(tree.probability(&Receiver::with_unknown_lobe(point, normal), number) > 0.0, "{:?} from {}, {}", light, point, normal);
                     prop_assert!(cut.probability(number) > 0.0, "{:?} from {}, {}", light, point, normal);
                 }
             }
@@ -166,7 +168,7 @@ fn spotlights_in_a_column_can_always_be_picked() {
     let mut arrived = 0;
     for _ in 0..2000 {
         let point = Vec3::new(16.0 * next(), 3.0 * next(), 0.2 * next() - 0.1);
-        let receiver = Receiver::without_lobe(point, Vec3::Y);
+        let receiver = Receiver::with_unknown_lobe(point, Vec3::Y);
         let cut = cut_for(&tree, point, Vec3::Y, 8);
         for (number, light) in (0..).zip(&lights) {
             let sample = light.sample(point, Vec3::Y, [0.5; 2]);
@@ -193,7 +195,7 @@ fn pick_frequencies_match_probabilities() {
         for _ in 0..N / 20 {
             let mut u: [f64; 20] =
                 std::array::from_fn(|_| f64::from(next()) + f64::from(next()) / f64::from(1 << 24));
-            for pick in u.iter().filter_map(|&u| tree.pick(&Receiver::without_lobe(point, normal), u)) {
+            for pick in u.iter().filter_map(|&u| tree.pick(&Receiver::with_unknown_lobe(point, normal), u)) {
                 counts[pick.light as usize][0] += 1.0;
             }
             u.sort_by(f64::total_cmp);
@@ -210,7 +212,7 @@ fn pick_frequencies_match_probabilities() {
             };
             for (number, counts) in (0..).zip(&counts) {
                 let probability = if way == 0 {
-                    tree.probability(&Receiver::without_lobe(point, normal), number)
+                    tree.probability(&Receiver::with_unknown_lobe(point, normal), number)
                 } else {
                     cut.probability(number)
                 };
@@ -262,7 +264,9 @@ fn noncontributing_lights_are_not_picked() {
     for (number, _) in (0..).zip(&lights) {
         let probability = cut.probability(number);
         assert!((probability > 0.0) == (number % 5 > 2), "{number}: {probability}");
-        assert!(number % 5 > 2 || tree.probability(&Receiver::without_lobe(point, normal), number) == 0.0);
+        assert!(
+            number % 5 > 2 || tree.probability(&Receiver::with_unknown_lobe(point, normal), number) == 0.0
+        );
         sum += probability;
     }
     // Nodes without contributing lights should be picked with almost no probability.
@@ -345,7 +349,7 @@ fn coincident_and_distant_lights_build_valid_trees() {
     for lights in [same, apart] {
         let tree = tree_of(&lights);
         let sum: f32 = (0..lights.len() as u32)
-            .map(|i| tree.probability(&Receiver::without_lobe(Vec3::NEG_ONE, Vec3::ONE), i))
+            .map(|i| tree.probability(&Receiver::with_unknown_lobe(Vec3::NEG_ONE, Vec3::ONE), i))
             .sum();
         assert!((sum - 1.0).abs() < 1e-3, "{sum}");
     }
@@ -383,7 +387,8 @@ fn packet_picks_match_single_picks() {
                 let vectors = receivers.each_ref().map(|receiver| of(receiver).to_array());
                 [0, 1, 2].map(|axis| vectors.map(|vector| vector[axis]))
             };
-            let mut row = ReceiverPacket::without_lobe(&column(&|one| one.point), &column(&|one| one.normal));
+            let mut row =
+                ReceiverPacket::with_unknown_lobe(&column(&|one| one.point), &column(&|one| one.normal));
             for (i, receiver) in receivers.iter().enumerate() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
@@ -433,7 +438,7 @@ fn mesh_pdf_matches_its_samples() {
     for count in [20, 500] {
         let mesh = uneven_mesh(count);
         assert_eq!(mesh.light_tree().is_some(), count > 32);
-        let bounds = mesh.bounds();
+        let bounds = mesh.light_bounds();
         let light = AreaLight {
             side: Side::Front,
             shape: Emitter::Mesh(mesh),

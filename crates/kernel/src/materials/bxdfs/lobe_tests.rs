@@ -112,7 +112,7 @@ impl<B: Bxdf> TestSurface<B> {
         light: NarrowLightPath,
     ) -> Self {
         let mut row = BxdfPacket::<B>::default();
-        row.reset();
+        row.reset_flags();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.light_side_sign() as f32;
             let place = SurfaceDirections { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
@@ -132,7 +132,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// f, the part of f from the wide lobes, and the pdf, for light from each direction.
-    pub fn evaluate(&self, lobes: SampledLobes, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
+    pub fn evaluate_bsdf(&self, lobes: SampledLobes, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
             let mut rows = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
@@ -193,7 +193,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// [`TestSurface::sampled_albedo`] with 16 lobe choices per cell.
-    pub fn albedo_by_choices(&self, side: u32) -> DVec3 {
+    pub fn lobe_stratified_albedo(&self, side: u32) -> DVec3 {
         let mut next = random(6);
         let mut samples = Vec::new();
         for number in 0..side * side {
@@ -211,7 +211,7 @@ impl<B: Bxdf> TestSurface<B> {
     /// Maximum of f·cos/pdf over samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
         let samples = self.sample_directions(SampledLobes::All, side);
-        let values = self.evaluate(SampledLobes::All, &samples);
+        let values = self.evaluate_bsdf(SampledLobes::All, &samples);
         let weights = samples.iter().zip(values).map(|(direction, (f, _, pdf))| {
             if pdf > 0.0 { f.max_element() * self.height(*direction).max(0.0) / pdf } else { 0.0 }
         });
@@ -220,7 +220,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Mean of f·cos/pdf.
     fn mean_sample_weight(&self, samples: &[DVec3]) -> DVec3 {
-        let values = self.evaluate(SampledLobes::All, samples);
+        let values = self.evaluate_bsdf(SampledLobes::All, samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)
@@ -245,7 +245,7 @@ impl<B: Bxdf> TestSurface<B> {
             .chunks(PACKET_SIZE)
             .map(|some| {
                 let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
-                let values = self.evaluate(SampledLobes::All, &directions);
+                let values = self.evaluate_bsdf(SampledLobes::All, &directions);
                 some.iter().zip(values).map(|((_, weight), (f, wide, _))| (f - wide) * *weight).sum::<DVec3>()
             })
             .sum();
@@ -257,7 +257,7 @@ impl<B: Bxdf> TestSurface<B> {
             })
             .collect();
         let wide: DVec3 =
-            self.evaluate(SampledLobes::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
+            self.evaluate_bsdf(SampledLobes::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
@@ -349,7 +349,8 @@ impl<B: Bxdf> TestSurface<B> {
             .collect();
         let directions: Vec<DVec3> = places.iter().map(|place| place.1).collect();
         let mut expected = vec![0.0; counts.len()];
-        for ((cell, _, solid_angle), (_, _, pdf)) in places.iter().zip(self.evaluate(lobes, &directions)) {
+        for ((cell, _, solid_angle), (_, _, pdf)) in places.iter().zip(self.evaluate_bsdf(lobes, &directions))
+        {
             expected[*cell] += pdf * solid_angle / f64::from(side * side) * total as f64;
         }
         let above: f64 = expected.iter().sum();
@@ -392,9 +393,9 @@ pub fn check_values<B: Bxdf>(
             if light.z < 0.02 {
                 continue;
             }
-            let (f, _, _) = there.evaluate(SampledLobes::All, &[light])[0];
+            let (f, _, _) = there.evaluate_bsdf(SampledLobes::All, &[light])[0];
             let (back, _, _) =
-                TestSurface::<B>::new(point, alphas, light).evaluate(SampledLobes::All, &[to_eye])[0];
+                TestSurface::<B>::new(point, alphas, light).evaluate_bsdf(SampledLobes::All, &[to_eye])[0];
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
@@ -432,7 +433,7 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
         let row = |of: &dyn Fn(usize) -> bool| {
             let mut row = BxdfPacket::<B>::default();
-            row.reset();
+            row.reset_flags();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place = SurfaceDirections {
                     normal: Vec3::Z * lit.light_side_sign() as f32,
@@ -490,7 +491,7 @@ pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
             };
             let shown = |diffuse: bool, specular: bool| {
                 let mut row = BxdfPacket::<B>::default();
-                row.reset();
+                row.reset_flags();
                 row.set_bsdf(0, point, LobeFilter::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);

@@ -203,12 +203,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::reset`].
+            /// [`BxdfPacket::reset_flags`].
             #[inline(always)]
-            pub fn reset(&mut self) {
+            pub fn reset_flags(&mut self) {
                 match self {
-                    $(Self::$kind(row) => row.reset(),)+
-                    $(Self::$part(row) => row.reset()),+
+                    $(Self::$kind(row) => row.reset_flags(),)+
+                    $(Self::$part(row) => row.reset_flags()),+
                 }
             }
 

@@ -225,7 +225,7 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.move_aside(|_| false),
+                Err(PartError::Version { .. }) => self.move_aside_unless_longer(|_| false),
                 Ok(head) if head.kind == PartKind::Part => Err(finished_part_conflict_message(&self.path)),
                 Ok(_)
                 | Err(
@@ -249,14 +249,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.move_aside(is_longer)
+        self.move_aside_unless_longer(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn move_aside(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn move_aside_unless_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
         let aside = PathBuf::from(aside);

@@ -38,7 +38,7 @@ impl CellCost {
         !(self.units > 0.0)
     }
 
-    pub(crate) fn seconds(&self) -> f64 {
+    pub(crate) fn recorded_seconds(&self) -> f64 {
         self.seconds
     }
 
@@ -96,7 +96,7 @@ mod tests {
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
             assert!((share.samples_including_overhead(800.0, 100.0) - 850.0).abs() < 1e-9);
-            assert!((cell.seconds() / cell.samples_including_overhead(share) - rate).abs() < 1e-9);
+            assert!((cell.recorded_seconds() / cell.samples_including_overhead(share) - rate).abs() < 1e-9);
         }
     }
 

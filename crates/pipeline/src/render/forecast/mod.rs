@@ -116,7 +116,7 @@ impl Forecast {
         let elapsed_seconds = moment.elapsed_seconds;
         // Predict the end from the remaining work.
         let work = self.work(moment);
-        let (mut fraction, mut eta_seconds) = self.rate.update_and_predict(elapsed_seconds, work);
+        let (mut fraction, mut eta_seconds) = self.rate.update_progress(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
@@ -138,7 +138,7 @@ impl Forecast {
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
-            noise: self.noise.predict_noise(work, self.rate.rate(), left),
+            noise: self.noise.noise_progress(work, self.rate.rate(), left),
         }
     }
 

@@ -46,7 +46,7 @@ impl NoiseForecast {
 
     /// Returns the last measured noise and its predicted decrease. `rate` is the work done per second, and
     /// `left` is the number of seconds until the end. Returns `None` before the first measurement.
-    pub(crate) fn predict_noise(
+    pub(crate) fn noise_progress(
         &self,
         work: WorkAmount,
         rate: Option<f64>,
@@ -117,21 +117,21 @@ mod tests {
     fn next_level_is_predicted_from_sample_count() {
         // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
         let work = WorkAmount { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().predict_noise(work, Some(10.0), Some(100.0)).expect("noise");
+        let told = measured().noise_progress(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
         let half = WorkAmount { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
-            measured().predict_noise(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
+            measured().noise_progress(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
         assert!((seconds - 68.2).abs() < 1e-6, "{seconds}");
     }
 
     #[test]
     fn prediction_accounts_for_work_since_measurement() {
         let work = WorkAmount { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().predict_noise(work, Some(10.0), Some(1000.0)).expect("noise");
+        let told = measured().noise_progress(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = told.next.expect("a level");
@@ -143,11 +143,11 @@ mod tests {
         let work = WorkAmount { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(
-                measured().predict_noise(work, Some(10.0), left).expect("noise").next,
+                measured().noise_progress(work, Some(10.0), left).expect("noise").next,
                 None,
                 "{left:?}"
             );
         }
-        assert_eq!(measured().predict_noise(work, None, Some(100.0)).expect("noise").next, None);
+        assert_eq!(measured().noise_progress(work, None, Some(100.0)).expect("noise").next, None);
     }
 }

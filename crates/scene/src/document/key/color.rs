@@ -50,7 +50,7 @@ impl TableKey<'_> {
     fn inline_table_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
-        table.report_invalid_keys();
+        table.report_key_errors();
         texture
     }
 
@@ -61,7 +61,7 @@ impl TableKey<'_> {
             let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
             let scale = table.optional_key("scale");
             let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
-            table.report_invalid_keys();
+            table.report_key_errors();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
         self.reject_texture_name(textures, EMISSION)?;

@@ -18,7 +18,7 @@ impl TableKey<'_> {
         limits: Limits,
     ) -> Option<NumberSource> {
         if self.is_table() {
-            let (texture, channel) = self.texture_with_channel(textures)?;
+            let (texture, channel) = self.texture_channel_table(textures)?;
             return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
@@ -41,19 +41,19 @@ impl TableKey<'_> {
         textures: &DefinedNames,
     ) -> Option<(usize, Option<Channel>)> {
         if self.is_table() {
-            return self.texture_with_channel(textures);
+            return self.texture_channel_table(textures);
         }
         let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
         Some((self.find_defined_name(textures, name)?, None))
     }
 
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.
-    fn texture_with_channel(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
+    fn texture_channel_table(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
         let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
         let key = table.optional_key("channel");
         let channel = if key.is_present() { key.choice().map(Some) } else { Some(None) };
-        table.report_invalid_keys();
+        table.report_key_errors();
         Some((texture?, channel?))
     }
 }

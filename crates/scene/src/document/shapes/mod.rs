@@ -25,7 +25,7 @@ use mesh::MeshFileRegistry;
 /// A function that reads a shape's table. Only meshes use the list of mesh files.
 type ShapeReader = fn(&TableReader<'_>, &mut MeshFileRegistry) -> Option<Shape>;
 
-/// Table name and reader for each kind of shape. [`read`] sorts the objects into file order.
+/// Table name and reader for each kind of shape. [`read_objects`] sorts the objects into file order.
 const KINDS: [(&str, ShapeReader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -45,7 +45,10 @@ pub(super) fn is_shape_table_name(name: &str) -> bool {
 }
 
 /// Reads all shapes and the mesh files they reference. Returns no shapes if any is invalid.
-pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<Vec<Object>>, Vec<MeshFile>) {
+pub(super) fn read_objects(
+    root: &TableReader<'_>,
+    materials: &MaterialList,
+) -> (Option<Vec<Object>>, Vec<MeshFile>) {
     let mut files = MeshFileRegistry::default();
     let mut objects = Vec::new();
     let mut is_valid = true;
@@ -75,7 +78,7 @@ fn read_object(
     };
     let material = key.index_by_name(&materials.names);
     let name = table.optional_key("name").optional_object_name();
-    table.report_invalid_keys();
+    table.report_key_errors();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
         let issue = Issue::error(key.span()?, "an infinite plane cannot emit light")
             .with_label("this material has `emission`")

@@ -314,7 +314,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_see_through() {
-            return self.trace_attenuated_shadow_rays((rays, ends, traced), sources, values, sums);
+            return self.add_attenuated_light((rays, ends, traced), sources, values, sums);
         }
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
@@ -324,7 +324,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// transmittance.
     #[cold]
     #[inline(never)]
-    fn trace_attenuated_shadow_rays(
+    fn add_attenuated_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,

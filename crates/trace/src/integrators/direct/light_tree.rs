@@ -175,7 +175,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     ) {
         let row = self.row;
         // Estimate the light from each source at each vertex, including glossy lobes.
-        let plain = ReceiverPacket::without_lobe(&row.from, &row.normal);
+        let plain = ReceiverPacket::with_unknown_lobe(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lane_indices(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.receiver_lobe(i) {
@@ -217,7 +217,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.new_tree_cut(tree), MIS.then(|| way.new_tree_cut(tree)));
         for i in lane_indices(self.used) {
-            let plain = Receiver::without_lobe(lane(&row.from, i), lane(&row.normal, i));
+            let plain = Receiver::with_unknown_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
             cut.adapt_to_receiver(&Receiver { lobe, ..plain });
             let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {
@@ -225,7 +225,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 &*without
             });
             for (numbers, picks) in numbers.chunks(group).zip(picks.chunks_mut(group)) {
-                cut.pick(numbers.iter().map(|row| row[i]), |place, light, probability| {
+                cut.pick_sorted_batch(numbers.iter().map(|row| row[i]), |place, light, probability| {
                     let row = &mut picks[place];
                     row.lights[i] = light;
                     row.shares[i] = probability;

@@ -257,7 +257,7 @@ impl TileContext<'_> {
             if !self.world.materials[self.world.material_index(&hit)].has_null_interaction() {
                 return sum;
             }
-            let (part, beyond) = self.world.continue_past(&along, &hit, lookups);
+            let (part, beyond) = self.world.continue_ray_past(&along, &hit, lookups);
             (left, along, passed) = (left * part, beyond, distance);
             if left == Vec3::ZERO {
                 return sum;
@@ -269,7 +269,7 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::emitter_weight`], for an emitter that coincides with glass. Returns 1 if shadow
     /// rays cannot reach the hit point.
-    pub fn coincident_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+    pub fn emitter_weight_at_glass(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0

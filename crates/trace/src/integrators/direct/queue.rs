@@ -219,7 +219,8 @@ impl DirectLightQueue {
     ) -> Result<DirectLightCounters, Cancelled> {
         let mut rays = DirectLightCounters::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
-        let together = if tile.world.lights.sampler(tile.behavior.receivers).is_some() { ROWS } else { 1 };
+        let together =
+            if tile.world.lights.sampler_for_mode(tile.behavior.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
@@ -342,7 +343,7 @@ impl DirectLightQueue {
         let weighed =
             SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler_for_mode(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })

@@ -49,7 +49,7 @@ impl UnshadowedLobeRay<'_> {
                 let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.visibility_of_light(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
-            (along, passed) = (world.continue_past(&along, &hit, &mut 0).1, distance);
+            (along, passed) = (world.continue_ray_past(&along, &hit, &mut 0).1, distance);
         }
         // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {

@@ -163,7 +163,7 @@ impl KernelNeighborhood {
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         match shape.local_geometry(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
-                .filter_map(|number| shape.polygon(number))
+                .filter_map(|number| shape.flat_polygon(number))
                 .all(|piece| self.add_polygon(&piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius

@@ -221,7 +221,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         }
         let shading = vertex.shading_normals(&mut self.counters);
         let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
-        self.push(path, vertex, (shading.normal, 1.0), ray);
+        self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
         NullInteraction::Ended
     }
 }
@@ -325,7 +325,7 @@ impl PhotonWavefront<'_> {
                 let shading = vertex.shading_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected_path(path, vertex, &shading, reflectance);
-                self.push(path, vertex, (shading.normal, 1.0), ray);
+                self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
             }
             Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
         }
@@ -352,7 +352,7 @@ impl PhotonWavefront<'_> {
         if is_reflected && self.may_scatter() {
             let specular = coated.specular_factor(&vertex.texture_point, &mut self.counters.texture_lookups);
             let ray = reflected_path(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
-            self.push(path, vertex, (shading.normal, 1.0), ray);
+            self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
         }
     }
 
@@ -440,11 +440,11 @@ impl PhotonWavefront<'_> {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
                 let eta = medium_ior(tile.world, far) / medium_ior(tile.world, &path.interiors);
                 ray.throughput *= 1.0 / (eta * eta);
-                self.push(path, vertex, (shading.normal, eta), ray);
+                self.queue_specular_photon(path, vertex, (shading.normal, eta), ray);
             }
             Some(_) | None => {
                 let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
-                self.push(path, vertex, (shading.normal, 1.0), ray);
+                self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
             }
         }
     }
@@ -452,7 +452,7 @@ impl PhotonWavefront<'_> {
     /// Queues a photon after a specular bounce. If the shading normal differs from the geometric normal, the
     /// photon is weighted by the adjoint BSDF (see the module documentation). `eta` is the index of
     /// refraction on the far side relative to the near side.
-    fn push(
+    fn queue_specular_photon(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

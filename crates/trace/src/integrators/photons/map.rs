@@ -2,7 +2,7 @@
 //! small as the radius requires. Lookups weight sixteen photons at a time.
 
 use super::packed::{self, PackedDirections};
-use super::reservoir::{LaneReservoirs, PhotonPositionAndNormal};
+use super::reservoir::{PhotonPositionAndNormal, ReservoirPacket};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::packet::lane_indices;
@@ -231,7 +231,7 @@ impl PhotonMap {
         simd: impl Simd,
     ) -> (Vec3, Option<PhotonPositionAndNormal>) {
         let mut sums = [[0.0; PACKET_SIZE]; 3];
-        let mut choices = LaneReservoirs::new(random[0]);
+        let mut choices = ReservoirPacket::new(random[0]);
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_in_range(*range) {

@@ -367,7 +367,7 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
     let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxPair| {
-        lamp.center_and_corners().any(|point| world.material_around(body, point, lamp.object).is_some())
+        lamp.smaller_box_points().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {

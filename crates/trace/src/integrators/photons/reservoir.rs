@@ -21,13 +21,13 @@ pub struct PhotonPositionAndNormal {
 /// number is enough for all choices because it can be rescaled after each choice.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub struct LaneReservoirs {
+pub struct ReservoirPacket {
     random: F32x16,
     totals: F32x16,
     chosen: [u32; PACKET_SIZE],
 }
 
-impl LaneReservoirs {
+impl ReservoirPacket {
     /// Creates reservoirs from a random number in [0, 1).
     #[inline(always)]
     pub fn new(random: f32) -> Self {
@@ -90,7 +90,7 @@ mod tests {
         let mut counts = [[0_u32; PACKET_SIZE]; ITEMS];
         const DRAWS: u32 = 400_000;
         for _ in 0..DRAWS {
-            let mut choices = LaneReservoirs::new(next());
+            let mut choices = ReservoirPacket::new(next());
             (0..ITEMS).for_each(|number| choices.add_item(number as u32, &weights[number]));
             let (number, lane) =
                 choices.sample_lane_by_weight(next()).expect("some weights should be positive");
@@ -101,6 +101,6 @@ mod tests {
             let difference = (f64::from(*count) - expected).abs();
             assert!(difference <= 5.0 * expected.sqrt(), "got {count}, expected {expected}");
         }
-        assert_eq!(LaneReservoirs::new(0.3).sample_lane_by_weight(0.5), None);
+        assert_eq!(ReservoirPacket::new(0.3).sample_lane_by_weight(0.5), None);
     }
 }

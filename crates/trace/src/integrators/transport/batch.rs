@@ -130,7 +130,7 @@ impl VertexBatch {
         (self.used, self.has_horizon, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
         (self.is_perturbed, self.is_dark, self.has_two_sides) = (false, false, false);
-        self.bsdf.reset();
+        self.bsdf.reset_flags();
         self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 

@@ -122,7 +122,7 @@ impl PacketHits {
     }
 
     /// Radiance of the environment along a ray that leaves the scene, and its light-sampling pdf in sr⁻¹.
-    pub fn sky(&self, lane_of_ray: usize) -> (Vec3, f32) {
+    pub fn sky_radiance(&self, lane_of_ray: usize) -> (Vec3, f32) {
         (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
@@ -158,7 +158,7 @@ impl TileContext<'_> {
 
     /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
     #[inline(always)]
-    pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
+    pub fn plain_packet_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let (plain, rough) = self.world.packet_material_and_bsdf(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
@@ -248,8 +248,11 @@ impl SimdKernel for PacketIntersection<'_> {
             ShadowMode::Off => ShadowLiftSelection::All,
             ShadowMode::Hard | ShadowMode::Soft => ShadowLiftSelection::IfFree(only_specular_before),
         };
-        let front =
-            if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, simd) };
+        let front = if plain.all == 0 {
+            0
+        } else {
+            self.row.set_plain_vertices(&rays, rows, self.surface, lifts, simd)
+        };
         // Compute the other surfaces, and the environment for rays that leave the scene.
         let found =
             tile.fill_non_plain_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
@@ -277,7 +280,7 @@ impl PacketIntersection<'_> {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
         let mut plain = PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = lanes_with_same_index(object, left, simd);
+            let (id, of_object) = lanes_matching_first(object, left, simd);
             left &= !of_object;
             if tile.world.are_vertex_colors_used(id) {
                 continue;
@@ -288,9 +291,9 @@ impl PacketIntersection<'_> {
             let mut groups = ArrayVec::<(&NonSpecular, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
+                let (material, alike) = lanes_matching_first(&materials, waiting, simd);
                 waiting &= !alike;
-                let Some((material, rough)) = tile.plain_material(material as usize) else { continue };
+                let Some((material, rough)) = tile.plain_packet_material(material as usize) else { continue };
                 if plain.all | of == 0 {
                     row.bsdf.set_kind(material.kind);
                 } else if row.bsdf.kind() != material.kind {
@@ -344,7 +347,7 @@ impl PacketIntersection<'_> {
 /// Returns the index stored in the first lane in `left`, and the mask of lanes in `left` that have the same
 /// index.
 #[inline(always)]
-fn lanes_with_same_index(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+fn lanes_matching_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
     let mut of = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
@@ -379,7 +382,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = lanes_with_same_index(object, left, simd);
+            let (id, of_object) = lanes_matching_first(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
@@ -389,7 +392,7 @@ impl TileContext<'_> {
             let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = lanes_with_same_index(&materials, waiting, simd);
+                let (material, alike) = lanes_matching_first(&materials, waiting, simd);
                 waiting &= !alike;
                 of |= if self.can_shade_material_in_packet(material as usize) { alike } else { 0 };
             }
@@ -486,7 +489,7 @@ impl VertexBatch {
     /// Sets the positions and path state of plain vertices and returns the mask of vertices whose front face
     /// was hit.
     #[inline(always)]
-    fn set_positions(
+    fn set_plain_vertices(
         &mut self,
         paths: &PacketSource<'_>,
         rays: &RayPacket,

@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::LightTransportKind;
+use crate::lights::LightSamplingMode;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
@@ -56,7 +56,7 @@ impl<'a> TileContext<'a> {
             && render.shadows == ShadowMode::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_constant && world.lights.sampler(LightTransportKind::Eye).is_none();
+        let lobes_find_sky = is_constant && world.lights.sampler_for_mode(LightSamplingMode::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 

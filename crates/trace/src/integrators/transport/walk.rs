@@ -105,7 +105,7 @@ impl Segment {
     /// Moves the ray origin back to the path's last vertex, and returns the hit with the distance from that
     /// vertex.
     #[inline(always)]
-    fn measure_from_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
+    fn rebase_to_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
         if self.count > 0 {
             path.ray.origin = self.origin;
             hit.shape.t += self.distance;
@@ -178,7 +178,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 far = crossing.far;
                 vertex.set_offset_points(crossing.sides);
             }
-            let hit = way.measure_from_last_vertex(path, hit);
+            let hit = way.rebase_to_last_vertex(path, hit);
             return stepper.interact(
                 path,
                 Interaction::Opaque(&vertex, OpaqueHit::Direct(hit), &far),
@@ -199,7 +199,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 || is_stopped_by_coincident_surface(stepper, path, &vertex)
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let touched = way.measure_from_last_vertex(path, touched);
+                let touched = way.rebase_to_last_vertex(path, touched);
                 let reached = Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
                 return stepper.interact(path, reached, has_passed);
             }
@@ -214,7 +214,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             } else {
                 None
             };
-            let hit = way.measure_from_last_vertex(path, hit);
+            let hit = way.rebase_to_last_vertex(path, hit);
             return stepper.interact(
                 path,
                 Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
@@ -273,7 +273,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(pane) => {
             let mut whole = *path;
-            let hit = way.measure_from_last_vertex(&mut whole, hit);
+            let hit = way.rebase_to_last_vertex(&mut whole, hit);
             whole.interiors = stepper.tile().without_open_glass(whole.interiors);
             stepper.handle_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }

@@ -26,8 +26,8 @@ pub(super) fn alpha_weighted_texels(
     let is_direct = space.is_default() && metadata.alpha != AlphaInterpretation::Premultiplied;
     let mut unusable = 0;
     let data = match &image {
-        DynamicImage::ImageLumaA8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
-        DynamicImage::ImageRgba8(pixels) if is_direct => rgba_texels_from_bytes(pixels, alpha, curve),
+        DynamicImage::ImageLumaA8(pixels) if is_direct => straight_alpha_texels(pixels, alpha, curve),
+        DynamicImage::ImageRgba8(pixels) if is_direct => straight_alpha_texels(pixels, alpha, curve),
         image => {
             let options = AlphaWeightingOptions {
                 alpha,
@@ -41,7 +41,7 @@ pub(super) fn alpha_weighted_texels(
     Texels { width, height, data, unusable }
 }
 
-fn rgba_texels_from_bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
+fn straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     let texel = |pixel: &[u8]| {
         let [red, green, blue] = rgb(pixel);
         [red, green, blue, pixel[alpha]]

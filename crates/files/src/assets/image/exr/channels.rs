@@ -39,7 +39,7 @@ impl ChosenChannels {
     }
 
     /// Y, RY and BY.
-    pub(super) fn luminance_chroma_channels(self) -> Option<[ChannelIndex; 3]> {
+    pub(super) fn as_luminance_chroma(self) -> Option<[ChannelIndex; 3]> {
         match self.color {
             ColorChannels::Rgb(_) | ColorChannels::Gray(_) => None,
             ColorChannels::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
@@ -51,7 +51,7 @@ impl ChosenChannels {
         self.component_channels()
             .into_iter()
             .flatten()
-            .chain(self.luminance_chroma_channels().into_iter().flatten())
+            .chain(self.as_luminance_chroma().into_iter().flatten())
     }
 }
 

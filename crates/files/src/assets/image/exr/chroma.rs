@@ -62,7 +62,7 @@ impl LuminanceChroma {
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
-                put(at, luminance_chroma_to_rgb(*luminance, self.interpolated_chroma(at), weights));
+                put(at, luminance_chroma_to_rgb(*luminance, self.chroma_between_rows(at), weights));
             }
             return;
         }
@@ -112,11 +112,10 @@ impl LuminanceChroma {
     }
 
     /// Chroma of a pixel, interpolated linearly between rows that have samples.
-    fn interpolated_chroma(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+    fn chroma_between_rows(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
-        [0, 1].map(|plane| {
-            interpolate_linearly(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x])
-        })
+        [0, 1]
+            .map(|plane| upsample_linearly(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x]))
     }
 }
 
@@ -129,7 +128,7 @@ fn interpolate_chroma_at_column(
     sample: impl Fn(usize) -> f32,
 ) -> f32 {
     if step != Vec2(2, 2) {
-        return interpolate_linearly(x, step.x(), count, sample);
+        return upsample_linearly(x, step.x(), count, sample);
     }
     let last = count as i64 - 1;
     match x % 2 {
@@ -145,7 +144,7 @@ fn filter_between(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
 }
 
 /// Interpolates linearly between samples that are `step` pixels apart. The last sample is repeated.
-fn interpolate_linearly(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+fn upsample_linearly(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     let first = (pixel / step).min(count - 1);
     let (low, fraction) = (sample(first), (pixel % step) as f32 / step as f32);
     if fraction == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * fraction }

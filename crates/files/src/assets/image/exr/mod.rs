@@ -49,7 +49,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let needed =
             channels.all().map(|channel| decompressed_block_size(&reader.headers()[channel.part])).max();
         let chroma_bytes = channels
-            .luminance_chroma_channels()
+            .as_luminance_chroma()
             .map_or(0, |planes| LuminanceChroma::memory_bytes(decompressor.headers(), planes));
         if needed.unwrap_or_default().saturating_add(chroma_bytes) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
@@ -124,7 +124,7 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
         Some(channel) => {
             Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
         }
-        None => match channels.luminance_chroma_channels() {
+        None => match channels.as_luminance_chroma() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
         },
@@ -149,7 +149,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let mut image = PartialImage {
             headers: &headers,
             channels,
-            planes: channels.luminance_chroma_channels().map(|planes| LuminanceChroma::new(&headers, planes)),
+            planes: channels.as_luminance_chroma().map(|planes| LuminanceChroma::new(&headers, planes)),
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
@@ -232,7 +232,7 @@ impl PartialImage<'_> {
 
     /// Computes colors from luminance and chroma.
     fn convert_luminance_chroma(self, samples: &mut [u8]) {
-        let (Some([y, ..]), Some(planes)) = (self.channels.luminance_chroma_channels(), self.planes) else {
+        let (Some([y, ..]), Some(planes)) = (self.channels.as_luminance_chroma(), self.planes) else {
             return;
         };
         let header = &self.headers[y.part];

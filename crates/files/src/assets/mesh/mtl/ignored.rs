@@ -51,7 +51,7 @@ fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
     let mut add = |line: Option<usize>, words: &str| {
         ignored.push(IgnoredStatement { line: line.unwrap_or(found.line), words: words.to_owned() });
     };
-    warn_about_illumination(found, &converted, &mut add);
+    warn_about_approximations(found, &converted, &mut add);
     warn_about_opacity(found, &converted, &mut add);
     warn_about_reflectance(found, &converted, &mut add);
     warn_about_pbr(found, &converted, &mut add);
@@ -111,7 +111,7 @@ fn is_above_one(number: f32) -> bool {
 }
 
 /// Warns about illumination models and indices of refraction that are approximated.
-fn warn_about_illumination(
+fn warn_about_approximations(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),

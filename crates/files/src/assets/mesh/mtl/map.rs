@@ -153,7 +153,8 @@ impl Map {
     fn parse_option_arguments(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
         match option {
             "-s" => {
-                let scale = rest.next_numbers([1.0; 3]).filter(|[u, v, _]| !is_zero(*u) && !is_zero(*v));
+                let scale =
+                    rest.next_numbers([1.0; 3]).filter(|[u, v, _]| !is_near_zero(*u) && !is_near_zero(*v));
                 set_if_some(&mut self.repeat, scale.map(|[u, v, _]| [u, v]))
             }
             "-o" => set_if_some(&mut self.offset, rest.next_numbers([0.0; 3]).map(|[u, v, _]| [u, v])),
@@ -163,13 +164,13 @@ impl Map {
                 let strength = rest.next_numbers([1.0]).filter(|[strength]| *strength >= 0.0);
                 set_if_some(&mut self.strength, strength.map(|[strength]| strength))
             }
-            "-clamp" => set_if_some(&mut self.is_clamped, rest.next_switch()),
+            "-clamp" => set_if_some(&mut self.is_clamped, rest.next_on_or_off()),
             "-imfchan" => {
                 set_if_some(&mut self.number, rest.next_unless_last().and_then(parse_channel).map(Some))
             }
             "-boost" | "-texres" => rest.next_numbers([0.0]) == Some([0.0]),
-            "-blendu" | "-blendv" => rest.next_switch() == Some(true),
-            "-cc" => rest.next_switch() == Some(false),
+            "-blendu" | "-blendv" => rest.next_on_or_off() == Some(true),
+            "-cc" => rest.next_on_or_off() == Some(false),
             "-type" | "-colorspace" => {
                 rest.next_unless_last();
                 false
@@ -238,7 +239,7 @@ fn parse_channel(letter: &str) -> Option<ChannelSelector> {
 }
 
 /// Whether a scale is 0 or too small to compute with.
-fn is_zero(scale: f64) -> bool {
+fn is_near_zero(scale: f64) -> bool {
     scale == 0.0 || is_too_short(scale)
 }
 
@@ -326,7 +327,7 @@ impl<'a> MapArguments<'a> {
     }
 
     /// Consumes `on` or `off`.
-    fn next_switch(&mut self) -> Option<bool> {
+    fn next_on_or_off(&mut self) -> Option<bool> {
         let is_on = parse_switch(self.peek_unless_last()?.0)?;
         self.next_unless_last();
         Some(is_on)

@@ -85,7 +85,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
         let line = decode_line(line);
         let mut warnings = Vec::new();
-        let statement = statements::parse(&line, &mut warnings)
+        let statement = statements::parse_line(&line, &mut warnings)
             .map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
         library.add(statement, index + 1, warnings);
     }
@@ -97,7 +97,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
 /// statements, and if the map statement is invalid.
 pub(super) fn map_statement_image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    match statements::parse(&decode_line(line), &mut Vec::new()) {
+    match statements::parse_line(&decode_line(line), &mut Vec::new()) {
         Ok(Statement::Map(_, map)) => map.candidate_paths().map(|file| folder.join(file)).collect(),
         Ok(
             Statement::Nothing

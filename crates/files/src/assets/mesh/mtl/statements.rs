@@ -92,7 +92,7 @@ pub(super) enum Statement {
 }
 
 /// Parses a line. Adds a warning for each unusable part.
-pub(super) fn parse(line: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
+pub(super) fn parse_line(line: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let line = line.trim();
     let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     let rest = rest.trim_start();

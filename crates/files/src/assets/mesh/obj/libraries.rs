@@ -32,7 +32,7 @@ pub(super) struct LoadedLibraries {
 impl MtlLibraryLoader<'_> {
     /// Loads the libraries named in a statement. Maps each used material name that they define to its
     /// material index. Missing files only cause warnings.
-    pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
+    pub(super) fn load_libraries(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
         let mut indices = HashMap::new();
         for path in library_paths(self.source.path, statement) {
             indices.extend(self.load_file_and_map_materials(&path)?);

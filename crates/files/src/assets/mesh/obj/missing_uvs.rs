@@ -51,7 +51,7 @@ impl MissingUvs {
     }
 
     /// Warning about objects in which only some corners have texture coordinates.
-    pub(super) fn warning(&self, source: &MeshSource<'_>) -> Option<String> {
+    pub(super) fn partial_uvs_warning(&self, source: &MeshSource<'_>) -> Option<String> {
         let (first, count) = self.partial?;
         Some(partly_missing_uvs_warning(source.line_number(face_start(source, first)), count))
     }

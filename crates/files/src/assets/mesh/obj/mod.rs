@@ -40,7 +40,7 @@ fn parse_normalized_text(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetErr
     };
     build_faces(&statements, &runs, &mut parsed);
     let missing = MissingUvs::find(&statements, &runs, &parsed.materials);
-    parsed.warnings.extend(missing.warning(source));
+    parsed.warnings.extend(missing.partial_uvs_warning(source));
     parsed.material_warnings.extend(missing.material_warnings(source, &parsed));
     drop(statements);
     assemble_text_mesh(source, parsed, |face| Some(face_start(source, face)))
@@ -72,7 +72,7 @@ impl ObjMaterials {
         let mut used = Vec::new();
         for (_, change) in changes {
             match change {
-                StateChange::Library(name) => known.extend(libraries.load(name)?),
+                StateChange::Library(name) => known.extend(libraries.load_libraries(name)?),
                 StateChange::Material(name) => used.push((name, known.get(name).copied())),
                 StateChange::Object | StateChange::Smoothing(_) => {}
             }

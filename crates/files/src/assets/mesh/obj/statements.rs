@@ -78,7 +78,7 @@ impl Statements {
             found
                 .parse_statement(source, &mut words)
                 .map_err(|reason| source.malformed_error_with_line(start, reason))?;
-            words.take_line_rest();
+            words.take_raw_line_rest();
         }
         found.drop_missing_attributes(source);
         found.check_index_ranges(source)?;
@@ -89,7 +89,7 @@ impl Statements {
     fn parse_statement(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>) -> Result<(), String> {
         let start = words.offset();
         let Some(keyword) = words.next_word() else {
-            if let Some(paint) = words.take_line_rest().strip_prefix(b"#MRGB ") {
+            if let Some(paint) = words.take_raw_line_rest().strip_prefix(b"#MRGB ") {
                 self.vertices.read_mrgb_colors(paint);
             }
             return Ok(());
@@ -225,7 +225,7 @@ pub(super) fn free_form_warning(line: usize, keyword: &str) -> String {
 
 /// Line numbers of faces, given their indices in ascending order. Reads the file once.
 pub(super) fn face_lines(source: &MeshSource<'_>, faces: &[usize]) -> Vec<usize> {
-    let mut starts = face_starts(source);
+    let mut starts = face_byte_offsets(source);
     let (mut passed, mut at, mut line) = (0, 0, 1);
     let mut line_of = |face: usize| {
         let start = starts.nth(face - passed).unwrap_or(source.bytes.len());
@@ -238,18 +238,18 @@ pub(super) fn face_lines(source: &MeshSource<'_>, faces: &[usize]) -> Vec<usize>
 
 /// Byte offset of a face.
 pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
-    face_starts(source).nth(face).unwrap_or(0)
+    face_byte_offsets(source).nth(face).unwrap_or(0)
 }
 
 /// Byte offsets of all faces.
-fn face_starts<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use<'a> {
+fn face_byte_offsets<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use<'a> {
     let mut words = Words::new(source.bytes);
     std::iter::from_fn(move || {
         while words.move_to_next_statement() {
             let start = words.offset();
             let is_face = words.next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"f"));
             while is_face && words.next_word().is_some() {}
-            words.take_line_rest();
+            words.take_raw_line_rest();
             if is_face {
                 return Some(start);
             }

@@ -56,7 +56,7 @@ impl<'a> Words<'a> {
     pub(super) fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
-            let line = self.take_line_rest();
+            let line = self.take_raw_line_rest();
             let text = line.trim_ascii_end();
             let Some(text) = text.strip_suffix(b"\\").filter(|_| self.at < self.bytes.len()) else {
                 name.push_str(&decode_line(text));
@@ -69,7 +69,7 @@ impl<'a> Words<'a> {
     }
 
     /// Consumes the rest of this line.
-    pub(super) fn take_line_rest(&mut self) -> &'a [u8] {
+    pub(super) fn take_raw_line_rest(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let line = &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())];
         self.at += line.len();
@@ -109,7 +109,7 @@ mod tests {
         while words.move_to_next_statement() {
             let statement = std::iter::from_fn(|| words.next_word());
             found.push(statement.map(|word| String::from_utf8_lossy(word).into_owned()).collect());
-            words.take_line_rest();
+            words.take_raw_line_rest();
         }
         found
     }

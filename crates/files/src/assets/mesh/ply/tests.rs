@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::super::parsed::{
-    FACE_COLORS_IGNORED, alpha_ignored_warning, clamped_color_warning, fractional_color_warning,
+    FACE_COLORS_IGNORED, alpha_ignored_warning, clamped_color_warning, dropped_fractions_warning,
 };
 use super::super::text::expected_message;
 use super::body::END_OF_FILE;
@@ -440,7 +440,7 @@ fn unusable_vertex_colors_are_reported_with_line() {
             [0, 255, 0],
         ),
         ("uchar", ["0 0 0", "0 0 0", "0 0 -5", "0 0 0"], 15, clamped_color_warning(-5.0, 255.0), [0; 3]),
-        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, fractional_color_warning(0.5), [0; 3]),
+        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, dropped_fractions_warning(0.5), [0; 3]),
         ("float", ["0 0.5 0", "0 1.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(1.5, 1.0), [0, 255, 0]),
         ("float", ["0 0 0", "0 -0.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(-0.5, 1.0), [0; 3]),
         (

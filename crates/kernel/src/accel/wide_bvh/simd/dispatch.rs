@@ -59,7 +59,7 @@ impl Simd for Avx2Simd {
     #[inline(always)]
     fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx2_min_max(row, of) }
+        unsafe { avx2_masked_min_max(row, of) }
     }
 
     #[inline(always)]
@@ -96,7 +96,7 @@ impl Simd for Avx512Simd {
     #[inline(always)]
     fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx512_min_max(row, of) }
+        unsafe { avx512_masked_min_max(row, of) }
     }
 
     #[inline(always)]
@@ -155,7 +155,7 @@ fn horizontal_min_max(low: __m256, high: __m256) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn avx2_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+fn avx2_masked_min_max(row: &F32x16, of: u32) -> [f32; 2] {
     let other = _mm256_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
     let (low, high) = row.split_at(PACKET_SIZE / 2);
@@ -171,7 +171,7 @@ fn avx2_min_max(row: &F32x16, of: u32) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+fn avx512_masked_min_max(row: &F32x16, of: u32) -> [f32; 2] {
     let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };

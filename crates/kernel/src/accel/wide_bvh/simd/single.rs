@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::portable::update_nearest;
+use super::portable::intersect_and_update_nearest;
 use super::ray::{SimdRay, is_traceable};
 use super::stack::{Stack, entry_distance, sort_key};
 use super::triangle::Hits;
@@ -90,7 +90,7 @@ fn update_nearest_of_pack(
     }
 }
 
-/// Non-inlined version of [`update_nearest`] for rare cases.
+/// Non-inlined version of [`intersect_and_update_nearest`] for rare cases.
 #[cold]
 #[inline(never)]
 fn update_nearest_uninlined(
@@ -100,7 +100,7 @@ fn update_nearest_uninlined(
     t_max: f32,
     best: &mut Option<ShapeHit>,
 ) {
-    update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
+    intersect_and_update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
 /// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.

@@ -51,7 +51,7 @@ fn quad_power_is_the_mean_of_its_texture() {
     let (shape, texels) = (shapes()[1], patchy(32, 16));
     let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
     let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape));
-    let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.areas()[0];
+    let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.part_areas()[0];
     let source = source_of(light, Some(shape));
     assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.x));
@@ -94,7 +94,7 @@ fn mesh_emission_matches_light_sampling() {
         )
         .expect("never canceled");
         let mesh = mesh.expect("an area");
-        let bounds = mesh.bounds();
+        let bounds = mesh.light_bounds();
         let light = AreaLight {
             side: Side::Front,
             shape: Emitter::Mesh(mesh),

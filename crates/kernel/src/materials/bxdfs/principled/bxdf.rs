@@ -154,7 +154,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Pdf of a direction that is sampled from a lobe with this α.
     #[inline(always)]
-    fn lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
+    fn single_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
         let half = HalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = Self::smith_terms(view, wi, alpha);
         let pdf = eye.pdf(half.isotropic_ggx(alpha));
@@ -254,8 +254,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         any: BxdfFlags,
     ) -> f32 {
         let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
-        let specular = Self::lobe_pdf(view, wi, self.alpha);
-        let coat = if any.contains(COATED) { Self::lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
+        let specular = Self::single_lobe_pdf(view, wi, self.alpha);
+        let coat = if any.contains(COATED) { Self::single_lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
         let narrow = if THROUGH {
             transmission_share * specular
         } else {

@@ -196,7 +196,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
                 let fresnel = f0 + (DVec3::splat(0.8) - f0) * weight;
                 let lobe = reference_microfacet_brdf(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
                 let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
-                let found = subject.evaluate(SampledLobes::All, &[light])[0].0;
+                let found = subject.evaluate_bsdf(SampledLobes::All, &[light])[0].0;
                 let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
                 let what = format!("α {alpha}, {transmission}, {cosine}: {found} instead of {exact}");
                 assert!((found - exact).abs().max_element() <= error * exact.max_element(), "{what}");

@@ -3,7 +3,7 @@
 use super::RoughDielectricPoint;
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
-use crate::materials::fresnel::{dielectric_from_either_side, transmittance};
+use crate::materials::fresnel::{dielectric_from_either_side, fresnel_transmittance};
 use crate::materials::microfacet::{HalfVector, SmithTerms, reflect_at, refract_at, sample_visible_normal};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -78,7 +78,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * view.wo.dot(sum), -scale * wi.dot(sum)];
         let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
-        let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
+        let by_facet = cosines[0] * cosines[1] * fresnel_transmittance(cosines, indices) / half.squared;
         let value = 4.0 * (by_facet * eye.reflection_term(&light, half.isotropic_ggx(self.alpha)));
         let value = value * (self.far * self.far);
         // If the indices are nearly equal, there is no usable half vector.
@@ -106,7 +106,8 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         // Compute the facet's scattering per solid angle.
         let behind = -half.dot(refracted);
         let sum = indices[0] * cosine - indices[1] * behind;
-        let through = 4.0 * (cosine * behind * transmittance([cosine, behind], indices) / (sum * sum));
+        let through =
+            4.0 * (cosine * behind * fresnel_transmittance([cosine, behind], indices) / (sum * sum));
         let by_facet = if is_reflected { reflectance } else { through * (indices[1] * indices[1]) };
         let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
         // Light on the wrong side of the surface does not contribute.

@@ -113,7 +113,7 @@ fn transmission_matches_the_formulas() {
                 )
             };
             let value = |point: &RoughDielectricPoint, eye: DVec3, light: DVec3, eta: f64| {
-                subject(point, eye, eta).evaluate(SampledLobes::All, &[light])[0].0.x
+                subject(point, eye, eta).evaluate_bsdf(SampledLobes::All, &[light])[0].0.x
             };
             let there = value(&point, to_eye, light, eta);
             // Flip both directions to the other side.
@@ -149,9 +149,9 @@ fn reflection_matches_the_formulas() {
             let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
             let near = subject.map_to_direction(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
             for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
-                let there = subject.evaluate(SampledLobes::All, &[light])[0].0.x;
+                let there = subject.evaluate_bsdf(SampledLobes::All, &[light])[0].0.x;
                 let back = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
-                let back = back.evaluate(SampledLobes::All, &[to_eye])[0].0.x;
+                let back = back.evaluate_bsdf(SampledLobes::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
                 assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
                 let (o, i) = (to_eye.normalize(), light.normalize());
@@ -187,7 +187,8 @@ fn two_sided_albedos_match_quadrature() {
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.3));
-            let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
+            let sampled =
+                [reflection.lobe_stratified_albedo(128).x, transmission.lobe_stratified_albedo(128).x];
             // Use fine steps because the integrand changes abruptly where total reflection begins.
             let exact =
                 [reflection.albedo_with_ring_count(1000).x, transmission.albedo_with_ring_count(1000).x];
@@ -253,8 +254,8 @@ fn two_sided_samples_match_one_sided_samples() {
             ];
             let directions: Vec<DVec3> = rows[0].iter().map(|sample| sample.direction).collect();
             let by_directions = [
-                reflection.evaluate(SampledLobes::All, &directions),
-                transmission.evaluate(SampledLobes::All, &directions),
+                reflection.evaluate_bsdf(SampledLobes::All, &directions),
+                transmission.evaluate_bsdf(SampledLobes::All, &directions),
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
