@@ -4,8 +4,9 @@ use std::cell::Cell;
 use std::collections::TryReserveError;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
-use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit, setrlimit};
 
 thread_local! {
     static MAY_FAIL: Cell<bool> = const { Cell::new(false) };
@@ -28,6 +29,22 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
     reserved
 }
 
+/// The control group's limit, once [`apply_cgroup_limit`] has applied it.
+static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
+
+/// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
+/// the process without a message. The limit applies to private memory, including memory that has not been
+/// used yet.
+pub fn apply_cgroup_limit() {
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let Some(limit) = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups) else { return };
+    let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
+    if limit.bytes < soft && setrlimit(Resource::RLIMIT_DATA, limit.bytes, hard).is_ok() {
+        // Another value means that this was called twice.
+        let _ = APPLIED_LIMIT.set(limit);
+    }
+}
+
 /// Returns the setting that prevents this process from mapping `bytes` more bytes of memory. `None` if there
 /// is enough room.
 pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
@@ -37,7 +54,7 @@ pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
         (
             Resource::RLIMIT_DATA,
             status_bytes(&status, "VmData") + status_bytes(&status, "VmStk"),
-            "`ulimit -d`",
+            APPLIED_LIMIT.get().map_or("`ulimit -d`", |limit| &limit.setting),
         ),
     ];
     let is_exhausted =
