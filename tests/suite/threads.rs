@@ -162,3 +162,40 @@ fn merging_too_many_parts_is_one_message() {
         assert!(!dir.path("new.png").exists(), "{options}");
     }
 }
+
+/// A control group (version 1) that limits memory. Removed when this value is dropped.
+#[cfg(target_os = "linux")]
+struct MemoryGroup(std::path::PathBuf);
+
+#[cfg(target_os = "linux")]
+impl MemoryGroup {
+    /// Creates a group. `None` if this system or user cannot create one.
+    fn new(bytes: u64) -> Option<Self> {
+        let group = Self(format!("/sys/fs/cgroup/memory/glimt-test-{}", std::process::id()).into());
+        std::fs::create_dir(&group.0).ok()?;
+        std::fs::write(group.0.join("memory.limit_in_bytes"), bytes.to_string()).ok()?;
+        Some(group)
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl Drop for MemoryGroup {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir(&self.0);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn control_groups_limit_memory_with_a_message() {
+    let Some(group) = MemoryGroup::new(16 << 20) else { return };
+    let dir = TestDir::new();
+    let vertices = "v 0.123456 0.234567 0.345678\n".repeat(400_000);
+    dir.write("big.obj", vertices + "f 1 2 3\n");
+    let script = format!("echo $$ > {}/cgroup.procs && exec \"$0\" check big.obj", group.0.display());
+    let mut process = Process::new("sh");
+    let output = process.args(["-c", &script, PROGRAM]).current_dir(dir.0.path()).output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    // Without a limit of its own, the program would be killed.
+    assert!(output.status.code() == Some(1) && said.contains("memory"), "{:?}: {said}", output.status);
+}
