@@ -88,11 +88,12 @@ fn huge_triangles_shade_like_planes() {
         format!(
             "[render]\nwidth = 32\nheight = 24\nsamples = 16\n[camera]\nposition = [0, 2, 6]\n\
              look_at = [0, 0.5, 0]\nfov = 40\n[materials.w]\ndiffuse = 0.7\n\
-             [[point_light]]\nposition = [2, 5, 3]\nintensity = 60\n\
+             [[light]]\ntype = \"point\"\nposition = [2, 5, 3]\nintensity = 60\n\
              [[sphere]]\ncenter = [0, 1, 0]\nradius = 1\nmaterial = \"w\"\n{floor}material = \"w\"\n"
         )
     };
     let plane = render(&dir, &scene("[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n"));
+    assert!(mean(&plane) > 20.0, "the image must not be black");
     for size in [1e4, 1e7] {
         let triangle =
             format!("[[triangle]]\na = [-{size}, 0, {size}]\nb = [{size}, 0, {size}]\nc = [0, 0, -{size}]\n");
