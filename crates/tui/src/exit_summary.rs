@@ -3,6 +3,7 @@
 use super::event::WriteFailure;
 use super::messages;
 use super::state::{KeyOverrides, SceneImageProgress, State, WorkerActivity, WrittenFile};
+use super::view::text::format_count;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
 use crate::pipeline::settings::{CameraChange, ViewMode};
@@ -154,8 +155,8 @@ pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) 
 
 /// `64 samples`, or `16 to 32 samples`.
 fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> String {
-    let s = if max == 1 { "" } else { "s" };
-    if min == max { format!("{max} sample{s}") } else { format!("{min} to {max} sample{s}") }
+    let most = format_count(max as usize, "sample");
+    if min == max { most } else { format!("{min} to {most}") }
 }
 
 fn view_prefix(view: ViewMode) -> String {

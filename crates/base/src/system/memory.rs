@@ -29,17 +29,22 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
     reserved
 }
 
+/// Address space reserved for the stack of a thread.
+const STACK_BYTES: u64 = 2 << 20;
+
 /// The control group's limit, once [`apply_cgroup_limit`] has applied it.
 static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 
 /// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
-/// the process without a message. The limit applies to private memory, including memory that has not been
-/// used yet.
+/// the process without a message. Thread stacks are counted in full but hardly used, so they are added to the
+/// limit.
 pub fn apply_cgroup_limit() {
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let Some(limit) = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups) else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
-    if limit.bytes < soft && setrlimit(Resource::RLIMIT_DATA, limit.bytes, hard).is_ok() {
+    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u64);
+    let bytes = limit.bytes.saturating_add(threads.saturating_mul(STACK_BYTES));
+    if bytes < soft && setrlimit(Resource::RLIMIT_DATA, bytes, hard).is_ok() {
         // Another value means that this was called twice.
         let _ = APPLIED_LIMIT.set(limit);
     }

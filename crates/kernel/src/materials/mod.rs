@@ -89,7 +89,7 @@ impl Material {
         self.textures().iter().any(|texture| texture.mipmaps.is_some())
     }
 
-    /// All textures except those of a coat over an emitting surface.
+    /// All textures. A coat over an emitting surface has the same textures as the BSDF's coat.
     fn textures(&self) -> Vec<&Arc<Texture>> {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),

@@ -259,7 +259,7 @@ pub(super) fn format_three_digit_number(x: f32) -> String {
 }
 
 /// Formats a count with its noun, such as `1 error` or `2 errors`.
-pub(super) fn format_count(count: usize, what: &str) -> String {
+pub(crate) fn format_count(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 

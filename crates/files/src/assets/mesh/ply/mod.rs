@@ -66,7 +66,7 @@ impl ErrorContext<'_> {
         let reason = item_error_message(&element.name, index + 1, reason);
         match self.encoding {
             Encoding::Ascii => self.source.malformed_error_with_line(at, reason),
-            _ => self.source.malformed_error(reason),
+            Encoding::LittleEndian | Encoding::BigEndian => self.source.malformed_error(reason),
         }
     }
 
@@ -289,7 +289,9 @@ fn read_vertices(
         for &(kind, slot) in &layout {
             match (kind, slot) {
                 (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
-                _ => skip_property(numbers, kind)?,
+                (PropertyType::Scalar(_), None) | (PropertyType::List { .. }, _) => {
+                    skip_property(numbers, kind)?
+                }
             }
         }
         let [x, y, z, nx, ny, nz, u, v, red, green, blue, second_u, second_v, alpha] = values;

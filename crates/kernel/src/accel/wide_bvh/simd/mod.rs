@@ -96,7 +96,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         // (`InstructionSet::or_best_supported`).
         InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest_hit(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
-        _ => portable::closest_hit(tree, ray),
+        InstructionSet::Avx2 | InstructionSet::Avx512 => portable::closest_hit(tree, ray),
     }
 }
 
@@ -109,7 +109,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
         // SAFETY: as above.
         InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::any_hit(tree, ray, except) },
         #[cfg(not(target_arch = "x86_64"))]
-        _ => portable::any_hit(tree, ray, except),
+        InstructionSet::Avx2 | InstructionSet::Avx512 => portable::any_hit(tree, ray, except),
     }
 }
 
@@ -128,7 +128,9 @@ pub fn try_closest_hit_packet(
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
         InstructionSet::Avx512 => unsafe { packet::try_closest_hit_avx512(tree, rays, ends, hits) },
-        _ => false,
+        InstructionSet::Portable => false,
+        #[cfg(not(target_arch = "x86_64"))]
+        InstructionSet::Avx2 | InstructionSet::Avx512 => false,
     }
 }
 
@@ -148,6 +150,8 @@ pub fn try_any_hit_packet(
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
         InstructionSet::Avx512 => unsafe { packet::try_any_hit_avx512(tree, rays, ends, except) },
-        _ => None,
+        InstructionSet::Portable => None,
+        #[cfg(not(target_arch = "x86_64"))]
+        InstructionSet::Avx2 | InstructionSet::Avx512 => None,
     }
 }
