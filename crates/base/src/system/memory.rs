@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use super::threads::core_count;
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit, setrlimit};
 
 thread_local! {
@@ -39,11 +40,9 @@ static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 /// the process without a message. Thread stacks are counted in full but hardly used, so they are added to the
 /// limit.
 pub fn apply_cgroup_limit() {
-    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let Some(limit) = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups) else { return };
+    let Some(limit) = current_cgroup_limit() else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
-    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u64);
-    let bytes = limit.bytes.saturating_add(threads.saturating_mul(STACK_BYTES));
+    let bytes = limit.bytes.saturating_add(core_count() as u64 * STACK_BYTES);
     if bytes < soft && setrlimit(Resource::RLIMIT_DATA, bytes, hard).is_ok() {
         // Another value means that this was called twice.
         let _ = APPLIED_LIMIT.set(limit);
@@ -88,9 +87,14 @@ pub fn memory_limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
     let of_space = of_space.map(|bytes| MemoryLimit { bytes, setting: "`ulimit -v`".to_owned() });
+    of_space.into_iter().chain(current_cgroup_limit()).min_by_key(|limit| limit.bytes)
+}
+
+/// Lowest limit among this process's control groups. `None` if memory is unlimited.
+#[cold]
+fn current_cgroup_limit() -> Option<MemoryLimit> {
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let of_group = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups);
-    of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
+    cgroup_limit(Path::new("/sys/fs/cgroup"), &groups)
 }
 
 /// Lowest limit among the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.

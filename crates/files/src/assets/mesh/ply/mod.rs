@@ -290,7 +290,7 @@ fn read_vertices(
             match (kind, slot) {
                 (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
                 (PropertyType::Scalar(_), None) | (PropertyType::List { .. }, _) => {
-                    skip_property(numbers, kind)?
+                    skip_property(numbers, kind)?;
                 }
             }
         }
