@@ -38,11 +38,12 @@ static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 
 /// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
 /// the process without a message. Thread stacks are counted in full but hardly used, so they are added to the
-/// limit.
+/// limit, up to an eighth.
 pub fn apply_cgroup_limit() {
     let Some(limit) = current_cgroup_limit() else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
-    let bytes = limit.bytes.saturating_add(core_count() as u64 * STACK_BYTES);
+    let stacks = (core_count() as u64 * STACK_BYTES).min(limit.bytes / 8);
+    let bytes = limit.bytes.saturating_add(stacks);
     if bytes < soft && setrlimit(Resource::RLIMIT_DATA, bytes, hard).is_ok() {
         // Another value means that this was called twice.
         let _ = APPLIED_LIMIT.set(limit);
