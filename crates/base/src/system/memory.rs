@@ -6,7 +6,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use super::threads::core_count;
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit, setrlimit};
 
 thread_local! {
@@ -30,20 +29,16 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
     reserved
 }
 
-/// Address space reserved for the stack of a thread.
-const STACK_BYTES: u64 = 2 << 20;
-
 /// The control group's limit, once [`apply_cgroup_limit`] has applied it.
 static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 
 /// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
-/// the process without a message. Thread stacks are counted in full but hardly used, so they are added to the
-/// limit, up to an eighth.
-pub fn apply_cgroup_limit() {
+/// the process without a message. `stacks` is the size of the thread stacks, which count in full but are hardly
+/// used. They are added to the limit, up to an eighth.
+pub fn apply_cgroup_limit(stacks: u64) {
     let Some(limit) = current_cgroup_limit() else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
-    let stacks = (core_count() as u64 * STACK_BYTES).min(limit.bytes / 8);
-    let bytes = limit.bytes.saturating_add(stacks);
+    let bytes = limit.bytes.saturating_add(stacks.min(limit.bytes / 8));
     if bytes < soft && setrlimit(Resource::RLIMIT_DATA, bytes, hard).is_ok() {
         // Another value means that this was called twice.
         let _ = APPLIED_LIMIT.set(limit);

@@ -10,7 +10,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::{describe_error, memory};
 
 /// Address space used by a thread: its stack (with the standard library's default size) and its signal stack.
-const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
+pub const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
 
 /// Starts a thread.
 ///

@@ -156,7 +156,7 @@ pub(super) fn scene_text(
     Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })
 }
 
-/// Returns the first warnings, followed by the number of the others.
+/// Returns the first warnings and, if there are more, a line that counts the rest.
 fn first_warnings(warnings: &[String]) -> Vec<String> {
     let more = warnings.len().saturating_sub(MAX_WARNINGS);
     let rest = (more > 0).then(|| format!("and {more} {MORE_LIKE_THESE}"));

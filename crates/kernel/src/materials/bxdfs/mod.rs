@@ -102,7 +102,7 @@ macro_rules! kinds {
                 match self { $(Self::$kind(material) => material.ambient(lookup)),+ }
             }
 
-            /// All textures, by use.
+            /// Collects all textures by use.
             fn collect_textures(&self) -> TextureCollector<'_> {
                 let mut textures = TextureCollector::default();
                 match self { $(Self::$kind(material) => { material.look_up_parameters(&mut textures); }),+ }
