@@ -170,6 +170,12 @@ impl Cone {
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
 
+    /// Unit tangents of the side away from the tip and around the axis.
+    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+        let along = (point - self.frame.origin).normalize_or(self.frame.axis());
+        [along, self.frame.tangent_around(point)]
+    }
+
     fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.height + self.radius
     }

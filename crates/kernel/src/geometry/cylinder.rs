@@ -150,6 +150,11 @@ impl Cylinder {
         if part == 0 { 0.5 / self.radius } else { 0.0 }
     }
 
+    /// Unit tangents along the axis and around it.
+    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+        [self.frame.axis(), self.frame.tangent_around(point)]
+    }
+
     fn coordinate_bound(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.half_length + self.radius
     }

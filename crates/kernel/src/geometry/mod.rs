@@ -19,6 +19,7 @@ pub mod surface;
 mod surface_of_revolution;
 pub mod surface_packet;
 pub mod torus;
+pub mod transformed;
 pub mod triangle;
 pub mod triangle_list;
 pub mod watertight;
@@ -40,12 +41,13 @@ use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
 use sphere::Sphere;
-use surface_packet::{SurfaceF64 as _, SurfacePacket};
+use surface_packet::{SurfaceF64 as _, SurfacePacket, SurfacePointF64};
 use torus::Torus;
+use transformed::TransformedShape;
 use triangle::Triangle;
 
 /// An analytic shape in world coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
     Sphere(Sphere),
@@ -65,6 +67,8 @@ pub enum Shape {
     Cone(Cone),
     /// A torus.
     Torus(Torus),
+    /// Any of these shapes under an affine transform.
+    Transformed(Box<TransformedShape>),
 }
 
 /// Evaluates an expression with `$it` bound to the concrete shape.
@@ -80,6 +84,7 @@ macro_rules! for_shape {
             Shape::Cylinder($it) => $asked,
             Shape::Cone($it) => $asked,
             Shape::Torus($it) => $asked,
+            Shape::Transformed($it) => $asked,
         }
     };
 }
@@ -109,7 +114,9 @@ impl Shape {
             Self::Box(cuboid) => cuboid.intersect_packet(rows, ends, found),
             Self::Triangle(triangle) => triangle.intersect_packet(rows, ends, found),
             Self::Disk(disk) => disk.intersect_packet(rows, ends, found),
-            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.intersect_each(rows, met, ends, found),
+            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) | Self::Transformed(_) => {
+                self.intersect_each(rows, met, ends, found);
+            }
         }
     }
 
@@ -137,7 +144,11 @@ impl Shape {
             Self::Plane(plane) => row.fill_from_shape(plane, rays, hits, of),
             Self::Box(cuboid) => row.fill_from_shape(cuboid, rays, hits, of),
             Self::Triangle(triangle) => row.fill_from_shape(triangle, rays, hits, of),
-            Self::Disk(_) | Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => return false,
+            Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_)
+            | Self::Transformed(_) => return false,
         }
         true
     }
@@ -154,7 +165,8 @@ impl Shape {
             | Self::Disk(_)
             | Self::Cylinder(_)
             | Self::Cone(_)
-            | Self::Torus(_) => return false,
+            | Self::Torus(_)
+            | Self::Transformed(_) => return false,
         }
         true
     }
@@ -176,8 +188,14 @@ impl Shape {
         if asked.uv {
             self.surface_point(ray, hit)
         } else {
-            for_shape!(self, it => it.surface_point_f64(ray, hit)).to_surface_point_without_uv()
+            self.surface_point_f64(ray, hit).to_surface_point_without_uv()
         }
+    }
+
+    /// Surface point at a hit, before rounding.
+    #[inline]
+    fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
+        for_shape!(self, it => it.surface_point_f64(ray, hit))
     }
 
     /// Bounding box, or `None` if the shape is infinite.
@@ -193,6 +211,7 @@ impl Shape {
             Self::Cylinder(cylinder) => Some(cylinder.bounds()),
             Self::Cone(cone) => Some(cone.bounds()),
             Self::Torus(torus) => Some(torus.bounds()),
+            Self::Transformed(transformed) => transformed.bounds(),
         }
     }
 
@@ -208,20 +227,29 @@ impl Shape {
             | Self::Cylinder(_)
             | Self::Cone(_)
             | Self::Torus(_) => 0,
+            Self::Transformed(transformed) => transformed.shape.triangle_count(),
         }
     }
 
-    /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite.
+    /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite. If the shape is
+    /// transformed, these are the areas before the transform; see [`Shape::area_scale`].
     pub fn part_areas(&self) -> Vec<f64> {
         for_shape!(self, it => it.part_areas().to_vec())
     }
 
-    /// Samples a point uniformly over the area of a part. `u` is uniform in [0, 1)².
+    /// Samples a point uniformly over [`Shape::part_areas`] of a part. `u` is uniform in [0, 1)².
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         for_shape!(self, it => it.sample(part, u))
     }
 
-    /// Centroid of the surface.
+    /// Factor from [`Shape::part_areas`] to the area in the world, at a point with this unit normal. 1 unless
+    /// the shape is transformed.
+    #[inline]
+    pub fn area_scale(&self, normal: DVec3) -> f64 {
+        if let Self::Transformed(transformed) = self { transformed.area_scale(normal) } else { 1.0 }
+    }
+
+    /// Centroid of the surface. For a transformed shape, the image of the centroid.
     pub fn centroid(&self) -> DVec3 {
         for_shape!(self, it => it.centroid())
     }
@@ -239,6 +267,7 @@ impl Shape {
             Self::Cylinder(cylinder) => cylinder.is_capped(),
             Self::Cone(cone) => cone.is_capped(),
             Self::Quad(_) | Self::Triangle(_) | Self::Disk(_) => false,
+            Self::Transformed(transformed) => transformed.shape.is_closed(),
         }
     }
 
@@ -253,6 +282,9 @@ impl Shape {
     pub fn encloses_points<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {
             Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
+            Self::Transformed(transformed) => transformed
+                .shape
+                .encloses_points(points.map(|point| transformed.to_world.inverse_point(point))),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Torus(_)
@@ -280,6 +312,27 @@ impl Shape {
             Self::Cylinder(cylinder) => cylinder.curvature(part),
             Self::Cone(cone) => cone.curvature(part, point),
             Self::Torus(torus) => torus.mean_curvature(point),
+            Self::Transformed(transformed) => transformed.curvature(part, point),
+        }
+    }
+
+    /// Curvature of the meridian through a point on a curved part, and unit tangents along the meridian and
+    /// around the axis, which are the principal directions. `None` if the shape is not a surface of revolution.
+    fn meridian(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
+        match self {
+            Self::Sphere(sphere) => {
+                let (a, b) = (point - sphere.center).normalize_or(DVec3::Y).any_orthonormal_pair();
+                Some((1.0 / sphere.radius, [a, b]))
+            }
+            Self::Cylinder(cylinder) => Some((0.0, cylinder.tangents(point))),
+            Self::Cone(cone) => Some((0.0, cone.tangents(point))),
+            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.tangents(point))),
+            Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Box(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Transformed(_) => None,
         }
     }
 
@@ -295,6 +348,7 @@ impl Shape {
             Self::Cylinder(cylinder) => LocalGeometry::curved_at_distance(cylinder.distance(point)),
             Self::Cone(cone) => LocalGeometry::curved_at_distance(cone.distance(point)),
             Self::Torus(torus) => LocalGeometry::curved_at_distance(torus.distance(point)),
+            Self::Transformed(transformed) => transformed.local_geometry(point),
         }
     }
 
@@ -314,6 +368,7 @@ impl Shape {
             | Self::Cylinder(_)
             | Self::Cone(_)
             | Self::Torus(_) => None,
+            Self::Transformed(transformed) => transformed.flat_polygon(number),
         }
     }
 
@@ -324,6 +379,7 @@ impl Shape {
         match self {
             Self::Sphere(sphere) => sphere.radius > distance,
             Self::Box(cuboid) => cuboid.is_near_only_one_face(point, distance),
+            Self::Transformed(transformed) => transformed.is_thicker_than(point, distance),
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Triangle(_)

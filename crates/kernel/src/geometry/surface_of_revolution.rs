@@ -50,6 +50,11 @@ impl AxialFrame {
         self.axes.z_axis.dot(point - self.origin)
     }
 
+    /// Unit tangent of the circle around the axis through a point.
+    pub fn tangent_around(&self, point: DVec3) -> DVec3 {
+        self.axis().cross(point - self.origin).normalize_or(self.axes.x_axis)
+    }
+
     /// The line through a ray in local coordinates, parametrized from its closest point to the frame's
     /// origin.
     #[inline(always)]

@@ -12,6 +12,7 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
+use crate::geometry::transformed::TransformedShape;
 use crate::geometry::triangle::Triangle;
 use crate::math::transform::Transform;
 use crate::math::{DMat3, DVec3};
@@ -117,6 +118,13 @@ pub enum Shape {
     },
     /// An instance of a mesh file.
     Mesh(MeshReference),
+    /// Another shape, but not a mesh, under an affine map. See [`Shape::transformed`].
+    Transformed {
+        /// The shape before the map.
+        shape: Box<Self>,
+        /// The map, applied after the shape's own keys.
+        matrix: AffineMap,
+    },
 }
 
 /// An open surface, which does not enclose a volume on its own.
@@ -181,12 +189,38 @@ pub enum MeshTransform {
         translate: DVec3,
     },
     /// An invertible affine map.
-    Matrix {
-        /// Images of the coordinate axes.
-        linear: [DVec3; 3],
-        /// Image of the origin.
-        translate: DVec3,
-    },
+    Matrix(AffineMap),
+}
+
+/// An invertible affine map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AffineMap {
+    /// Images of the coordinate axes.
+    pub linear: [DVec3; 3],
+    /// Image of the origin.
+    pub translate: DVec3,
+}
+
+impl AffineMap {
+    /// Returns the map and its inverse.
+    pub fn transform(&self) -> Transform {
+        let [x, y, z] = self.linear;
+        Transform::from_mat3_translation(DMat3::from_cols(x, y, z), self.translate)
+    }
+
+    /// Returns the scale of a map that consists of a uniform scale > 0 and a translation. `None` for other
+    /// maps.
+    fn uniform_scale(&self) -> Option<f64> {
+        let scale = self.linear[0].x;
+        (scale > 0.0 && self.linear == DVec3::AXES.map(|axis| axis * scale)).then_some(scale)
+    }
+}
+
+impl Fingerprinted for AffineMap {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+        let [x, y, z] = self.linear;
+        key.add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(self.translate);
+    }
 }
 
 impl MeshTransform {
@@ -196,15 +230,13 @@ impl MeshTransform {
             Self::Steps { scale, rotate, translate } => {
                 Transform::scale_rotate_translate(scale, rotate, translate)
             }
-            Self::Matrix { linear: [x, y, z], translate } => {
-                Transform::from_mat3_translation(DMat3::from_cols(x, y, z), translate)
-            }
+            Self::Matrix(map) => map.transform(),
         }
     }
 }
 
 /// A shape in the representation used for tracing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum LoweredShape<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
@@ -213,6 +245,42 @@ pub enum LoweredShape<'a> {
 }
 
 impl Shape {
+    /// Applies an affine map. The front remains the front. If the result is a shape of the same kind with the
+    /// same texture coordinates, returns this shape, which is faster to trace.
+    #[must_use]
+    pub fn transformed(self, matrix: AffineMap) -> Self {
+        let map = matrix.transform();
+        let (at, along) = (|point: DVec3| map.point(point), |vector: DVec3| map.vector(vector));
+        let flips = map.flips_handedness();
+        match (self, matrix.uniform_scale()) {
+            (Self::Quad { corner, u, v }, _) if !flips => {
+                Self::Quad { corner: at(corner), u: along(u), v: along(v) }
+            }
+            (Self::Triangle { a, b, c }, _) if !flips => Self::Triangle { a: at(a), b: at(b), c: at(c) },
+            (Self::Sphere { center, radius }, Some(scale)) => {
+                Self::Sphere { center: at(center), radius: radius * scale }
+            }
+            (Self::Box { center, size, rotate }, Some(scale)) => {
+                Self::Box { center: at(center), size: size * scale, rotate }
+            }
+            (Self::Disk { center, normal, radius }, Some(scale)) => {
+                Self::Disk { center: at(center), normal, radius: radius * scale }
+            }
+            (Self::Cylinder { a, b, radius, caps }, Some(scale)) => {
+                Self::Cylinder { a: at(a), b: at(b), radius: radius * scale, caps }
+            }
+            (Self::Cone { base, tip, radius, cap }, Some(scale)) => {
+                Self::Cone { base: at(base), tip: at(tip), radius: radius * scale, cap }
+            }
+            (Self::Torus { center, axis, radius, tube }, Some(scale)) => {
+                Self::Torus { center: at(center), axis, radius: radius * scale, tube: tube * scale }
+            }
+            // Texture tiles on a plane have an edge length of 1.
+            (Self::Plane { point, normal }, Some(1.0)) => Self::Plane { point: at(point), normal },
+            (shape, _) => Self::Transformed { shape: Box::new(shape), matrix },
+        }
+    }
+
     /// Lowers the shape, with coordinates relative to `origin`.
     pub fn lowered(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
@@ -237,6 +305,17 @@ impl Shape {
                 geometry::Shape::Torus(Torus::new(at(center), axis, radius, tube))
             }
             Self::Mesh(ref mesh) => return LoweredShape::Mesh(mesh),
+            Self::Transformed { ref shape, ref matrix } => {
+                // The shape's own coordinates are relative to a point near it.
+                let near = shape.representative_point().unwrap_or_default();
+                match shape.lowered(near) {
+                    LoweredShape::Shape(own) => geometry::Shape::Transformed(Box::new(TransformedShape::new(
+                        own,
+                        matrix.transform().relative_to_origins(near, origin),
+                    ))),
+                    mesh @ LoweredShape::Mesh(_) => return mesh,
+                }
+            }
         })
     }
 
@@ -253,6 +332,7 @@ impl Shape {
             Self::Cone { .. } => "cone",
             Self::Torus { .. } => "torus",
             Self::Mesh(_) => "mesh",
+            Self::Transformed { shape, .. } => shape.kind(),
         }
     }
 
@@ -261,9 +341,14 @@ impl Shape {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// Returns the shape as an open surface. `None` for closed shapes, planes and meshes.
+    /// Returns the shape before its matrix, and the matrix if the shape is transformed.
+    pub fn untransformed(&self) -> (&Self, Option<&AffineMap>) {
+        if let Self::Transformed { shape, matrix } = self { (shape, Some(matrix)) } else { (self, None) }
+    }
+
+    /// Returns the shape before its matrix as an open surface. `None` for closed shapes, planes and meshes.
     pub fn as_open_surface(&self) -> Option<OpenSurface> {
-        match *self {
+        match *self.untransformed().0 {
             Self::Quad { corner, u, v } => {
                 Some(OpenSurface::Quad([corner, corner + u, corner + u + v, corner + v]))
             }
@@ -277,7 +362,8 @@ impl Shape {
             | Self::Torus { .. }
             | Self::Cylinder { caps: true, .. }
             | Self::Cone { cap: true, .. }
-            | Self::Mesh(_) => None,
+            | Self::Mesh(_)
+            | Self::Transformed { .. } => None,
         }
     }
 
@@ -293,6 +379,9 @@ impl Shape {
             Self::Triangle { a, .. } | Self::Cylinder { a, .. } => Some(a),
             Self::Cone { base, .. } => Some(base),
             Self::Mesh(_) => None,
+            Self::Transformed { ref shape, ref matrix } => {
+                Some(matrix.transform().point(shape.representative_point()?))
+            }
         }
     }
 
@@ -329,6 +418,11 @@ impl Shape {
             }
             Self::Torus { center, axis, radius, tube } => along(center) + round(axis, radius) + tube,
             Self::Mesh(_) => return None,
+            Self::Transformed { ref shape, ref matrix } => {
+                let own = DVec3::from_array(matrix.linear.map(along));
+                let length = own.length();
+                along(matrix.translate) + length * shape.max_projection_onto(own / length)?
+            }
         })
     }
 }
@@ -361,6 +455,7 @@ impl Fingerprinted for Shape {
                 key.add_usize(8).add_dvec3(*center).add_dvec3(*axis).add_f64(*radius).add_f64(*tube)
             }
             Self::Mesh(mesh) => key.add_usize(9).add(mesh, of),
+            Self::Transformed { shape, matrix } => key.add_usize(10).add(matrix, of).add(&**shape, of),
         };
     }
 }
@@ -374,8 +469,8 @@ impl Fingerprinted for MeshReference {
             MeshTransform::Steps { scale, rotate, translate } => {
                 key.add_usize(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate);
             }
-            MeshTransform::Matrix { linear: [x, y, z], translate } => {
-                key.add_usize(1).add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(translate);
+            MeshTransform::Matrix(map) => {
+                key.add_usize(1).add(&map, of);
             }
         }
     }

@@ -13,7 +13,7 @@ macro_rules! shapes {
             name: $name,
             form: TableSyntax::List,
             doc: $doc,
-            keys: &[$($own,)* material_key($name), NAME],
+            keys: &[$($own,)* matrix_key($name), material_key($name), NAME],
             types: &[],
         }),*];
     };
@@ -21,6 +21,20 @@ macro_rules! shapes {
 
 const NAME: KeyInfo =
     define_key("name", Text, "", Absent, "Name used in messages, for clicks and by `--set`");
+
+/// Defines the key `matrix`. A mesh takes it instead of its own transform.
+const fn matrix_key(shape: &str) -> KeyInfo {
+    // String comparison is not const, so match bytes.
+    let doc = match shape.as_bytes() {
+        b"mesh" => {
+            "An affine transform in row-major order, with 0, 0, 0, 1 as the last row; replaces `scale`, `rotate` and `translate`"
+        }
+        _ => {
+            "An affine transform in row-major order, with 0, 0, 0, 1 as the last row, applied after the other keys; the front remains the front"
+        }
+    };
+    define_key("matrix", Numbers(16, "16 numbers", Any), "", Absent, doc)
+}
 
 /// Defines the key `material`. It is optional for meshes, because their files may contain materials.
 const fn material_key(shape: &str) -> KeyInfo {
@@ -91,7 +105,6 @@ shapes! {
         define_key("scale", Scale(NotZero), "", Is("1.0"), "Scale, applied first"),
         define_key("rotate", Numbers(3, "three numbers", Any), "degrees", Is("[0, 0, 0]"), "Rotation about x, then y, then z"),
         define_key("translate", Numbers(3, "three numbers", Any), "length", Is("[0, 0, 0]"), "Translation, applied last"),
-        define_key("matrix", Numbers(16, "16 numbers", Any), "", Absent, "An affine transform in row-major order, with 0, 0, 0, 1 as the last row; replaces `scale`, `rotate` and `translate`"),
         define_key("smooth", Flag, "", Is("true"), "Whether vertex normals are interpolated; glimt computes them if the file has none"),
         define_key("vertex_colors", Flag, "", Is("false"), "Whether vertex colors multiply the material's color"),
     ];

@@ -12,6 +12,7 @@ use super::MeshTree;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::geometry::cuboid::Cuboid;
 use crate::materials::EmissionSides;
+use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{Scene, Shape};
 
@@ -62,6 +63,16 @@ impl FlatFace {
         let [a, b, c] = *corners.first_chunk()?;
         let normal = (b - a).cross(c - a).try_normalize()?;
         Some(Self { object: 0, corners, point: a, normal, emits: None, rounding: 0.0 })
+    }
+
+    /// Applies an affine map. The front remains the front.
+    fn transformed(self, map: &Transform) -> Self {
+        let mut corners: Vec<DVec3> = self.corners.iter().map(|corner| map.point(*corner)).collect();
+        if map.flips_handedness() {
+            corners.reverse();
+        }
+        let (point, normal) = (map.point(self.point), map.normal(self.normal).normalize_or_zero());
+        Self { corners, point, normal, ..self }
     }
 
     /// Bounding box of the corners. `None` for an infinite plane.
@@ -288,14 +299,19 @@ fn visit_flat_faces(
     let object = &scene.objects[number];
     let material = object.material.map(|index| &scene.materials[index]);
     let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+    let (shape, matrix) = object.shape.untransformed();
+    let map = matrix.map(|matrix| matrix.transform().relative_to_origins(DVec3::ZERO, origin));
+    // The map also translates the origin.
+    let origin = if map.is_some() { DVec3::ZERO } else { origin };
     let mut visit = |face: Option<FlatFace>, emits: Option<EmissionSides>| {
-        if let Some(mut face) = face {
+        let transformed = |face: FlatFace| if let Some(map) = &map { face.transformed(map) } else { face };
+        if let Some(mut face) = face.map(transformed) {
             (face.object, face.emits) = (number, emits);
             visit(&face);
         }
     };
     let polygon = |corners: Vec<DVec3>| FlatFace::new(corners.into_iter().map(|at| at - origin).collect());
-    match object.shape {
+    match *shape {
         Shape::Quad { corner, u, v } => {
             visit(polygon(vec![corner, corner + u, corner + u + v, corner + v]), emits);
         }
@@ -354,7 +370,11 @@ fn visit_flat_faces(
                 visit(face, if material.is_some() { emits } else { own(triangle) });
             }
         }
-        Shape::Sphere { .. } | Shape::Torus { .. } | Shape::Cylinder { .. } | Shape::Cone { .. } => {}
+        Shape::Sphere { .. }
+        | Shape::Torus { .. }
+        | Shape::Cylinder { .. }
+        | Shape::Cone { .. }
+        | Shape::Transformed { .. } => {}
     }
 }
 

@@ -176,7 +176,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
         let light = AreaLight { bounds: emissive.scale_bounds_by_mean(light.bounds), ..light };
-        Some(match emissive.texture(UvMapping::Shape(*shape)) {
+        Some(match emissive.texture(UvMapping::Shape(shape.clone())) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })

@@ -114,7 +114,7 @@ impl Object {
     /// Geometry of the object as a light source.
     pub(super) fn emitter_geometry(&self) -> EmissiveObjectGeometry {
         match self {
-            Self::Shape(shape) => EmissiveObjectGeometry::Shape(*shape),
+            Self::Shape(shape) => EmissiveObjectGeometry::Shape(shape.clone()),
             Self::Mesh(mesh) => EmissiveObjectGeometry::Mesh { rounding: mesh.max_rounding_error() },
         }
     }

@@ -104,6 +104,18 @@ impl Torus {
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
+    /// Unit tangents around the tube and around the axis.
+    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+        let (out, from_circle) = self.circle_directions(point);
+        let around_tube = self.frame.vector_to_world((out * -from_circle.y).extend(from_circle.x));
+        [around_tube, self.frame.tangent_around(point)]
+    }
+
+    /// Radius of the tube.
+    pub(super) fn tube(&self) -> f64 {
+        self.tube
+    }
+
     /// Surface point for a direction from the axis and a direction from the circle, as returned by
     /// [`Torus::circle_directions`].
     fn surface_from_directions(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {

@@ -31,7 +31,7 @@ impl ShapeEmitter for InwardEmitter {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
             None if self.is_first_hit(from, met.direction, met.distance) => {
-                met.uniform_area_pdf(self.by_area.total())
+                met.uniform_area_pdf(self.by_area.total() * self.shape.area_scale(met.normal.as_dvec3()))
             }
             None => 0.0,
         }
@@ -48,7 +48,7 @@ const ALL_AROUND: f32 = 4.0 * PI;
 impl InwardEmitter {
     /// Creates an emitter for a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
-        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.part_areas())? })
+        Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.part_areas())? })
     }
 
     /// Samples a direction uniformly from a point inside the shape.
@@ -75,7 +75,8 @@ impl InwardEmitter {
         if !(cosine > 0.0 && self.is_first_hit(point, direction, distance as f32)) {
             return LightSamplePoint::NOTHING;
         }
-        let factor = cosine * self.by_area.total() / (distance * distance);
+        let area = self.by_area.total() * self.shape.area_scale(normal);
+        let factor = cosine * area / (distance * distance);
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 

@@ -19,6 +19,7 @@ pub mod sphere;
 pub mod surface_of_revolution;
 pub mod textured_quad;
 pub mod torus;
+pub mod transformed;
 pub mod triangle;
 
 pub use emission_texture::{EmissionTexture, UvMapping, UvTriangle};
@@ -31,8 +32,9 @@ use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
+use crate::geometry::transformed::TransformedShape;
 use crate::geometry::triangle::Triangle;
-use crate::math::{DVec2, DVec3, Vec3};
+use crate::math::{DVec2, DVec3, Vec2, Vec3};
 use cuboid::BoxEmitter;
 use disk::DiskEmitter;
 use inside::InwardEmitter;
@@ -43,6 +45,7 @@ use sphere::SphereEmitter;
 use surface_of_revolution::{ConeSide, CylinderSide, RevolutionEmitter};
 use textured_quad::TexturedQuadEmitter;
 use torus::TorusEmitter;
+use transformed::TransformedEmitter;
 use triangle::TriangleEmitter;
 
 /// A shape whose front emits the same radiance in every direction.
@@ -115,6 +118,8 @@ pub enum Emitter {
     Cone(Box<RevolutionEmitter<ConeSide>>),
     /// A torus.
     Torus(TorusEmitter),
+    /// The front of a transformed shape.
+    Transformed(Box<TransformedEmitter>),
     /// The inside of a shape.
     Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
@@ -137,11 +142,27 @@ macro_rules! of_any {
             Emitter::Cylinder($it) => $asked,
             Emitter::Cone($it) => $asked,
             Emitter::Torus($it) => $asked,
+            Emitter::Transformed($it) => $asked,
             Emitter::Inside($it) => $asked,
             Emitter::SeeThrough($it) => $asked,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
+}
+
+/// For emitters in their own coordinates. Meshes are never transformed this way.
+impl ShapeEmitter for Emitter {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        of_any!(self, it => it.sample(point, u), _mesh => LightSamplePoint::NOTHING)
+    }
+
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+        of_any!(self, it => it.pdf(from, met), _mesh => 0.0)
+    }
+
+    fn center(&self) -> DVec3 {
+        of_any!(self, it => it.center(), mesh => mesh.center())
+    }
 }
 
 impl Emitter {
@@ -170,7 +191,14 @@ impl Emitter {
 
 /// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
-    let emitter = match shape {
+    let (emitter, bounds) = (front_emitter(shape)?, emission_bounds(shape, radiance)?);
+    let (side, texture, part) = (Side::Front, None, EmittingPart::Whole);
+    Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
+}
+
+/// Creates the emitter for the front of a shape.
+fn front_emitter(shape: &Shape) -> Option<Emitter> {
+    Some(match shape {
         Shape::Sphere(sphere) => {
             let Sphere { center, radius } = *sphere;
             Emitter::Sphere(SphereEmitter { center, radius })
@@ -182,11 +210,11 @@ pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Ar
         Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RevolutionEmitter::from_cylinder(cylinder))),
         Shape::Cone(cone) => Emitter::Cone(Box::new(RevolutionEmitter::from_cone(cone))),
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
+        Shape::Transformed(own) => {
+            Emitter::Transformed(Box::new(TransformedEmitter::new(front_emitter(&own.shape)?, own)))
+        }
         Shape::Plane(_) => return None,
-    };
-    let bounds = emission_bounds(shape, radiance)?;
-    let (side, texture, part) = (Side::Front, None, EmittingPart::Whole);
-    Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
+    })
 }
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
@@ -197,12 +225,13 @@ pub fn see_through_side_area_light(
     radiance: Vec3,
     object: u32,
 ) -> Option<AreaLight> {
-    let hides_itself = match (shape, side) {
+    let untransformed = if let Shape::Transformed(own) = shape { &own.shape } else { shape };
+    let hides_itself = match (untransformed, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
         // Seen from outside, the front is hit at most once in each direction.
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
-        (Shape::Torus(_), _) => true,
+        (Shape::Torus(_) | Shape::Transformed(_), _) => true,
     };
     let light = match side {
         Side::Front => front_area_light(shape, radiance, object)?,
@@ -217,13 +246,7 @@ pub fn see_through_side_area_light(
 
 /// Creates the light on the back of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
-    let turned = match shape {
-        Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
-        Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
-        Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.centroid(), -disk.normal(), disk.radius()))),
-        Shape::Plane(_) => return None,
-        Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => None,
-    };
+    let turned = turned_over(shape);
     let light = front_area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
     let emitter = match turned {
         Some(_) => light.shape,
@@ -232,23 +255,56 @@ pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Are
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// Bounds on a shape's emission. `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
-/// Other shapes are assumed to emit a quarter of their area times the radiance in every direction, which is
-/// the mean over all directions for convex shapes (Cauchy).
-fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
-    let normal = match shape {
+/// A flat shape with its front on the other side. `None` for other shapes.
+fn turned_over(shape: &Shape) -> Option<Shape> {
+    match shape {
+        Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
+        Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
+        Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.centroid(), -disk.normal(), disk.radius()))),
+        Shape::Transformed(own) => turned_over(&own.shape)
+            .map(|shape| Shape::Transformed(Box::new(TransformedShape::new(shape, own.to_world)))),
+        Shape::Plane(_)
+        | Shape::Sphere(_)
+        | Shape::Box(_)
+        | Shape::Cylinder(_)
+        | Shape::Cone(_)
+        | Shape::Torus(_) => None,
+    }
+}
+
+/// Normal of a flat shape's front, of any length. `None` for other shapes.
+fn flat_normal(shape: &Shape) -> Option<DVec3> {
+    match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
         Shape::Triangle(Triangle { a, b, c }) => Some((b - a).cross(c - a)),
         Shape::Disk(disk) => Some(disk.normal()),
+        Shape::Transformed(own) => Some(own.to_world.normal(flat_normal(&own.shape)?)),
         Shape::Sphere(_)
         | Shape::Plane(_)
         | Shape::Box(_)
         | Shape::Cylinder(_)
         | Shape::Cone(_)
         | Shape::Torus(_) => None,
-    };
-    let area: f64 = shape.part_areas().iter().sum();
-    let (shown, cone) = match normal.map(DVec3::normalize) {
+    }
+}
+
+/// Area of a shape. Estimated on a grid of points if the shape is transformed.
+fn area(shape: &Shape) -> f64 {
+    let areas = shape.part_areas();
+    let Shape::Transformed(_) = shape else { return areas.iter().sum() };
+    const SIDE: u32 = 16;
+    let grid = |i: u32| (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32;
+    let scale = |part: u32, i: u32| shape.area_scale(shape.sample(part, grid(i)).normal);
+    let mean = |part: u32| (0..SIDE * SIDE).map(|i| scale(part, i)).sum::<f64>() / f64::from(SIDE * SIDE);
+    (0..).zip(areas).map(|(part, area)| if area > 0.0 { area * mean(part) } else { 0.0 }).sum()
+}
+
+/// Bounds on a shape's emission. `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
+/// Other shapes are assumed to emit a quarter of their area times the radiance in every direction, which is
+/// the mean over all directions for convex shapes (Cauchy).
+fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
+    let area = area(shape);
+    let (shown, cone) = match flat_normal(shape).map(DVec3::normalize) {
         Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
@@ -323,6 +379,6 @@ impl AreaLight {
 
     /// Centroid of the area.
     pub fn center(&self) -> DVec3 {
-        of_any!(&self.shape, it => it.center(), mesh => mesh.center())
+        self.shape.center()
     }
 }

@@ -22,7 +22,7 @@ impl SeeThroughSideEmitter {
             Side::Front => 1.0,
             Side::Back => -1.0,
         };
-        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.part_areas())?, outwards })
+        Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.part_areas())?, outwards })
     }
 }
 
@@ -37,12 +37,13 @@ impl ShapeEmitter for SeeThroughSideEmitter {
             return LightSamplePoint::NOTHING;
         }
         let direction = (offset / distance).as_vec3();
-        let factor = cosine * self.by_area.total() / (distance * distance);
+        let area = self.by_area.total() * self.shape.area_scale(normal);
+        let factor = cosine * area / (distance * distance);
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     fn pdf(&self, _: Vec3, met: &LightHit) -> f32 {
-        met.uniform_area_pdf(self.by_area.total())
+        met.uniform_area_pdf(self.by_area.total() * self.shape.area_scale(met.normal.as_dvec3()))
     }
 
     fn center(&self) -> DVec3 {

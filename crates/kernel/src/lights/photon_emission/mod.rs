@@ -55,7 +55,7 @@ impl BoundingSphere {
 }
 
 /// The geometry of an emitting object.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum EmissiveObjectGeometry {
     /// A shape.
     Shape(Shape),

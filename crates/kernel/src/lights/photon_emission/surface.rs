@@ -22,11 +22,12 @@ pub struct EmissiveSurface {
 /// Geometry of the pieces.
 #[derive(Clone, Debug)]
 enum DividedSurfaceGeometry {
-    /// An analytic shape. Each part is divided into side × side pieces of equal area.
+    /// An analytic shape. Each part is divided into side × side pieces of equal
+    /// [`Shape::part_areas`].
     Shape {
         shape: Shape,
         side: u32,
-        /// Areas of the parts.
+        /// [`Shape::part_areas`].
         areas: Vec<f64>,
         /// Upper bound on the magnitudes of the lengths used to compute points.
         reach: f64,
@@ -56,12 +57,12 @@ pub struct EmissionPoint {
 struct PiecePoint {
     point: DVec3,
     normal: DVec3,
-    /// Area of the entire piece.
+    /// Area of the entire piece, if the whole piece has the same area scale as this point.
     area: f64,
     primitive: u32,
 }
 
-/// Maximum number of pieces for a textured light.
+/// Maximum number of pieces for a textured or transformed light.
 const PIECES: usize = 1024;
 
 /// Number of texture lookups per side of a piece.
@@ -76,12 +77,13 @@ impl EmissiveSurface {
         let (on, count) = match emitter_geometry {
             EmissiveObjectGeometry::Shape(shape) => {
                 let areas = shape.part_areas();
-                let most = if light.texture.is_some() { PIECES / areas.len().max(1) } else { 1 };
+                let is_uneven = light.texture.is_some() || matches!(shape, Shape::Transformed(_));
+                let most = if is_uneven { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (
                     DividedSurfaceGeometry::Shape {
-                        shape: *shape,
+                        shape: shape.clone(),
                         side: side as u32,
                         areas,
                         reach: coordinate_bound(shape)?,
@@ -150,11 +152,12 @@ impl DividedSurfaceGeometry {
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
                 let AreaPoint { point, normal } = shape.sample(part as u32, u);
+                let area = areas[part] * shape.area_scale(normal) / (all * all) as f64;
                 let normal = match light.side {
                     Side::Front => normal,
                     Side::Back => -normal,
                 };
-                PiecePoint { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
+                PiecePoint { point, normal, area, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {
                 let (place, area, primitive) = mesh.sample_point_on_triangle(index, u);
@@ -179,6 +182,9 @@ fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
 /// Upper bound on the magnitudes of the lengths used to compute points on the shape. `None` if the shape is
 /// infinite.
 fn coordinate_bound(shape: &Shape) -> Option<f64> {
+    if let Shape::Transformed(own) = shape {
+        return Some(own.reach_to_world(coordinate_bound(&own.shape)?));
+    }
     let bounds = shape.bounds()?;
     let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
     Some(greatest + 2.0 * bounds.extent().as_dvec3().length())

@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use super::super::super::description::{MeshFile, MeshReference, MeshTransform, Shape, Spanned};
 use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
-use super::super::key::TableKey;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
+use super::matrix::read_affine_matrix;
 use crate::math::DVec3;
-use crate::math::limits::{SHORTEST, is_too_short, robust_length};
 
 /// The mesh files referenced so far. A file referenced through different paths is listed once.
 #[derive(Default)]
@@ -72,7 +71,7 @@ fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
                 key.context.report(Issue::error(span, message));
             }
         }
-        return read_affine_matrix(&matrix);
+        return read_affine_matrix(&matrix).map(MeshTransform::Matrix);
     }
     let [scale, rotate, translate] = steps;
     Some(MeshTransform::Steps {
@@ -80,34 +79,4 @@ fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
         rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
         translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
     })
-}
-
-/// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
-/// ratio is singular up to rounding.
-const MIN_VOLUME_RATIO: f64 = 1e-12;
-
-/// Reads an invertible affine transform in row-major order.
-fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
-    let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
-    let [x, y, z, translate] =
-        std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
-    let wrong = |message: &str, label: String| {
-        key.context.report(Issue::error(key.span().unwrap_or_default(), message).with_label(label));
-        None
-    };
-    if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
-        let [a, b, c, d] = [12, 13, 14, 15].map(|place| numbers[place]);
-        return wrong("the last row of `matrix` must be 0, 0, 0, 1", format!("it is {a}, {b}, {c}, {d}"));
-    }
-    let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());
-    if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
-        return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
-    }
-    if [x, y, z].iter().any(|axis| is_too_short(robust_length(*axis))) {
-        return wrong(
-            "`matrix` makes the mesh too small",
-            format!("its columns must be more than {SHORTEST:e} long"),
-        );
-    }
-    Some(MeshTransform::Matrix { linear: [x, y, z], translate })
 }

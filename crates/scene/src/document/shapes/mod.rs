@@ -4,6 +4,7 @@ mod boxes;
 mod cone;
 mod cylinder;
 mod disk;
+mod matrix;
 mod mesh;
 mod plane;
 mod quad;
@@ -20,6 +21,7 @@ use super::limits::Limits;
 use super::materials::MaterialList;
 use super::table::TableReader;
 use crate::math::DVec3;
+use matrix::read_affine_matrix;
 use mesh::MeshFileRegistry;
 
 /// A function that reads a shape's table. Only meshes use the list of mesh files.
@@ -72,6 +74,9 @@ fn read_object(
     files: &mut MeshFileRegistry,
 ) -> Option<Object> {
     let shape = reader(table, files);
+    let matrix = table.optional_key("matrix");
+    // A mesh's reader reads the matrix.
+    let matrix = if kind == "mesh" || !matrix.is_present() { None } else { Some(read_affine_matrix(&matrix)) };
     let key = match kind {
         "mesh" => table.optional_key("material"),
         _ => table.required_key("material", "\"name\""),
@@ -89,7 +94,10 @@ fn read_object(
     if key.is_present() && material.is_none() || kind != "mesh" && material.is_none() {
         return None;
     }
-    let shape = shape?;
+    let shape = match matrix {
+        Some(matrix) => shape?.transformed(matrix?),
+        None => shape?,
+    };
     Some(Object { shape, material, name: name?, span: table.span.clone() })
 }
 

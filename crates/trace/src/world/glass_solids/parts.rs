@@ -8,6 +8,7 @@ use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
+use crate::math::transform::Transform;
 use crate::scene::description::{
     MaterialKind, MeshReference, NumberSource, Object, OpenSurface, Scene, Shape,
 };
@@ -75,7 +76,11 @@ impl GlassParts {
                 let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
                 parts.add_mesh(number, mesh, loaded, glass, open);
             } else if let Some(sheet) = object.shape.as_open_surface() {
+                let first = parts.rims.len();
                 parts.add_open_surface(number, &sheet);
+                if let (_, Some(matrix)) = object.shape.untransformed() {
+                    parts.transform_last_part(first, &matrix.transform());
+                }
             }
             for part in &mut parts.list[first..] {
                 part.substance = glass_medium_key_of_object(scene, meshes, object);
@@ -113,6 +118,28 @@ impl GlassParts {
                 self.add_circle(base, axis, radius, tip);
             }
         }
+    }
+
+    /// Transforms the last part, whose rims start at index `first`. The front remains the front.
+    fn transform_last_part(&mut self, first: usize, to_scene: &Transform) {
+        let map = to_scene.relative_to_origins(self.origin, self.origin);
+        // The area vector, the integral of the normal, depends only on the boundary.
+        let mut area_vector = DVec3::ZERO;
+        for rim in &mut self.rims[first..] {
+            let [from, to] = rim.ends;
+            area_vector += from.cross(to) * 0.5;
+            (rim.ends, rim.inner) = ([from, to].map(|end| map.point(end)), map.point(rim.inner));
+            if map.flips_handedness() {
+                rim.ends.reverse();
+            }
+        }
+        let volume_scale = map.linear.determinant().abs();
+        let Some(part) = self.list.last_mut() else { return };
+        part.volume = volume_scale * (part.volume + map.normal(area_vector).dot(map.translation) / 3.0);
+        // The mean scale of the areas is exact for flat parts.
+        let flat = map.normal(area_vector.normalize_or_zero()).length() * volume_scale;
+        part.area *= if flat > 0.0 { flat } else { libm::pow(volume_scale, 2.0 / 3.0) };
+        part.tolerance *= map.transform_abs_bound(DVec3::ONE).max_element();
     }
 
     fn begin_part(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {

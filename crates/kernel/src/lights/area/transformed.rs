@@ -1,0 +1,71 @@
+//! Light sampling of shapes under an affine transform.
+
+use super::sample_point::LightSamplePoint;
+use super::{Emitter, LightHit, ShapeEmitter};
+use crate::geometry::transformed::TransformedShape;
+use crate::math::transform::Transform;
+use crate::math::{DVec3, Vec3};
+
+/// The front of a transformed shape, sampled in the shape's own coordinates.
+///
+/// M maps a unit direction d to M·d / |M·d| and a small solid angle around d to |det M| / |M·d|³ times the
+/// solid angle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TransformedEmitter {
+    /// The emitter in its own coordinates.
+    pub(super) emitter: Emitter,
+    to_world: Transform,
+    /// |det M|.
+    volume_scale: f64,
+}
+
+impl ShapeEmitter for TransformedEmitter {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let local = self.emitter.sample(self.point_to_local(point), u);
+        let offset = self.to_world.vector(local.direction.as_dvec3());
+        let length = offset.length();
+        if !(local.factor > 0.0 && length > 0.0) {
+            return LightSamplePoint::NOTHING;
+        }
+        LightSamplePoint {
+            direction: (offset / length).as_vec3(),
+            target: self.to_world.point(local.target.as_dvec3()).as_vec3(),
+            factor: (f64::from(local.factor) * self.solid_angle_scale(length)) as f32,
+        }
+    }
+
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+        let direction = self.to_world.inverse_vector(met.direction.as_dvec3());
+        let length = direction.length();
+        let normal = self.to_world.linear.transpose() * met.normal.as_dvec3();
+        let local = LightHit {
+            direction: (direction / length).as_vec3(),
+            distance: (f64::from(met.distance) * length) as f32,
+            normal: normal.normalize().as_vec3(),
+            primitive: met.primitive,
+        };
+        let pdf = f64::from(self.emitter.pdf(self.point_to_local(from), &local));
+        (pdf / self.solid_angle_scale(1.0 / length)) as f32
+    }
+
+    fn center(&self) -> DVec3 {
+        self.to_world.point(self.emitter.center())
+    }
+}
+
+impl TransformedEmitter {
+    /// Transforms the emitter of the shape before the transform.
+    pub fn new(emitter: Emitter, transformed: &TransformedShape) -> Self {
+        Self { emitter, to_world: transformed.to_world, volume_scale: transformed.volume_scale }
+    }
+
+    fn point_to_local(&self, point: Vec3) -> Vec3 {
+        self.to_world.inverse_point(point.as_dvec3()).as_vec3()
+    }
+
+    /// Factor from solid angles in the shape's coordinates to solid angles in the world, around a unit
+    /// direction that the transform stretches to `length`.
+    fn solid_angle_scale(&self, length: f64) -> f64 {
+        self.volume_scale / (length * length * length)
+    }
+}
