@@ -198,3 +198,125 @@ impl SurfaceF64 for TransformedShape {
         }
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::geometry::cylinder::Cylinder;
+    use crate::geometry::sphere::Sphere;
+    use crate::geometry::torus::Torus;
+    use crate::math::DMat3;
+    use crate::math::random::unit_generator;
+
+    /// The shape under a scale, a shear and a rotation. The transform mirrors the shape if `mirror` is −1, and
+    /// not if it is 1.
+    pub(crate) fn sheared(shape: Shape, mirror: f64) -> Shape {
+        let [x, y] = [DVec3::new(1.2, 0.1, -0.2), DVec3::new(0.3, 0.8, 0.1)];
+        let linear = DMat3::from_cols(x, y, DVec3::new(-0.1, 0.2, 0.9) * mirror);
+        let to_world = Transform::from_mat3_translation(linear, DVec3::new(0.1, 0.2, -0.3));
+        Shape::Transformed(Box::new(TransformedShape::new(shape, to_world)))
+    }
+
+    /// Area of a part, by the midpoint rule.
+    pub(crate) fn area(shape: &Shape, part: u32) -> f64 {
+        let side = 256_u32;
+        let at = |i: u32| (Vec2::new((i % side) as f32, (i / side) as f32) + 0.5) / side as f32;
+        let scale = |i: u32| shape.area_scale(shape.sample(part, at(i)).normal);
+        let mean = (0..side * side).map(scale).sum::<f64>() / f64::from(side * side);
+        mean * shape.part_areas()[part as usize]
+    }
+
+    fn scaled(shape: Shape, scale: DVec3, degrees: DVec3, translation: DVec3) -> Shape {
+        let to_world = Transform::scale_rotate_translate(scale, degrees, translation);
+        Shape::Transformed(Box::new(TransformedShape::new(shape, to_world)))
+    }
+
+    #[test]
+    fn hits_are_within_their_error_bounds() {
+        // Ellipsoids, in directions that also graze them, from far away and from inside. The distance from an
+        // ellipsoid is |f|/|∇f| up to second order, for f = |x|² − 1 in the coordinates of the unit sphere.
+        let mut next = unit_generator(11);
+        let mut number = || f64::from(next()) * 2.0 - 1.0;
+        let mut counts = [0; 3];
+        for i in 0..6000 {
+            let scale = DVec3::new(1.0, 10.0_f64.powf(number()), 10.0_f64.powf(number()));
+            let degrees = DVec3::new(number(), number(), number()) * 180.0;
+            let center = DVec3::new(number(), number(), number()) * 100.0;
+            let unit = Shape::Sphere(Sphere { center: DVec3::ZERO, radius: 1.0 });
+            let shape = scaled(unit, scale, degrees, center);
+            let Shape::Transformed(own) = &shape else { unreachable!() };
+            let on_unit = || DVec3::new(number(), number(), number()).normalize();
+            let [a, b] = {
+                let mut on_unit = on_unit;
+                [on_unit(), on_unit()]
+            };
+            let to = own.to_world.point(a);
+            let from = match i % 3 {
+                // Almost a tangent.
+                0 => own.to_world.point(a + a.cross(b).normalize() * 3.0 + a * 1e-6),
+                1 => to + (to - center).normalize() * 1e5,
+                _ => own.to_world.point(b * 0.7),
+            };
+            let from = from.as_vec3().as_dvec3();
+            let direction = (to - from).as_vec3().as_dvec3();
+            let ray = RayF64 { origin: from, direction, t_max: f64::INFINITY };
+            let Some(hit) = shape.intersect(&ray) else { continue };
+            let surface = shape.surface_point(&ray, &hit);
+            let local = own.to_world.inverse_point(surface.point.as_dvec3());
+            let gradient = own.to_world.normal(local * 2.0);
+            let distance = (local.length_squared() - 1.0).abs() / gradient.length();
+            let bound = surface.error.as_dvec3().dot((gradient / gradient.length()).abs());
+            assert!(distance <= bound, "{shape:?}, {ray:?}: {distance} > {bound}");
+            counts[i % 3] += 1;
+            // No ray that leaves the surface hits it again where it starts.
+            let out = surface.normal;
+            let origin = crate::geometry::ray::offset_origin(surface.point, surface.error, out, out);
+            let leaving = RayF64 { origin: origin.as_dvec3(), direction: out.as_dvec3(), ..ray };
+            assert_eq!(shape.intersect(&leaving), None, "{shape:?}, {leaving:?}");
+        }
+        assert!(counts.iter().all(|count| *count > 800), "{counts:?}");
+    }
+
+    #[test]
+    fn area_scales_integrate_to_known_areas() {
+        // A prolate spheroid with semi-axes a and c: 2π·a²·(1 + c·arcsin(e)/(a·e)), where e² = 1 − a²/c².
+        let unit = Shape::Sphere(Sphere { center: DVec3::ZERO, radius: 1.0 });
+        let spheroid = scaled(unit, DVec3::new(1.0, 3.0, -1.0), DVec3::new(20.0, 50.0, 70.0), DVec3::ONE);
+        let e = (1.0 - 1.0 / 9.0_f64).sqrt();
+        let expected = std::f64::consts::TAU * (1.0 + 3.0 * e.asin() / e);
+        assert!((area(&spheroid, 0) / expected - 1.0).abs() < 1e-4, "{} {expected}", area(&spheroid, 0));
+        // A cylinder stretched across its axis: the circumference of an ellipse, by the midpoint rule.
+        let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z * 2.0, 1.0, true));
+        let tube = scaled(tube, DVec3::new(4.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO);
+        let step = |i: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * (f64::from(i) + 0.5) / 10_000.0).sin_cos();
+            DVec2::new(4.0 * sin, cos).length() * std::f64::consts::TAU / 10_000.0
+        };
+        let ellipse: f64 = (0..10_000).map(step).sum();
+        assert!((area(&tube, 0) / (2.0 * ellipse) - 1.0).abs() < 1e-4);
+        assert!((area(&tube, 1) / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn identity_gives_the_same_hits() {
+        let mut next = unit_generator(5);
+        let mut number = || f64::from(next()) * 2.0 - 1.0;
+        let torus = Shape::Torus(Torus::new(DVec3::ZERO, DVec3::new(0.3, 1.0, -0.2), 0.7, 0.25));
+        let same = Shape::Transformed(Box::new(TransformedShape::new(torus.clone(), Transform::IDENTITY)));
+        let mut count = 0;
+        for _ in 0..1000 {
+            let origin = DVec3::new(number(), number(), number()) * 3.0;
+            let direction = DVec3::new(number(), number(), number()) * 0.5 - origin;
+            let ray = RayF64 { origin, direction, t_max: f64::INFINITY };
+            let hit = torus.intersect(&ray);
+            assert_eq!(hit, same.intersect(&ray));
+            if let Some(hit) = hit {
+                let [a, b] = [&torus, &same].map(|shape| shape.surface_point(&ray, &hit));
+                let parts = |at: SurfacePoint| (at.point, at.normal, at.uv, at.dpdu, at.dpdv);
+                assert_eq!(parts(a), parts(b));
+                count += 1;
+            }
+        }
+        assert!(count > 200, "{count}");
+    }
+}

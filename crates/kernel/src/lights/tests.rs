@@ -10,6 +10,7 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
+use crate::geometry::transformed::tests::sheared;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::lights::delta::{Falloff, PointLight};
@@ -20,6 +21,13 @@ use crate::sampling::{Dimension, PixelSampler};
 /// Shapes for all sampling methods. Rectangles are sampled by solid angle, other parallelograms and distant
 /// rectangles by area.
 fn shapes() -> Vec<Shape> {
+    let plain = untransformed_shapes();
+    let transformed: Vec<Shape> =
+        plain.iter().flat_map(|shape| [1.0, -1.0].map(|mirror| sheared(shape.clone(), mirror))).collect();
+    plain.into_iter().chain(transformed).collect()
+}
+
+fn untransformed_shapes() -> Vec<Shape> {
     let (p, q) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.0, 0.5, -0.4));
     vec![
         Shape::Sphere(Sphere { center: p, radius: 0.7 }),
@@ -198,8 +206,7 @@ fn two_sided_samples_cover_the_visible_shape() {
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain((!is_flat).then_some(inner)) {
             let (n, mut seen, mut sum) = (100_000_u32, 0.0, 0.0);
-            let around = SphereCone::new(Vec3::new(0.3, 0.5, 0.8), 0.0);
-            let around = SphereCone { one_minus_cos: 2.0, ..around };
+            let around = SphereCone::around(&shape, from);
             for i in 0..n {
                 let direction = around.direction(i, n);
                 let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
@@ -257,13 +264,8 @@ fn back_sample_pdf_equals_pdf_of_hit() {
 fn pdfs_integrate_to_one_over_the_light() {
     for shape in shapes() {
         let lights = lights_of(&shape);
-        let around = shape.bounds().expect("a finite shape");
-        let reach = around.extent().length() * 0.5 + (around.center() - shape.centroid().as_vec3()).length();
         for from in points() {
-            // Sample directions in a cone around the shape.
-            let to_middle = shape.centroid() - from.as_dvec3();
-            let sin = (f64::from(reach) / to_middle.length()).min(1.0) as f32;
-            let cone = SphereCone::new(to_middle.as_vec3(), sin);
+            let cone = SphereCone::around(&shape, from);
             let (mut sums, n) = (vec![0.0; lights.len()], 200_000);
             for i in 0..n {
                 let direction = cone.direction(i, n);
@@ -288,7 +290,7 @@ fn pdfs_integrate_to_one_over_the_light() {
     }
 }
 
-/// Directions in a cone, stratified by solid angle.
+/// Directions in a cone or in the whole sphere, stratified by solid angle.
 struct SphereCone {
     frame: crate::math::frame::Frame,
     one_minus_cos: f32,
@@ -298,6 +300,15 @@ impl SphereCone {
     fn new(axis: Vec3, sin: f32) -> Self {
         let one_minus_cos = 1.0 - (1.0 - sin * sin).max(0.0).sqrt();
         Self { frame: crate::math::frame::Frame::from_normal(axis.normalize()), one_minus_cos }
+    }
+
+    /// The directions from a point to a shape, or all directions if the shape may enclose the point.
+    fn around(shape: &Shape, from: Vec3) -> Self {
+        let bounds = shape.bounds().expect("a finite shape");
+        let to_middle = bounds.center() - from;
+        let sin = bounds.extent().length() * 0.5 / to_middle.length();
+        let cone = Self::new(to_middle, sin.min(1.0));
+        if sin < 1.0 { cone } else { Self { one_minus_cos: 2.0, ..cone } }
     }
 
     fn solid_angle(&self) -> f32 {

@@ -24,7 +24,9 @@ pub use method::{Integrator, IntegratorProperties};
 pub use render::{
     Accel, KeyRange, MAX_BOUNCES, PixelFilter, RenderKeySpec, RenderOptions, ShadowMode, Tonemap, render_keys,
 };
-pub use shape::{AffineMap, LoweredShape, MeshReference, MeshTransform, Object, OpenSurface, Shape, max_projection};
+pub use shape::{
+    AffineMap, LoweredShape, MeshReference, MeshTransform, Object, OpenSurface, Shape, max_projection,
+};
 
 /// A validated scene.
 #[derive(Clone, Debug, PartialEq)]

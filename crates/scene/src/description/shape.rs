@@ -309,10 +309,9 @@ impl Shape {
                 // The shape's own coordinates are relative to a point near it.
                 let near = shape.representative_point().unwrap_or_default();
                 match shape.lowered(near) {
-                    LoweredShape::Shape(own) => geometry::Shape::Transformed(Box::new(TransformedShape::new(
-                        own,
-                        matrix.transform().relative_to_origins(near, origin),
-                    ))),
+                    LoweredShape::Shape(own) => geometry::Shape::Transformed(Box::new(
+                        TransformedShape::new(own, matrix.transform().relative_to_origins(near, origin)),
+                    )),
                     mesh @ LoweredShape::Mesh(_) => return mesh,
                 }
             }

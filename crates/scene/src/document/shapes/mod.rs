@@ -76,7 +76,8 @@ fn read_object(
     let shape = reader(table, files);
     let matrix = table.optional_key("matrix");
     // A mesh's reader reads the matrix.
-    let matrix = if kind == "mesh" || !matrix.is_present() { None } else { Some(read_affine_matrix(&matrix)) };
+    let matrix =
+        if kind == "mesh" || !matrix.is_present() { None } else { Some(read_affine_matrix(&matrix)) };
     let key = match kind {
         "mesh" => table.optional_key("material"),
         _ => table.required_key("material", "\"name\""),

@@ -34,8 +34,9 @@ fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvMapping) -> Light
 fn textured_emission_matches_light_sampling() {
     for shape in shapes() {
         let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
-        let light = textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Shape(shape));
-        let source = source_of(light.clone(), Some(shape));
+        let light =
+            textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Shape(shape.clone()));
+        let source = source_of(light.clone(), Some(shape.clone()));
         assert_same_irradiance(&format!("{shape:?}"), &light, &source, Some(&shape));
         let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
         let told = f64::from(source.power().y);
@@ -48,11 +49,11 @@ fn textured_emission_matches_light_sampling() {
 
 #[test]
 fn quad_power_is_the_mean_of_its_texture() {
-    let (shape, texels) = (shapes()[1], patchy(32, 16));
+    let (shape, texels) = (shapes()[1].clone(), patchy(32, 16));
     let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
-    let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape));
+    let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape.clone()));
     let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.part_areas()[0];
-    let source = source_of(light, Some(shape));
+    let source = source_of(light, Some(shape.clone()));
     assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.x));
     assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
