@@ -388,7 +388,9 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (52, 41, "`matrix` must be a finite number; found nan"),
             (57, 10, "`matrix` must be 16 numbers, row by row; found an array of 9 values"),
             (58, 17, r#"`vertex_colors` must be true or false; found the string "red""#),
-            (65, 7, "`ior` must be a number; found a table"),
+            (64, 10, "`matrix` is not invertible; its determinant is 0e0"),
+            (68, 10, "the last row of `matrix` must be 0, 0, 0, 1; it is 0, 0, 1, 1"),
+            (75, 7, "`ior` must be a number; found a table"),
         ],
     ),
     (

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::PathBuf;
 
-use glimt::scene::description::{Camera, Scene};
+use glimt::math::DVec3;
+use glimt::scene::description::{AffineMap, Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter_scene};
 
@@ -419,6 +420,26 @@ fn mesh_accepts_a_matrix() {
     let by_steps = transform("scale = [1, 2, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]");
     assert_eq!(by_matrix, by_steps);
     assert!(by_matrix.flips_handedness());
+}
+
+#[test]
+fn every_shape_accepts_a_matrix() {
+    let (_folder, path) = folder();
+    let matrix = "matrix = [0, -2, 0, 5, 1, 0, 0.5, 6, 0, 0, -3, 7, 0, 0, 0, 1]";
+    let (x, y, z) = (DVec3::new(0.0, 1.0, 0.0), DVec3::new(-2.0, 0.0, 0.0), DVec3::new(0.0, 0.5, -3.0));
+    for kind in ["sphere", "quad", "plane", "box", "triangle", "disk", "cylinder", "cone", "torus"] {
+        let own = if kind == "sphere" { "center = [1, 2, 3]\nradius = 1\n" } else { "" };
+        let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\n";
+        let shape = |matrix: &str| {
+            let text = format!("{camera}[[{kind}]]\n{own}material = \"a\"\n{matrix}\n");
+            let outcome = parse(text.into(), &path);
+            assert_eq!(errors(&outcome.diagnostics), [""; 0], "{kind}");
+            outcome.scene.expect("a scene").objects[0].shape.clone()
+        };
+        let map = AffineMap { linear: [x, y, z], translate: DVec3::new(5.0, 6.0, 7.0) };
+        assert_eq!(shape(matrix), shape("").transformed(map), "{kind}");
+        assert_eq!(shape(matrix).kind(), kind);
+    }
 }
 
 #[test]

@@ -32,6 +32,7 @@ mod sky;
 mod speckle;
 mod straight;
 mod touching;
+mod transformed;
 mod two_sided;
 mod uv_sets;
 mod views;

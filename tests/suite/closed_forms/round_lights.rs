@@ -69,7 +69,7 @@ fn disk_light_is_exact_off_its_axis() {
 
 /// Compares the rendered irradiance, from area samples, with [`by_directions`].
 #[track_caller]
-fn assert_same(shape: &Shape) {
+pub fn assert_same(shape: &Shape) {
     let exact = by_directions(shape);
     if exact == 0.0 {
         assert_eq!(lit(shape).value(), 0.0, "only the back of {shape:?} is visible");

@@ -458,7 +458,7 @@ fn ambient_light_is_uniform_in_and_under_glass() {
 }
 
 /// A box mesh whose corners are exactly as specified.
-fn block(low: DVec3, high: DVec3) -> TriangleMesh {
+pub fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     let mut mesh = boxes(&[(DVec3::ZERO, 2.0, 0)]);
     for p in &mut mesh.positions {
         let is_high = p.cmpgt(Vec3::ZERO);
@@ -469,7 +469,7 @@ fn block(low: DVec3, high: DVec3) -> TriangleMesh {
 
 /// Checks that a white furnace has value 1 everywhere.
 #[track_caller]
-fn assert_white(what: &str, build: Build) {
+pub fn assert_white(what: &str, build: Build) {
     let seen = build.background(1.0).depth(1000).pictured(v(2.2, 1.7, 4.5), DVec3::ZERO, 40.0, 32, 24);
     for (i, pixel) in seen.picture(8, 1).into_iter().enumerate() {
         assert!((pixel.x - 1.0).abs() <= 1e-5, "{what}, pixel {i}: {pixel}");

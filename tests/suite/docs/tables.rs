@@ -43,9 +43,9 @@ fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
     if table.types.is_empty() {
         let keys: Vec<DefinedKey> = table.keys_for_type(None).map(key).collect();
         let headings = match table.form {
-            // The last two keys are common to all shapes.
+            // The last three keys are common to all shapes.
             TableSyntax::List => {
-                vec![(heading(table.header()), keys.len() - 2), ("Every shape".to_owned(), 2)]
+                vec![(heading(table.header()), keys.len() - 3), ("Every shape".to_owned(), 3)]
             }
             TableSyntax::Single | TableSyntax::Named => vec![(heading(table.header()), keys.len())],
         };

@@ -13,7 +13,7 @@ macro_rules! shapes {
             name: $name,
             form: TableSyntax::List,
             doc: $doc,
-            keys: &[$($own,)* matrix_key($name), material_key($name), NAME],
+            keys: &[$($own,)* MATRIX, material_key($name), NAME],
             types: &[],
         }),*];
     };
@@ -22,19 +22,13 @@ macro_rules! shapes {
 const NAME: KeyInfo =
     define_key("name", Text, "", Absent, "Name used in messages, for clicks and by `--set`");
 
-/// Defines the key `matrix`. A mesh takes it instead of its own transform.
-const fn matrix_key(shape: &str) -> KeyInfo {
-    // String comparison is not const, so match bytes.
-    let doc = match shape.as_bytes() {
-        b"mesh" => {
-            "An affine transform in row-major order, with 0, 0, 0, 1 as the last row; replaces `scale`, `rotate` and `translate`"
-        }
-        _ => {
-            "An affine transform in row-major order, with 0, 0, 0, 1 as the last row, applied after the other keys; the front remains the front"
-        }
-    };
-    define_key("matrix", Numbers(16, "16 numbers", Any), "", Absent, doc)
-}
+const MATRIX: KeyInfo = define_key(
+    "matrix",
+    Numbers(16, "16 numbers", Any),
+    "",
+    Absent,
+    "An affine transform in row-major order, with 0, 0, 0, 1 as the last row; applied after the other keys of the shape, instead of a mesh's `scale`, `rotate` and `translate`",
+);
 
 /// Defines the key `material`. It is optional for meshes, because their files may contain materials.
 const fn material_key(shape: &str) -> KeyInfo {

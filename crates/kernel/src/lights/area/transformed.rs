@@ -1,9 +1,8 @@
 //! Light sampling of shapes under an affine transform.
 
 use super::sample_point::LightSamplePoint;
-use super::{Emitter, LightHit, ShapeEmitter};
+use super::{Emitter, LightHit, ShapeEmitter, flat_normal};
 use crate::geometry::transformed::TransformedShape;
-use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec3};
 
 /// The front of a transformed shape, sampled in the shape's own coordinates.
@@ -12,60 +11,70 @@ use crate::math::{DVec3, Vec3};
 /// solid angle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransformedEmitter {
-    /// The emitter in its own coordinates.
-    pub(super) emitter: Emitter,
-    to_world: Transform,
-    /// |det M|.
-    volume_scale: f64,
+    /// The emitter in the shape's own coordinates.
+    emitter: Emitter,
+    transformed: TransformedShape,
 }
 
 impl ShapeEmitter for TransformedEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let local = self.emitter.sample(self.point_to_local(point), u);
-        let offset = self.to_world.vector(local.direction.as_dvec3());
+        let Some(point) = self.point_to_local(point) else { return LightSamplePoint::NOTHING };
+        let local = self.emitter.sample(point, u);
+        let to_world = &self.transformed.to_world;
+        let offset = to_world.vector(local.direction.as_dvec3());
         let length = offset.length();
         if !(local.factor > 0.0 && length > 0.0) {
             return LightSamplePoint::NOTHING;
         }
         LightSamplePoint {
             direction: (offset / length).as_vec3(),
-            target: self.to_world.point(local.target.as_dvec3()).as_vec3(),
+            target: to_world.point(local.target.as_dvec3()).as_vec3(),
             factor: (f64::from(local.factor) * self.solid_angle_scale(length)) as f32,
         }
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let direction = self.to_world.inverse_vector(met.direction.as_dvec3());
+        let Some(from) = self.point_to_local(from) else { return 0.0 };
+        let to_world = &self.transformed.to_world;
+        let direction = to_world.inverse_vector(met.direction.as_dvec3());
         let length = direction.length();
-        let normal = self.to_world.linear.transpose() * met.normal.as_dvec3();
+        let normal = to_world.linear.transpose() * met.normal.as_dvec3();
         let local = LightHit {
             direction: (direction / length).as_vec3(),
             distance: (f64::from(met.distance) * length) as f32,
             normal: normal.normalize().as_vec3(),
             primitive: met.primitive,
         };
-        let pdf = f64::from(self.emitter.pdf(self.point_to_local(from), &local));
+        let pdf = f64::from(self.emitter.pdf(from, &local));
         (pdf / self.solid_angle_scale(1.0 / length)) as f32
     }
 
     fn center(&self) -> DVec3 {
-        self.to_world.point(self.emitter.center())
+        self.transformed.to_world.point(self.emitter.center())
     }
 }
 
 impl TransformedEmitter {
     /// Transforms the emitter of the shape before the transform.
     pub fn new(emitter: Emitter, transformed: &TransformedShape) -> Self {
-        Self { emitter, to_world: transformed.to_world, volume_scale: transformed.volume_scale }
+        Self { emitter, transformed: transformed.clone() }
     }
 
-    fn point_to_local(&self, point: Vec3) -> Vec3 {
-        self.to_world.inverse_point(point.as_dvec3()).as_vec3()
+    /// The point in the shape's coordinates. `None` if the front is not visible from there: rounding to `f32`
+    /// could move a point behind the surface to its front.
+    fn point_to_local(&self, point: Vec3) -> Option<Vec3> {
+        let shape = &self.transformed.shape;
+        let point = self.transformed.to_world.inverse_point(point.as_dvec3());
+        let is_behind = match flat_normal(shape) {
+            Some(normal) => !(normal.dot(point - shape.centroid()) > 0.0),
+            None => shape.encloses(point),
+        };
+        (!is_behind).then(|| point.as_vec3())
     }
 
     /// Factor from solid angles in the shape's coordinates to solid angles in the world, around a unit
     /// direction that the transform stretches to `length`.
     fn solid_angle_scale(&self, length: f64) -> f64 {
-        self.volume_scale / (length * length * length)
+        self.transformed.volume_scale / (length * length * length)
     }
 }
