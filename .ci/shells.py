@@ -49,7 +49,7 @@ LINES = [
     ("glimt ball.toml --set materials.wall.dif\ttomat\t", ["ball.toml", "--set", "materials.wall.diffuse=tomato"]),
     ("glimt ball.toml --set render.integ\tp\t", ["ball.toml", "--set", "render.integrator=path"]),
     ("glimt ball.toml --set=photons.en\tt\t", ["ball.toml", "--set=photons.enabled=true"]),
-    ("glimt ball.toml --set sphere.ball.mat\twi\t", ["ball.toml", "--set", "sphere.ball.material=window"]),
+    ("glimt ball.toml --set sphere.ball.mate\twi\t", ["ball.toml", "--set", "sphere.ball.material=window"]),
     ("glimt explain materials.metal.anis\t", ["explain", "materials.metal.anisotropy"]),
 ]
 # File names with special characters, by the keys that complete to them.

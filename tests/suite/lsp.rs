@@ -163,7 +163,7 @@ fn completions_offer_keys_choices_and_names() {
     let (keys, first) = editor.offered(&TEXT.replace("radius = 0.5", "r|"));
     assert_eq!(
         (keys.as_slice(), first.as_str()),
-        (["radius", "name"].map(str::to_owned).as_slice(), "radius = 0.5")
+        (["radius", "name", "matrix"].map(str::to_owned).as_slice(), "radius = 0.5")
     );
     let (keys, _) = editor.offered(&TEXT.replace("color = [1, 0.5, 0]", "an|"));
     assert!(keys.contains(&"anisotropy".to_owned()) && !keys.contains(&"diffuse".to_owned()), "{keys:?}");

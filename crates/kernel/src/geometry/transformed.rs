@@ -138,7 +138,8 @@ impl TransformedShape {
         };
         let [along, around] = tangents.map(|tangent| self.to_world.vector(tangent));
         let forms = bend * around.length_squared() + (2.0 * mean - bend) * along.length_squared();
-        0.5 * self.volume_scale * forms / along.cross(around).length().powi(3)
+        let area = along.cross(around).length();
+        0.5 * self.volume_scale * forms / (area * area * area)
     }
 
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.

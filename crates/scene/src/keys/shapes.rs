@@ -13,7 +13,7 @@ macro_rules! shapes {
             name: $name,
             form: TableSyntax::List,
             doc: $doc,
-            keys: &[$($own,)* MATRIX, material_key($name), NAME],
+            keys: &[$($own,)* material_key($name), NAME, MATRIX],
             types: &[],
         }),*];
     };
