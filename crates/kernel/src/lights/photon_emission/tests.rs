@@ -103,9 +103,9 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     all
 }
 
-fn source_of(light: Light, shape: Option<Shape>) -> PhotonSource {
+fn source_of(light: Light, shape: Option<&Shape>) -> PhotonSource {
     let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("never canceled"));
-    PhotonSource::new(&lights, |_| shape.clone().map(EmissiveObjectGeometry::Shape), SCENE).expect("power")
+    PhotonSource::new(&lights, |_| shape.cloned().map(EmissiveObjectGeometry::Shape), SCENE).expect("power")
 }
 
 /// A mean and its standard error.
@@ -151,7 +151,7 @@ fn targets() -> [BoundingSphere; 4] {
 #[test]
 fn mean_flux_equals_power_for_any_aimed_fraction() {
     for (light, shape, power) in lights() {
-        let plain = source_of(light.clone(), shape);
+        let plain = source_of(light.clone(), shape.as_ref());
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
             let source = plain.clone().with_targets(targets, share);
             assert_eq!(source.aimed_share(), share);
@@ -228,7 +228,7 @@ fn photon_irradiance_matches_light_sampling() {
         if matches!(light, Light::Spot(_)) {
             continue;
         }
-        let source = source_of(light.clone(), shape.clone());
+        let source = source_of(light.clone(), shape.as_ref());
         assert_same_irradiance(&format!("{light:?}"), &light, &source, shape.as_ref());
     }
     // Aim spotlights to put the disk in the fading part of the cone.
@@ -247,7 +247,7 @@ fn photons_from_one_light_carry_its_power() {
     // The flux of photons from transformed shapes varies.
     let is_transformed = |shape: &Option<Shape>| matches!(shape, Some(Shape::Transformed(_)));
     for (light, shape, power) in lights().into_iter().filter(|(_, shape, _)| !is_transformed(shape)) {
-        let source = source_of(light.clone(), shape);
+        let source = source_of(light.clone(), shape.as_ref());
         let power = COLOR.as_dvec3() * power;
         let told = source.power().as_dvec3();
         assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} instead of {power}");
@@ -270,7 +270,7 @@ fn photons_leave_convex_lights() {
             continue;
         }
         let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
-        let source = source_of(light, Some(shape.clone()));
+        let source = source_of(light, Some(&shape));
         let mut next = numbers(random::unit_generator(2));
         for _ in 0..20_000 {
             let photon = source.emit(&next()).expect("a photon");
@@ -302,7 +302,7 @@ fn photon_directions_follow_the_intensity() {
     let count = 400_000;
     for shape in shapes() {
         let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
-        let source = source_of(light, Some(shape.clone()));
+        let source = source_of(light, Some(&shape));
         let (mut next, mut counts) = (numbers(random::unit_generator(3)), [0; 256]);
         for _ in 0..count {
             let photon = source.emit(&next()).expect("a photon");

@@ -270,7 +270,7 @@ mod tests {
     use crate::math::Vec3;
 
     /// Coverage of an upward-facing kernel of radius 0.1 at (x, 0, z) among shapes.
-    fn coverage_at(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
+    fn coverage_at(x: f32, z: f32, shapes: &[&Shape]) -> Option<f64> {
         let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = KernelNeighborhood::new(&look, 0.1);
         let is_exact = shapes.iter().all(|shape| around.add_shape(shape, || true));
@@ -283,10 +283,10 @@ mod tests {
 
     #[test]
     fn only_flat_pieces_have_a_closed_form() {
-        let floor = quad(DVec3::ZERO, DVec3::Z, DVec3::X);
-        let other = quad(DVec3::X, DVec3::Z, DVec3::X);
-        let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
-        let back = quad(DVec3::ZERO, DVec3::X, DVec3::Y);
+        let floor = &quad(DVec3::ZERO, DVec3::Z, DVec3::X);
+        let other = &quad(DVec3::X, DVec3::Z, DVec3::X);
+        let wall = &quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
+        let back = &quad(DVec3::ZERO, DVec3::X, DVec3::Y);
         let near = |told: Option<f64>, exact: f64| told.is_some_and(|told| (told - exact).abs() < 1e-5);
         assert_eq!(coverage_at(0.5, 0.5, &[floor, wall]), Some(1.0));
         assert!(near(coverage_at(1.0, 0.5, &[floor]), 0.5), "{:?}", coverage_at(1.0, 0.5, &[floor]));
@@ -300,18 +300,18 @@ mod tests {
             coverage_at(0.0005, 0.0005, &[floor]).expect("flat")
         ));
         // A wall between two pieces, a box on the floor, a sheet above the floor, and a ball on the floor.
-        assert_eq!(coverage_at(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
+        assert_eq!(coverage_at(0.95, 0.5, &[floor, other, &quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
         let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
-        assert_eq!(coverage_at(0.35, 0.5, &[floor, cuboid]), None);
-        assert_eq!(coverage_at(0.25, 0.5, &[floor, cuboid]), Some(1.0));
+        assert_eq!(coverage_at(0.35, 0.5, &[floor, &cuboid]), None);
+        assert_eq!(coverage_at(0.25, 0.5, &[floor, &cuboid]), Some(1.0));
         let sheet = quad(DVec3::new(0.4, 0.01, 0.4), DVec3::Z * 0.2, DVec3::X * 0.2);
-        assert_eq!(coverage_at(0.35, 0.5, &[floor, sheet]), None);
+        assert_eq!(coverage_at(0.35, 0.5, &[floor, &sheet]), None);
         let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
-        assert_eq!(coverage_at(0.45, 0.5, &[floor, ball(0.1)]), None);
+        assert_eq!(coverage_at(0.45, 0.5, &[floor, &ball(0.1)]), None);
         // Kernels on large and small balls.
         let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
         assert_eq!(
-            (coverage_at(0.5, 0.5, &[under(1.0)]), coverage_at(0.5, 0.5, &[under(0.15)])),
+            (coverage_at(0.5, 0.5, &[&under(1.0)]), coverage_at(0.5, 0.5, &[&under(0.15)])),
             (Some(1.0), None)
         );
     }

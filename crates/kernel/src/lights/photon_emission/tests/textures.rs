@@ -36,7 +36,7 @@ fn textured_emission_matches_light_sampling() {
         let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
         let light =
             textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Shape(shape.clone()));
-        let source = source_of(light.clone(), Some(shape.clone()));
+        let source = source_of(light.clone(), Some(&shape));
         assert_same_irradiance(&format!("{shape:?}"), &light, &source, Some(&shape));
         let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
         let told = f64::from(source.power().y);
@@ -53,7 +53,7 @@ fn quad_power_is_the_mean_of_its_texture() {
     let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
     let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape.clone()));
     let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.part_areas()[0];
-    let source = source_of(light, Some(shape.clone()));
+    let source = source_of(light, Some(&shape));
     assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.x));
     assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
