@@ -227,6 +227,6 @@ mod tests {
             ["position", "intensity", "falloff", "look_at", "angle", "blend", "direction", "irradiance"]
         );
         assert!(known("materials.wall").starts_with(&["reflectance", "emission"]));
-        assert!(known("sphere.2").ends_with(&["material", "name"]));
+        assert!(known("sphere.2").ends_with(&["material", "name", "matrix"]));
     }
 }
