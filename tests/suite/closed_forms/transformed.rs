@@ -198,7 +198,7 @@ fn rays_from_inside_are_tinted_up_to_the_surface() {
                 let seen = build.clone().background(1.0).seen(from, from + direction);
                 let ray = Ray::new(Vec3::ZERO, direction.as_vec3());
                 let world = seen.world();
-                let local = Ray { origin: (from - world.geometry.origin()).as_vec3(), ..ray };
+                let local = Ray { origin: (from - world.geometry.coordinate_origin()).as_vec3(), ..ray };
                 let hit = world.geometry.closest_hit(&local).expect("the camera is inside");
                 assert_close(&format!("{shape:?}"), seen.value(), 0.3_f64.powf(f64::from(hit.shape.t)));
             }

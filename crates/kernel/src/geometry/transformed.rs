@@ -3,9 +3,9 @@
 //! Rays are transformed to the shape's own coordinates in double precision. An affine transform preserves the
 //! ray parameter t, so hits are the same in both coordinate systems.
 
-use super::local_geometry::{FlatPolygon, LocalGeometry, NearestSurface, SurfaceExtent};
+use super::local_geometry::{FlatPolygon, LocalGeometry, LocalSurfaceShape, NearestSurface};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, Shape, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::transform::Transform;
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -100,9 +100,9 @@ impl TransformedShape {
     }
 
     /// Samples a point uniformly over the area of a part in the shape's coordinates.
-    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
-        let AreaPoint { point, normal } = self.shape.sample(part, u);
-        AreaPoint { point: self.to_world.point(point), normal: self.to_world.normal(normal).normalize() }
+    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
+        let SurfaceSample { point, normal } = self.shape.sample(part, u);
+        SurfaceSample { point: self.to_world.point(point), normal: self.to_world.normal(normal).normalize() }
     }
 
     /// Factor from areas in the shape's coordinates to areas in the world, at a point with this unit normal in
@@ -132,7 +132,7 @@ impl TransformedShape {
     /// form by |det M| / |M·t₁ × M·t₂|, and tangents have the lengths |M·tᵢ|.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let local = self.to_world.inverse_point(point);
-        let mean = self.shape.curvature(part, local);
+        let mean = self.shape.mean_curvature(part, local);
         let Some((bend, tangents)) = self.shape.meridian(local).filter(|_| mean != 0.0) else {
             return 0.0;
         };
@@ -145,18 +145,18 @@ impl TransformedShape {
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
     pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
-            SurfaceExtent::Flat(extent) => {
+            LocalSurfaceShape::Flat(extent) => {
                 let normal = self.to_world.normal(ground.normal);
                 let length = normal.length();
                 Some(NearestSurface {
                     normal: normal / length,
                     height: ground.height / length,
-                    extent: SurfaceExtent::Flat(extent / self.inverse_stretch),
+                    extent: LocalSurfaceShape::Flat(extent / self.inverse_stretch),
                 })
             }
-            SurfaceExtent::Round(_) => None,
+            LocalSurfaceShape::Round(_) => None,
         };
-        match self.shape.local_geometry(self.to_world.inverse_point(point)) {
+        match self.shape.geometry_near(self.to_world.inverse_point(point)) {
             LocalGeometry::Polygons(count) => LocalGeometry::Polygons(count),
             LocalGeometry::Surface { distance, ground } => LocalGeometry::Surface {
                 distance: distance / self.inverse_stretch,
@@ -168,7 +168,7 @@ impl TransformedShape {
     /// [`Shape::flat_polygon`].
     pub fn flat_polygon(&self, number: u32) -> Option<FlatPolygon> {
         let mut corners: FlatPolygon =
-            self.shape.flat_polygon(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
+            self.shape.polygon_face(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
         if self.to_world.flips_handedness() {
             corners.reverse();
         }
@@ -177,7 +177,8 @@ impl TransformedShape {
 
     /// [`Shape::is_thicker_than`].
     pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
-        self.shape.is_thicker_than(self.to_world.inverse_point(point), distance * self.inverse_stretch)
+        self.shape
+            .is_locally_thicker_than(self.to_world.inverse_point(point), distance * self.inverse_stretch)
     }
 
     /// Projected area. The transform maps the area vectors A to |det M|·M⁻ᵀ·A.

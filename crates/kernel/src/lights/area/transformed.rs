@@ -49,8 +49,8 @@ impl ShapeEmitter for TransformedEmitter {
         (pdf / self.solid_angle_scale(1.0 / length)) as f32
     }
 
-    fn center(&self) -> DVec3 {
-        self.transformed.to_world.point(self.emitter.center())
+    fn area_centroid(&self) -> DVec3 {
+        self.transformed.to_world.point(self.emitter.area_centroid())
     }
 }
 

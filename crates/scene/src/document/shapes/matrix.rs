@@ -5,7 +5,7 @@ use super::super::context::Issue;
 use super::super::key::TableKey;
 use super::super::limits::Limits;
 use crate::math::DVec3;
-use crate::math::limits::{SHORTEST, is_too_short, robust_length};
+use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 
 /// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
 /// ratio is singular up to rounding.
@@ -17,7 +17,7 @@ pub(super) fn read_affine_matrix(key: &TableKey<'_>) -> Option<AffineMap> {
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
     let wrong = |message: &str, label: String| {
-        key.context.report(Issue::error(key.span().unwrap_or_default(), message).with_label(label));
+        key.context.report(Issue::error(key.value_span().unwrap_or_default(), message).with_label(label));
         None
     };
     if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
@@ -28,7 +28,7 @@ pub(super) fn read_affine_matrix(key: &TableKey<'_>) -> Option<AffineMap> {
     if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
         return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
     }
-    if [x, y, z].iter().any(|axis| is_too_short(robust_length(*axis))) {
+    if [x, y, z].iter().any(|axis| is_nonzero_but_too_short(robust_length(*axis))) {
         return wrong(
             "`matrix` makes the shape too small",
             format!("its columns must be more than {SHORTEST:e} long"),

@@ -50,8 +50,8 @@ pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Opt
 /// Reads the index of a glTF part.
 fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional_key("part");
-    let Some(span) = key.span() else { return Some(None) };
-    let number = key.integer(table.integer_range("part")).map(Some);
+    let Some(span) = key.value_span() else { return Some(None) };
+    let number = key.integer(table.integer_key_range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
