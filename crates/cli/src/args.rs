@@ -14,10 +14,10 @@ use clap::builder::styling::{AnsiColor, Styles};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
-pub use self::parts::{FarmArgs, MergeArgs, Scheduler};
+pub use self::parts::{ClusterScheduler, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
-use crate::console::stdout_columns;
+use crate::console::stdout_columns_or_default;
 use crate::environment;
 use crate::film::Rect;
 use crate::output::{AnimationFormat, Format};
@@ -26,7 +26,7 @@ use crate::pipeline::settings::{
 };
 use crate::pipeline::turntable::{self, TurntableFrame};
 use crate::scene::description::{Accel, Integrator, KeyRange, RenderOptions, ShadowMode, render_keys};
-use crate::tui::{ColorChoice, PreviewChoice};
+use crate::tui::{ColorDepthChoice, PreviewChoice};
 
 /// Examples for the long help and the manual page, in lines of at most 80 columns.
 pub(super) const EXAMPLES: &str = "  \
@@ -55,7 +55,7 @@ pub(super) const EXIT_CODES: &str = "\
 /// Returns the help width in columns: `COLUMNS` if set, else the terminal's width, else 80.
 fn help_columns() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
-    columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns)
+    columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns_or_default)
 }
 
 /// Text after the options in `-h`.
@@ -87,7 +87,7 @@ pub struct Args {
 
 impl Args {
     /// Returns the command's `--color` option.
-    pub(super) fn color(&self) -> ColorChoice {
+    pub(super) fn color(&self) -> ColorDepthChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
             Some(Subcommand::Bench(bench)) => bench.color,
@@ -119,14 +119,14 @@ pub enum Subcommand {
         #[arg(add = candidates::scene_completer())]
         scene: PathBuf,
         /// Override a scene key
-        #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
+        #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
         /// Colors: auto, truecolor, 256, 16, none
-        #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-        color: ColorChoice,
+        #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+        color: ColorDepthChoice,
     },
     /// Write a commented starter scene; never overwrites a file
     New {
@@ -173,7 +173,7 @@ pub enum Subcommand {
     #[command(after_long_help = EXPLAIN_HELP)]
     Explain {
         /// A key or table, such as render.samples, materials.metal.roughness, samples or sphere
-        #[arg(add = candidates::key_path_completer())]
+        #[arg(add = candidates::explain_path_completer())]
         key: Option<String>,
     },
     /// Print the JSON Schema for scenes, for use in editors
@@ -297,8 +297,8 @@ pub struct ImportArgs {
     #[arg(long)]
     pub strict: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-    pub color: ColorChoice,
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    pub color: ColorDepthChoice,
 }
 
 const INFO_HELP: &str = "\
@@ -316,8 +316,8 @@ pub struct InfoArgs {
     #[arg(long)]
     pub json: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-    pub color: ColorChoice,
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    pub color: ColorDepthChoice,
 }
 
 const COMPARE_HELP: &str = "\
@@ -346,7 +346,7 @@ pub struct CompareArgs {
     /// The reference image, with the same size
     pub b: PathBuf,
     /// Exit with code 1 if relMSE is above X
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_error_bound)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_nonnegative_number)]
     pub max_relmse: Option<f64>,
     /// Write the error as an image
     ///
@@ -360,11 +360,11 @@ pub struct CompareArgs {
     #[arg(long)]
     pub json: bool,
     /// Show the images and their difference: auto, on, off
-    #[arg(long, value_parser = choice_parser::<ImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<ImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub pictures: ImageVisibility,
+    #[arg(long, value_parser = choice_parser::<CompareImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<CompareImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub pictures: CompareImageVisibility,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub color: ColorDepthChoice,
 }
 
 /// Arguments of a render. Options override the scene's settings for this run.
@@ -381,7 +381,7 @@ pub struct RenderArgs {
     ///
     /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
     /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
-    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
+    #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
     /// Output file; can be given several times
@@ -505,8 +505,8 @@ pub struct RenderArgs {
     #[arg(long, value_parser = choice_parser::<PreviewChoice>(), hide_possible_values = true, long_help = choice_long_help::<PreviewChoice>("How the preview is drawn"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub color: ColorDepthChoice,
     /// Minimum render time for notifications; 0 disables them
     ///
     /// When a longer render ends while the window is not focused, the terminal shows a desktop notification.
@@ -579,7 +579,7 @@ choice! {
 
 choice! {
     /// Whether `compare` shows images.
-    pub enum ImageVisibility {
+    pub enum CompareImageVisibility {
         /// On a terminal with at least 30 columns.
         Auto = "auto",
         /// Always; 80 columns wide without a terminal.
@@ -748,7 +748,7 @@ fn parse_shard(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-fn parse_error_bound(text: &str) -> Result<f64, String> {
+fn parse_nonnegative_number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a nonnegative number".to_owned()),

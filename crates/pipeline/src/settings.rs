@@ -7,7 +7,7 @@ use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
 pub use crate::integrators::ViewMode;
-pub use crate::scene::description::CameraChange;
+pub use crate::scene::description::CameraOverrides;
 use crate::scene::description::{Accel, Integrator, RenderOptions, ShadowMode, render_keys};
 
 macro_rules! overrides {
@@ -38,7 +38,7 @@ macro_rules! overrides {
             /// Up axis of a model. Replaces the format's default.
             pub up: Option<UpAxis>,
             /// Changes to the scene's camera.
-            pub camera: CameraChange,
+            pub camera: CameraOverrides,
             /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
             /// Turntable frame. `None` for a still image.
@@ -150,7 +150,7 @@ pub enum ResumeMode {
 
 /// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AdjustableSettings {
+pub struct KeyboardSettings {
     /// Integrator.
     pub integrator: Integrator,
     /// Shadow type.

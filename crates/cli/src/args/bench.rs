@@ -8,7 +8,7 @@ use super::{
     parse_thread_count, parse_u32,
 };
 use crate::scene::description::{Accel, Integrator, ShadowMode};
-use crate::tui::ColorChoice;
+use crate::tui::ColorDepthChoice;
 
 pub(super) const HELP: &str = "\
 Each image is compared with two references whose noise is independent, using the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
@@ -100,7 +100,7 @@ pub struct BenchArgs {
     pub accel: Vec<Accel>,
 
     /// Override a scene key
-    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
+    #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
     /// Maximum bounces per path
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("max_depth"), help_heading = "All images and references")]
@@ -119,8 +119,8 @@ pub struct BenchArgs {
     #[arg(long, value_parser = choice_parser::<ProgressMode>(), hide_possible_values = true, long_help = choice_long_help::<ProgressMode>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    pub color: ColorDepthChoice,
 }
 
 fn parse_seed_count(text: &str) -> Result<u32, String> {

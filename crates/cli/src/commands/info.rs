@@ -8,7 +8,7 @@ use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::json::to_pretty_text;
-use crate::output::settings::{ImageInfo, ImageInfoError, read_info};
+use crate::output::settings::{ImageInfo, ImageInfoReadError, read_image_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
 use crate::scene::detect_non_scene;
@@ -33,10 +33,10 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
 ///
 /// # Errors
-/// Returns the same errors as [`read_info`].
-fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoError> {
-    read_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
-        (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
+/// Returns the same errors as [`read_image_info`].
+fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+    read_image_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
+        (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
         _ => Err(error),

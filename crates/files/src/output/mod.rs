@@ -1,6 +1,6 @@
 //! Encodes images and writes files.
 //!
-//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! [`check_image_path`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
 //! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
 //! the same file.
 
@@ -35,11 +35,11 @@ pub mod write;
 use std::path::Path;
 
 pub use attributes::{AttributeLossPolicy, WriteWarning};
-pub use develop::DevelopSettings;
+pub use develop::FilmEncodingSettings;
 pub use error::OutputError;
 pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
-pub use identity::{FileFingerprint, FileIdentity, is_same_file};
+pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
     ReplaceCheck, may_replace_image, may_replace_json, may_replace_plot, may_replace_table,
     scene_name_in_png, sign_plot,
@@ -118,7 +118,7 @@ pub(crate) fn encode_with_layers(
         Format::WebP => webp::encode(image, options, token),
     };
     // A cancelled encoder reports an error from its writer.
-    token.check()?;
+    token.check_pause_and_cancel()?;
     bytes
 }
 
@@ -128,16 +128,16 @@ pub(crate) fn encode_with_layers(
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
 /// directory or not writable.
-pub fn check_image_target(path: &Path) -> Result<Format, OutputError> {
+pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     resolve_path::check_writable(path)?;
     Ok(format)
 }
 
-/// Like [`check_image_target`], but does not create a file, so it can be called frequently.
+/// Like [`check_image_path`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_image_target`], but does not detect directories that reject new files despite their permissions.
+/// Same as [`check_image_path`], but does not detect directories that reject new files despite their permissions.
 pub fn check_image_target_read_only(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     check_file_target_read_only(path)?;
@@ -155,7 +155,7 @@ pub fn check_file_target_read_only(path: &Path) -> Result<(), OutputError> {
 /// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
-/// Same as [`check_image_target`], but the extension is not checked.
+/// Same as [`check_image_path`], but the extension is not checked.
 pub fn check_file_target(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }

@@ -11,7 +11,7 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::flat_polygon).
+    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon_face).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {
@@ -30,12 +30,12 @@ pub struct NearestSurface {
     /// Height of the point above or below the surface.
     pub height: f64,
     /// Extent of the surface around the closest point.
-    pub extent: SurfaceExtent,
+    pub extent: LocalSurfaceShape,
 }
 
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SurfaceExtent {
+pub enum LocalSurfaceShape {
     /// A plane that extends at least up to this distance.
     Flat(f64),
     /// A sphere of this radius.
@@ -44,7 +44,7 @@ pub enum SurfaceExtent {
 
 /// A parallelogram with a corner c and edges u and v.
 #[inline]
-pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
+pub(super) fn parallelogram_polygon((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 

@@ -6,14 +6,14 @@
 
 use super::film_state::FilmState;
 use super::scheduler::{RenderStageInputs, Scheduler};
-use crate::film::{Convergence, Quantity, RadianceImage};
+use crate::film::{ConvergenceModel, Quantity, RadianceImage};
 use crate::integrators::ViewMode;
 use crate::keys;
 use crate::math::Vec3;
 use crate::output::LayerImage;
 use crate::scene::fingerprint::FingerprintHasher;
 use crate::settings::OutputLayer;
-use crate::stages::StopReason;
+use crate::stages::AbortReason;
 use crate::stages::photons::PhotonStore;
 use crate::trace::Tracer;
 
@@ -37,7 +37,7 @@ impl OutputLayer {
             Self::Albedo => (LayerSource::View(ViewMode::Albedo), COLOR),
             Self::Normal => (LayerSource::View(ViewMode::Normal), DIRECTION),
             Self::Depth => (LayerSource::View(ViewMode::Depth), DISTANCE),
-            Self::Variance => (LayerSource::Film(luminance_variance_image), NUMBER),
+            Self::Variance => (LayerSource::Film(squared_standard_error_image), NUMBER),
             Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
             Self::Ambient => (LayerSource::View(ViewMode::Ambient), COLOR),
             Self::Diffuse => (LayerSource::View(ViewMode::Diffuse), COLOR),
@@ -57,7 +57,7 @@ impl OutputLayer {
 }
 
 /// Returns the squared standard error of each pixel's mean luminance.
-fn luminance_variance_image(state: &FilmState) -> RadianceImage {
+fn squared_standard_error_image(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
@@ -82,14 +82,14 @@ pub(crate) fn render_layers(
     state: &FilmState,
     rendering: &RenderStageInputs<'_>,
     layers: &[OutputLayer],
-) -> Result<Vec<LayerImage>, StopReason> {
+) -> Result<Vec<LayerImage>, AbortReason> {
     let mut images = Vec::with_capacity(layers.len());
     for (number, layer) in layers.iter().enumerate() {
         let (source, channels) = layer.source_and_channels();
         let image = match source {
             LayerSource::Film(image) => image(state),
             LayerSource::View(view) => {
-                render_matching_view(view, state, rendering, progress_range(layers, Some(number)))?
+                render_view_at_image_samples(view, state, rendering, progress_range(layers, Some(number)))?
             }
         };
         images.push(LayerImage { name: crate::choice::Choice::name(*layer), channels, image });
@@ -98,12 +98,12 @@ pub(crate) fn render_layers(
 }
 
 /// Renders a view with the same number of samples in each pixel as the image.
-fn render_matching_view(
+fn render_view_at_image_samples(
     view: ViewMode,
     picture: &FilmState,
     rendering: &RenderStageInputs<'_>,
     progress: [f64; 2],
-) -> Result<RadianceImage, StopReason> {
+) -> Result<RadianceImage, AbortReason> {
     let mut plan = rendering.plan.clone();
     plan.settings.view = view;
     // Use the image's sample counts, no matter what ended its render.
@@ -111,9 +111,9 @@ fn render_matching_view(
     plan.settings.render.samples = picture.film.sample_count_stats().max;
     plan.time_seconds = None;
     let photons = rendering.photons.filter(|_| plan.settings.gathers_photons());
-    let convergence = match photons.is_some_and(PhotonStore::emits_photons) {
-        true => Convergence::Photons,
-        false => Convergence::Stratified,
+    let convergence = match photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
+        true => ConvergenceModel::Photons,
+        false => ConvergenceModel::Stratified,
     };
     let key = keys::film_sums_key(
         FingerprintHasher::new("layer").add_fingerprint(&picture.key).finish(),
@@ -121,7 +121,7 @@ fn render_matching_view(
         plan.crop,
     );
     let mut state = FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None)
-        .map_err(StopReason::work_failure)?;
+        .map_err(AbortReason::work_failure)?;
     state.goals = picture.goals_at_current_samples();
     let sink = rendering.sink.for_progress_range(progress);
     let rendering = RenderStageInputs {

@@ -22,7 +22,7 @@ pub fn shade_aov(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
-        let passed = if tile.world.has_see_through() {
+        let passed = if tile.world.has_null_interaction_surfaces() {
             Some(tile.first_opaque_path_and_hit(path, hit, counters))
         } else {
             None
@@ -58,7 +58,7 @@ fn count_nearby_photons(
     vertex: &SurfaceVertex<'_>,
 ) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
-    let (_, _, sample) = tile.block.sample_of(slot);
+    let (_, _, sample) = tile.block.pixel_and_sample(slot);
     let pass = maps.pass_for_sample(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }

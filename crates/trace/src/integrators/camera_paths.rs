@@ -9,14 +9,14 @@ use std::ops::Range;
 
 use super::RayCounters;
 use super::behavior::PathBehavior;
-use super::direct::queue::{DirectLightQueue, ShadingSides};
+use super::direct::queue::{DirectLightVertexQueue, ShadingSides};
 use super::memory::ThreadMemory;
 use super::photons::PhotonMaps;
-use super::photons::gather::GatherPhotons;
+use super::photons::gather::GatherPhotonsKernel;
 use super::transport::accumulator::{Accumulator, NonReflectedTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
-use super::transport::crossing::CrossingBuffers;
+use super::transport::crossing::CoincidentSurfaceBuffers;
 use super::transport::interface::{
     FresnelSplit, fresnel_split, reflected_path, sheet_transmission_between_media,
 };
@@ -28,12 +28,12 @@ use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, SurfaceVertex};
 use super::transport::walk::{
-    Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk_to_interaction,
+    DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
 };
 use super::view::LightAov;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, lane_indices};
+use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::SampledLobes;
 use crate::materials::{Bsdf, BxdfPoint, Coated, Mirror, NonSpecular, RoughDielectricPoint, ThinDielectric};
@@ -75,7 +75,7 @@ pub fn trace_camera_paths(
         place: 0,
         counters,
     };
-    wavefront.prepare_bounce_continuation();
+    wavefront.set_continuation_policy();
     wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
@@ -88,7 +88,7 @@ pub fn trace_camera_paths(
     }
     // Compute direct lighting at the vertices, and add it to the accumulator.
     wavefront.add_direct_light()?;
-    wavefront.direct.flush_consecutive(slots.start, &mut wavefront.accumulator);
+    wavefront.direct.flush_consecutive_to_accumulator(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -97,7 +97,7 @@ pub fn trace_camera_paths(
             // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
-            for places in object_order.indices().chunks(PACKET_SIZE) {
+            for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
                 wavefront.trace_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
@@ -107,7 +107,7 @@ pub fn trace_camera_paths(
         }
         let slots: &[PathRay] = rays;
         wavefront.add_direct_light()?;
-        wavefront.direct.flush_to_accumulator(
+        wavefront.direct.add_arrived_light(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
         );
@@ -132,7 +132,7 @@ struct CameraWavefront<'a, 's> {
     /// Photon maps for the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
     /// This bounce's vertices that await direct lighting.
-    direct: &'a mut DirectLightQueue,
+    direct: &'a mut DirectLightVertexQueue,
     /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfacePacket,
     accumulator: Accumulator<'s>,
@@ -140,7 +140,7 @@ struct CameraWavefront<'a, 's> {
     next: &'a mut Vec<PathRay>,
     /// Index of the current path in this bounce's queue.
     place: u32,
-    crossing: &'a mut CrossingBuffers,
+    crossing: &'a mut CoincidentSurfaceBuffers,
     counters: &'a mut RayCounters,
 }
 
@@ -149,7 +149,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         self.tile
     }
 
-    fn crossing_buffers(&mut self) -> &mut CrossingBuffers {
+    fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers {
         self.crossing
     }
 
@@ -174,7 +174,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 }
             }
             Interaction::Glass(vertex, hit, Interface { far, rough }) => {
-                if self.add_emission(path, vertex, OpaqueHit::Direct(hit)) {
+                if self.add_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -195,7 +195,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        hit: OpaqueHit,
+        hit: DirectOrCoincidentHit,
         pane: &ThinDielectric,
     ) -> NullInteraction {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
@@ -205,7 +205,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         if !self.add_emission(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -227,7 +227,13 @@ impl CameraWavefront<'_, '_> {
         let (tile, maps, depth, aov) = (self.tile, self.maps, self.depth, self.accumulator.aov);
         let gather = |row: &VertexBatch| {
             let maps = maps?;
-            Some(tile.world.geometry.instruction_set().run(GatherPhotons { tile, row, maps, depth, aov }))
+            Some(tile.world.geometry.instruction_set().run(GatherPhotonsKernel {
+                tile,
+                row,
+                maps,
+                depth,
+                aov,
+            }))
         };
         let rays =
             self.direct.compute_direct_light(tile, aov, (self.continuation, depth), gather, self.next)?;
@@ -237,7 +243,7 @@ impl CameraWavefront<'_, '_> {
         Ok(())
     }
 
-    fn prepare_bounce_continuation(&mut self) {
+    fn set_continuation_policy(&mut self) {
         let continuation = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::All);
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
@@ -247,7 +253,7 @@ impl CameraWavefront<'_, '_> {
         std::mem::swap(rays, self.next);
         self.next.clear();
         self.depth += 1;
-        self.prepare_bounce_continuation();
+        self.set_continuation_policy();
     }
 
     /// Shades the hit of one ray in a packet. The path is large, so it is moved only here.
@@ -263,7 +269,7 @@ impl CameraWavefront<'_, '_> {
                 walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
-                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance(lane));
+                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
                 self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
             }
         }
@@ -273,7 +279,7 @@ impl CameraWavefront<'_, '_> {
     fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
         if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
-            tile.token.check()?;
+            tile.token.check_pause_and_cancel()?;
         }
         let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.accepts_reflected();
         let packet =
@@ -291,12 +297,12 @@ impl CameraWavefront<'_, '_> {
         }
         // Queue the vertices of plain surfaces for direct lighting.
         if are_lit {
-            self.direct.commit_spare_batch();
+            self.direct.commit_spare_vertices();
             if tile.pixel_spread > 0.0 {
                 for (lane, hit) in
-                    lane_indices(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?)))
+                    set_bit_lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?)))
                 {
-                    let cone = packet.path(tile, &rays, lane).cone.at_distance(hit.shape.t);
+                    let cone = packet.path(tile, &rays, lane).cone.propagated_by(hit.shape.t);
                     self.direct.store_cone(rays.queue_index(lane), cone);
                 }
             }
@@ -316,7 +322,7 @@ impl CameraWavefront<'_, '_> {
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
         // Shade in path order because the contributions to a sample are added in this order.
-        for lane in lane_indices(wanted) {
+        for lane in set_bit_lanes(wanted) {
             self.place = rays.queue_index(lane);
             self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
         }
@@ -340,7 +346,7 @@ impl CameraWavefront<'_, '_> {
         let render = &tile.settings.render;
         // Add the emission and ambient light of plain surfaces.
         let mut known = None;
-        for lane in lane_indices(plain) {
+        for lane in set_bit_lanes(plain) {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
@@ -358,10 +364,13 @@ impl CameraWavefront<'_, '_> {
         }
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
-        for lane in lane_indices(beyond) {
-            let sky = lights.environment().map(|_| packet.sky_radiance(lane));
-            let beyond =
-                lights.radiance_from_infinity_with_sky(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+        for lane in set_bit_lanes(beyond) {
+            let sky = lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
+            let beyond = lights.radiance_from_infinity_with_precomputed_sky(
+                sky,
+                lane_of(&rays.direction, lane),
+                |_, _| 1.0,
+            );
             self.accumulator.add_non_reflected(
                 first + lane as u32,
                 NonReflectedTerm::Emitted,
@@ -435,11 +444,16 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    fn add_emission(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, hit: OpaqueHit) -> bool {
+    fn add_emission(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        hit: DirectOrCoincidentHit,
+    ) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                OpaqueHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
+                DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
+                DirectOrCoincidentHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);
@@ -492,7 +506,7 @@ impl CameraWavefront<'_, '_> {
         far: &InteriorList,
     ) {
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
         let aov = self.light_aov_selection_at_vertex(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
@@ -521,7 +535,7 @@ impl CameraWavefront<'_, '_> {
             return;
         }
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let aov = self.light_aov_selection_at_vertex(path);
         let near = &path.interiors;
         let reflection = BxdfPoint::DielectricReflection(rough);
@@ -535,7 +549,7 @@ impl CameraWavefront<'_, '_> {
         // Without shadows, lights also illuminate the inside of solids.
         let has_shadows = tile.settings.render.shadows != ShadowMode::Off;
         let is_dark = |interiors: &InteriorList| {
-            interiors.glass().is_some_and(|inside| tile.world.is_unlit_glass(inside.body))
+            interiors.glass().is_some_and(|inside| tile.world.is_glass_interior_shadowed(inside.body))
         };
         let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
         // Photons are stored on both sides, so each side needs a vertex.
@@ -565,7 +579,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let is_colored = self.accumulator.aov.has_surface_colors_applied();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
@@ -580,7 +594,7 @@ impl CameraWavefront<'_, '_> {
         coated: &Coated,
         far: &InteriorList,
     ) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -605,7 +619,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));

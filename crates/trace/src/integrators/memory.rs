@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::direct::queue::DirectLightQueue;
+use super::direct::queue::DirectLightVertexQueue;
 use super::transport::scratch::TraceBuffers;
 
 /// Buffers that a thread reuses for all of its batches.
@@ -11,7 +11,7 @@ pub struct ThreadMemory {
     /// Queues of rays and hits.
     pub scratch: TraceBuffers,
     /// Vertices of the current bounce that await direct lighting.
-    pub direct: DirectLightQueue,
+    pub direct: DirectLightVertexQueue,
 }
 
 impl ThreadMemory {

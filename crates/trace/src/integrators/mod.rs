@@ -32,18 +32,18 @@ mod view;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{NegativeLobeSamples, SelectedPixels, TileSamples};
+use crate::film::{NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_purpose;
+pub use behavior::light_sampling_mode;
 pub use counters::RayCounters;
 use memory::ThreadMemory;
 pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::Accumulator;
 use transport::tile::{SampleBlock, TileContext};
-pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponents, ViewMode};
+pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponentMask, ViewMode};
 
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
@@ -121,7 +121,7 @@ pub fn render_tile_with_photons(
     }
     // Return the samples.
     memory.return_to_thread();
-    let negative = weight.map(|weight| NegativeLobeSamples { weight, is_negative });
+    let negative = weight.map(|weight| NegativeLobeMask { weight, is_negative });
     let samples = block.samples.len() as u32;
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }

@@ -2,20 +2,22 @@
 
 use arrayvec::ArrayVec;
 
-use super::all_lights::{DirectLightCounters, LightSums, ReflectedLight, SampleAllLights, add_masked_lanes};
+use super::all_lights::{
+    DirectLightCounters, LightSums, ReflectedDirectLightPacket, SampleAllLights, add_masked_lanes,
+};
 use super::light_tree::SampleLightTree;
-use super::lobe_rays::LobeRayKernel;
+use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
+use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{ContinuationPolicy, SampleBsdf};
+use crate::integrators::transport::scatter::{BsdfSampler, ContinuationPolicy};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
@@ -30,7 +32,7 @@ use crate::world::{Geometry, SimdKernel};
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
 /// packet.
 #[derive(Default)]
-pub struct DirectLightQueue {
+pub struct DirectLightVertexQueue {
     rows: Vec<VertexBatch>,
     /// Number of packets in use. The remaining packets are kept for reuse.
     count: usize,
@@ -69,7 +71,7 @@ pub enum ShadingSides<'m> {
 /// Number of packets processed together if lights are picked from a tree.
 const ROWS: usize = 64;
 
-impl DirectLightQueue {
+impl DirectLightVertexQueue {
     /// The queue is processed when it contains this many packets, while their data is still in the cache.
     const FULL: usize = 64;
 
@@ -100,7 +102,7 @@ impl DirectLightQueue {
 
     /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
     /// for a queue index and whether the camera sees the vertex.
-    pub fn flush_to_accumulator(
+    pub fn add_arrived_light(
         &mut self,
         path: impl Fn(usize) -> (u32, bool),
         accumulator: &mut Accumulator<'_>,
@@ -111,13 +113,13 @@ impl DirectLightQueue {
         }
     }
 
-    /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
-    pub fn flush_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    /// Like [`DirectLightVertexQueue::add_arrived_light`], for paths with consecutive slots.
+    pub fn flush_consecutive_to_accumulator(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_consecutive(first, &self.arrived);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
-    /// [`DirectLightQueue::commit_spare_batch`] or discards it.
+    /// [`DirectLightVertexQueue::commit_spare_vertices`] or discards it.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::empty());
@@ -126,7 +128,7 @@ impl DirectLightQueue {
     }
 
     /// Keeps the vertices in the spare packet.
-    pub fn commit_spare_batch(&mut self) {
+    pub fn commit_spare_vertices(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
         row.retain_lanes(row.used);
@@ -138,8 +140,8 @@ impl DirectLightQueue {
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.accepts(row.bsdf.kind(), (false, false))) {
-            for lane in lane_indices(row.used).take((ALL & !open.used).count_ones() as usize) {
-                open.copy_vertex(open.used.trailing_ones() as usize, row, lane);
+            for lane in set_bit_lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
+                open.copy_vertex_from(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
             }
         }
@@ -160,16 +162,20 @@ impl DirectLightQueue {
         sides: ShadingSides<'_>,
     ) {
         self.store_cone(lit.place, lit.vertex.cone);
-        let interiors = self.interior_lists.insert(lit.interiors);
+        let interiors = self.interior_lists.push_list(lit.interiors);
         let far_side = match sides {
             ShadingSides::OneSide { .. } => None,
             ShadingSides::TwoSides { beyond, interiors, .. } => {
-                Some((beyond, self.interior_lists.insert(interiors)))
+                Some((beyond, self.interior_lists.push_list(interiors)))
             }
         };
         let (row, lane) = match sides {
-            ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
-            ShadingSides::TwoSides { is_dark, .. } => self.open_packet(lit.bsdf.kind(), (is_dark, true)),
+            ShadingSides::OneSide { is_dark } => {
+                self.packet_with_free_lane(lit.bsdf.kind(), (is_dark, false))
+            }
+            ShadingSides::TwoSides { is_dark, .. } => {
+                self.packet_with_free_lane(lit.bsdf.kind(), (is_dark, true))
+            }
         };
         row.set_vertex(lane, tile, lit, aov, interiors);
         if let Some((beyond, interiors)) = far_side {
@@ -179,7 +185,7 @@ impl DirectLightQueue {
 
     /// Returns a packet for this kind of BSDF and the index of a free lane in the packet. `which` specifies
     /// whether the vertex is dark and whether it is two-sided.
-    fn open_packet(&mut self, kind: BxdfKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
+    fn packet_with_free_lane(&mut self, kind: BxdfKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
@@ -238,13 +244,13 @@ impl DirectLightQueue {
             let end = (first + together).min(self.count);
             // Sample lights at each packet, and pool the shadow rays to picked lights.
             for number in first..end {
-                tile.token.check()?;
+                tile.token.check_pause_and_cancel()?;
                 let row = &mut self.rows[number];
                 if row.may_lift != 0 {
                     tile.world
                         .geometry
                         .instruction_set()
-                        .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
+                        .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
                 }
                 let request = DirectLightPacketRequest {
                     number,
@@ -272,12 +278,12 @@ impl DirectLightQueue {
                     add_masked_lanes(row.used, &gathered, &mut arrived.light);
                 }
                 rays += arrived.rays;
-                self.store_reflected_light(number, aov, &arrived.light);
+                self.accumulate_reflected_light(number, aov, &arrived.light);
             }
             // Continue the paths.
             for row in &self.rows[first..end] {
                 if let Some(continuation) = of_row(row) {
-                    SampleBsdf { tile, row, used: row.used, continuation }.scatter(
+                    BsdfSampler { tile, row, used: row.used, continuation }.scatter(
                         &self.interior_lists,
                         &self.cones,
                         next,
@@ -304,15 +310,15 @@ impl DirectLightQueue {
             CompetingTechnique::NarrowPaths
         } else if row.bsdf.extends_narrow_lobe_paths() && !is_soft && aov != LightAov::LitFraction {
             // Paths in microfacet lobes do not account for lights.
-            CompetingTechnique::from_lobe_mask(row.bsdf.narrow_lobe_mask() & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
-            CompetingTechnique::from_lobe_mask(row.sharp_lobes(tile, aov) & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobes(tile, aov) & request.used)
         }
     }
 
     /// Media at a packet's vertices. `None` if all vertices are in air.
-    fn interiors_of(&self, row: &VertexBatch) -> Option<&InteriorLists> {
-        (!self.interior_lists.are_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
+    fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorLists> {
+        (!self.interior_lists.are_all_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
@@ -329,7 +335,7 @@ impl DirectLightQueue {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
-            (self.competing_technique(request, tile, aov), self.interiors_of(row));
+            (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
         let plain = SampleAllLights::<false> {
             tile,
@@ -364,13 +370,13 @@ impl DirectLightQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
         sums: LightSums,
-    ) -> ReflectedLight {
+    ) -> ReflectedDirectLightPacket {
         let row = &self.rows[request.number];
         let arrived = sums.into_reflected_or_lit_fraction(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
-                let interior_lists = self.interiors_of(row);
-                let lobes = LobeRayKernel { tile, row, sharp, aov, interior_lists, arrived };
+                let interior_lists = self.interiors_of_batch(row);
+                let lobes = LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived };
                 tile.world.geometry.instruction_set().run(lobes)
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
@@ -380,7 +386,7 @@ impl DirectLightQueue {
     }
 
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
+    fn accumulate_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
         let row = &self.rows[number];
         let light = match aov {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
@@ -394,7 +400,7 @@ impl DirectLightQueue {
                 }
             }
             None => {
-                for i in lane_indices(row.used) {
+                for i in set_bit_lanes(row.used) {
                     self.arrived[row.place[i] as usize] += lane(&light, i);
                 }
             }
@@ -424,12 +430,12 @@ struct DirectLightPacketRequest {
 }
 
 /// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
-struct LiftShadowOrigins<'a> {
+struct ShadowOriginLiftKernel<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,
 }
 
-impl SimdKernel for LiftShadowOrigins<'_> {
+impl SimdKernel for ShadowOriginLiftKernel<'_> {
     type Output = ();
 
     #[inline(always)]
