@@ -119,13 +119,13 @@ pub enum Subcommand {
         #[arg(add = candidates::scene_completer())]
         scene: PathBuf,
         /// Override a scene key
-        #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
+        #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
         /// Colors: auto, truecolor, 256, 16, none
-        #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+        #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorDepthChoice,
     },
     /// Write a commented starter scene; never overwrites a file
@@ -173,7 +173,7 @@ pub enum Subcommand {
     #[command(after_long_help = EXPLAIN_HELP)]
     Explain {
         /// A key or table, such as render.samples, materials.metal.roughness, samples or sphere
-        #[arg(add = candidates::key_path_completer())]
+        #[arg(add = candidates::explain_path_completer())]
         key: Option<String>,
     },
     /// Print the JSON Schema for scenes, for use in editors
@@ -297,7 +297,7 @@ pub struct ImportArgs {
     #[arg(long)]
     pub strict: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorDepthChoice,
 }
 
@@ -316,7 +316,7 @@ pub struct InfoArgs {
     #[arg(long)]
     pub json: bool,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorDepthChoice,
 }
 
@@ -346,7 +346,7 @@ pub struct CompareArgs {
     /// The reference image, with the same size
     pub b: PathBuf,
     /// Exit with code 1 if relMSE is above X
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_error_bound)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = parse_nonnegative_number)]
     pub max_relmse: Option<f64>,
     /// Write the error as an image
     ///
@@ -360,10 +360,10 @@ pub struct CompareArgs {
     #[arg(long)]
     pub json: bool,
     /// Show the images and their difference: auto, on, off
-    #[arg(long, value_parser = choice_parser::<ImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<ImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<CompareImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<CompareImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub pictures: CompareImageVisibility,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorDepthChoice,
 }
 
@@ -381,7 +381,7 @@ pub struct RenderArgs {
     ///
     /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
     /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
-    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE")]
+    #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
     /// Output file; can be given several times
@@ -505,7 +505,7 @@ pub struct RenderArgs {
     #[arg(long, value_parser = choice_parser::<PreviewChoice>(), hide_possible_values = true, long_help = choice_long_help::<PreviewChoice>("How the preview is drawn"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorDepthChoice,
     /// Minimum render time for notifications; 0 disables them
     ///

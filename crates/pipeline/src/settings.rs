@@ -38,7 +38,7 @@ macro_rules! overrides {
             /// Up axis of a model. Replaces the format's default.
             pub up: Option<UpAxis>,
             /// Changes to the scene's camera.
-            pub camera: CameraChange,
+            pub camera: CameraOverrides,
             /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
             /// Turntable frame. `None` for a still image.

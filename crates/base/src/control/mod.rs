@@ -15,7 +15,7 @@ pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 /// Progress callback that ignores all reports.
 pub fn ignore_progress(_done: u64, _total: u64) {}
 
-/// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check`] often enough to stop within
+/// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check_pause_and_cancel`] often enough to stop within
 /// 10 ms.
 #[derive(Clone, Debug, Default)]
 pub struct CancelToken(Arc<TokenState>);
@@ -47,7 +47,7 @@ impl CancelToken {
         self.notify();
     }
 
-    /// Pauses the work at its next [`CancelToken::check`], or resumes it.
+    /// Pauses the work at its next [`CancelToken::check_pause_and_cancel`], or resumes it.
     pub fn set_paused(&self, paused: bool) {
         let mut held = self.lock();
         self.0.paused.store(paused, Ordering::Release);

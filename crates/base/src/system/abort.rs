@@ -86,7 +86,7 @@ unsafe impl GlobalAlloc for AbortingAllocator {
 /// # Errors
 /// Returns an error if the handler cannot be installed.
 pub fn install_abort_handler() -> io::Result<()> {
-    // SAFETY: `on_abort` makes only async-signal-safe calls.
+    // SAFETY: `handle_abort_signal` makes only async-signal-safe calls.
     unsafe { low_level::register(SIGABRT, handle_abort_signal) }.map(drop)
 }
 

@@ -29,7 +29,7 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
     reserved
 }
 
-/// The control group's limit, once [`apply_cgroup_limit`] has applied it.
+/// The control group's limit, once [`set_rlimit_from_cgroup`] has applied it.
 static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 
 /// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill

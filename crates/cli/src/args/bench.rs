@@ -100,7 +100,7 @@ pub struct BenchArgs {
     pub accel: Vec<Accel>,
 
     /// Override a scene key
-    #[arg(long = "set", add = candidates::set_arg_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
+    #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
     /// Maximum bounces per path
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = integer_override_parser("max_depth"), help_heading = "All images and references")]
@@ -119,7 +119,7 @@ pub struct BenchArgs {
     #[arg(long, value_parser = choice_parser::<ProgressMode>(), hide_possible_values = true, long_help = choice_long_help::<ProgressMode>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorDepthChoice,
 }
 

@@ -41,7 +41,7 @@ pub struct MergeArgs {
     #[arg(long, value_parser = choice_parser::<ProgressMode>(), hide_possible_values = true, long_help = choice_long_help::<ProgressMode>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorDepthChoice,
 }
 
@@ -70,7 +70,7 @@ pub struct FarmArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MAX_PARTS as i64))]
     pub shards: u32,
     /// The job scheduler
-    #[arg(long, value_parser = choice_parser::<Scheduler>(), value_name = "ENGINE")]
+    #[arg(long, value_parser = choice_parser::<ClusterScheduler>(), value_name = "ENGINE")]
     pub engine: ClusterScheduler,
     /// ssh login for parallel, such as user@machine; can be given several times
     #[arg(long = "host", value_name = "LOGIN")]
@@ -82,7 +82,7 @@ pub struct FarmArgs {
     #[arg(long, value_name = "NAME", default_value = "glimt")]
     pub claim: String,
     /// Colors: auto, truecolor, 256, 16, none
-    #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
+    #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorDepthChoice,
     /// Options for every render
     #[arg(last = true, value_name = "OPTIONS")]

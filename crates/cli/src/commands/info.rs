@@ -33,7 +33,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
 ///
 /// # Errors
-/// Returns the same errors as [`read_info`].
+/// Returns the same errors as [`read_image_info`].
 fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
     read_image_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
         (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {

@@ -47,7 +47,7 @@ fn backup_path(target: &Path) -> PathBuf {
     name.into()
 }
 
-/// A replacement in progress. The steps are [`Self::move_new_to_backup_path`], [`Self::swap`] and [`Self::finish_or_restore`].
+/// A replacement in progress. The steps are [`Self::stage_at_backup_path`], [`Self::swap`] and [`Self::finish_if_old_text_matches`].
 pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,

@@ -102,7 +102,7 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
 }
 
 /// Whether two paths refer to the same file, existing or not. Also true if they may refer to the same file
-/// according to their [`FileFingerprint`].
+/// according to their [`FallbackFileIdentity`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let Some(identity) = FileIdentity::from_path(a) else { return false };
     let are_alike =

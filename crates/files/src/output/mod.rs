@@ -1,6 +1,6 @@
 //! Encodes images and writes files.
 //!
-//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! [`check_image_path`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
 //! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
 //! the same file.
 
@@ -134,10 +134,10 @@ pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
     Ok(format)
 }
 
-/// Like [`check_image_target`], but does not create a file, so it can be called frequently.
+/// Like [`check_image_path`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_image_target`], but does not detect directories that reject new files despite their permissions.
+/// Same as [`check_image_path`], but does not detect directories that reject new files despite their permissions.
 pub fn check_image_target_read_only(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     check_file_target_read_only(path)?;
@@ -155,7 +155,7 @@ pub fn check_file_target_read_only(path: &Path) -> Result<(), OutputError> {
 /// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
-/// Same as [`check_image_target`], but the extension is not checked.
+/// Same as [`check_image_path`], but the extension is not checked.
 pub fn check_file_target(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }

@@ -55,7 +55,7 @@ impl OrientedBox {
         })
     }
 
-    /// [`Cuboid::intersect`] for a packet.
+    /// [`OrientedBox::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];

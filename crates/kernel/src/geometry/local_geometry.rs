@@ -11,7 +11,7 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::flat_polygon).
+    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon_face).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {

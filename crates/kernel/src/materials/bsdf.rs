@@ -152,7 +152,7 @@ pub trait BxdfMaterial {
         None
     }
 
-    /// Whether the material depends on [`SurfaceDirections::tangent`](super::bxdf::SurfaceDirections::tangent).
+    /// Whether the material depends on [`ShadingGeometry::tangent`](super::bxdf::ShadingGeometry::tangent).
     #[inline]
     fn is_anisotropic(&self) -> bool {
         false

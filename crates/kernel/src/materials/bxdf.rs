@@ -72,7 +72,7 @@ impl LobeValue {
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingGeometry {
-    /// Unit shading normal on the lit side, rotated by [`facing_normal`]. Except for transmitted light, this
+    /// Unit shading normal on the lit side, rotated by [`lobe_shading_normal`]. Except for transmitted light, this
     /// is the side of the viewer.
     pub normal: Vec3,
     /// Unit direction to the viewer.
@@ -117,7 +117,7 @@ pub trait Bxdf: Soa + Default {
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`BxdfMaterial::packet_color_parameter`](super::bsdf::BxdfMaterial::packet_color_parameter)
+    /// Replaces the color that [`BxdfMaterial::color_for_packet_lookup`](super::bsdf::BxdfMaterial::color_for_packet_lookup)
     /// returns. Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}

@@ -133,7 +133,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Sets the shading normals (on the viewer's side) and the directions of the incoming rays, for the lanes
     /// in `of` or for all lanes. Replaces `normals` with the normals rotated by
-    /// [`facing_normal`](super::bxdf::facing_normal).
+    /// [`lobe_shading_normal`](super::bxdf::lobe_shading_normal).
     #[inline(always)]
     pub fn set_normals_and_directions(
         &mut self,

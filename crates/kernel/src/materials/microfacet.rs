@@ -162,7 +162,7 @@ impl SmithTerms {
 }
 
 impl SmithTerms {
-    /// [`SmithTerms::pdf`], computed from the result of [`SmithTerms::reflection_term`] instead of D. 0 for
+    /// [`SmithTerms::reflection_pdf`], computed from the result of [`SmithTerms::torrance_sparrow_without_fresnel`] instead of D. 0 for
     /// directions below the surface.
     #[inline(always)]
     pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {

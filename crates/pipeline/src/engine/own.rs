@@ -173,7 +173,7 @@ impl Engine {
     /// Writes the scene's own image if the current view is based on its finished film.
     ///
     /// # Errors
-    /// Returns [`StopReason::Cancelled`] if the token is cancelled.
+    /// Returns [`AbortReason::Cancelled`] if the token is cancelled.
     pub(super) fn write_image_without_overrides(
         &mut self,
         sink: &EventSink,

@@ -35,7 +35,7 @@ pub(crate) struct CellSampleGoals {
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last evaluated. Tiles are evaluated only once per sample count.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the [`BrightnessPrepass`]. `None` until noise has been evaluated.
+    /// Mean luminance of the [`BrightnessPrepassPixels`]. `None` until noise has been evaluated.
     pub(super) brightness: Option<f64>,
 }
 

@@ -110,7 +110,7 @@ impl<'a> Scheduler<'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// Returns [`StopReason::Cancelled`] if the token is cancelled. The film keeps its samples.
+    /// Returns [`AbortReason::Cancelled`] if the token is cancelled. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), AbortReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
@@ -283,7 +283,7 @@ impl<'a> Scheduler<'a> {
         self.forecast.begin_photons(begin);
         let maps =
             photons.get_or_trace_maps(samples, PhotonContext { world, plan, pool, token, sink }, || {
-                self.run_due_tasks()
+                self.run_due_tasks();
             })?;
         self.forecast.end_photons(self.clock.active_seconds(token.is_paused()));
         Ok(maps)

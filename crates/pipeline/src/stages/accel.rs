@@ -70,7 +70,7 @@ pub(crate) struct AccelResult {
 /// Builds all missing trees, using coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
-/// Returns [`StopReason::Cancelled`] if the token is cancelled.
+/// Returns [`AbortReason::Cancelled`] if the token is cancelled.
 pub(crate) fn build_accel_structures(
     scene: &Scene,
     (of, origin): (&FingerprintContext<'_>, DVec3),

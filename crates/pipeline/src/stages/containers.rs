@@ -63,7 +63,7 @@ impl GltfContainers {
         }
     }
 
-    /// Stores a mesh returned by [`GltfContainers::load_mesh`] for the next call.
+    /// Stores a mesh returned by [`GltfContainers::load_any_mesh`] for the next call.
     pub(crate) fn store_mesh_for_next_load(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }

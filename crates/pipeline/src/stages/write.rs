@@ -103,7 +103,7 @@ pub(crate) struct ImageWriteContext<'a> {
 /// Checks all output files before rendering starts.
 ///
 /// # Errors
-/// With [`WriteMode::Must`], returns an error for the first file that cannot be written. Otherwise, reports
+/// With [`WriteRequirement::Must`], returns an error for the first file that cannot be written. Otherwise, reports
 /// failures as events.
 pub(crate) fn check_targets(
     writing: WriteRequirement,
@@ -155,7 +155,7 @@ fn check_each_target(
 /// Runs the last stage of a request. Returns whether the image is on disk.
 ///
 /// # Errors
-/// With [`WriteMode::Must`], returns an error if the image could not be written.
+/// With [`WriteRequirement::Must`], returns an error if the image could not be written.
 pub(crate) fn write_if_wanted(
     writing: WriteRequirement,
     state: &FilmState,
@@ -175,7 +175,7 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// Returns [`StopReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
+/// Returns [`AbortReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
 fn write_outdated_outputs(
     state: &FilmState,
     to: ImageWriteContext<'_>,

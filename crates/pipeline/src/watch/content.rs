@@ -126,7 +126,7 @@ impl RequestFileSnapshot {
         self.record_decoded_with_stamp(path, hash, None)
     }
 
-    /// Like [`Snapshot::record_decoded`], but takes a stamp obtained before the file was read.
+    /// Like [`RequestFileSnapshot::record_decoded`], but takes a stamp obtained before the file was read.
     fn record_decoded_with_stamp(
         &self,
         path: &Path,

@@ -41,7 +41,7 @@ impl fmt::Display for TableTitle<'_> {
     }
 }
 
-/// A table in the file. Read its keys, then call [`TableReader::report_key_errors`].
+/// A table in the file. Read its keys, then call [`TableReader::report_unknown_and_missing_keys`].
 pub(super) struct TableReader<'a> {
     pub(super) context: &'a FileContext<'a>,
     /// Byte range of the header or the braces.

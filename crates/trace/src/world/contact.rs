@@ -127,7 +127,7 @@ impl World {
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path for [`World::classify_candidates`] if [`World::is_glass_thicker_than`] is true and nothing else
+    /// Fast path for [`World::visit_coincident_candidates`] if [`World::is_glass_thicker_than`] is true and nothing else
     /// is nearby. In this case, only the incoming ray's side matters.
     fn classify_isolated_hit(
         &self,
@@ -264,7 +264,7 @@ impl World {
         })
     }
 
-    /// The [`ClosedGlassShapesOfSubtree`] of each subtree. Empty if few objects are nested.
+    /// The [`SubtreeClosedGlassIds`] of each subtree. Empty if few objects are nested.
     pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[SubtreeClosedGlassIds]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;

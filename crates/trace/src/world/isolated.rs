@@ -3,7 +3,7 @@
 //!
 //! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached
 //! in one byte. The state depends only on the geometry, not on the order of rays. The cache does not change
-//! the results of [`World::find_coincident_surfaces`](super::World::find_coincident_surfaces).
+//! the results of [`World::find_coincident_surfaces_at`](super::World::find_coincident_surfaces_at).
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};

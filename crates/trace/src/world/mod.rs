@@ -204,7 +204,7 @@ impl World {
         }
     }
 
-    /// Whether a material is textured; see [`Material::is_textured`].
+    /// Whether a material is textured; see [`Material::needs_uvs_or_tangents`].
     #[inline(always)]
     pub fn material_needs_uvs_or_tangents(&self, material: usize) -> bool {
         self.textured[material]

@@ -111,7 +111,7 @@ impl Perform for InputPerformer {
             b'\t' => self.push_decoded_key(KeyCode::Tab, KeyModifiers::NONE),
             0 => self.push_decoded_key(KeyCode::Char(' '), KeyModifiers::CONTROL),
             1..=0x1a => {
-                self.push_decoded_key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL)
+                self.push_decoded_key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL);
             }
             0x1c..=0x1f => {
                 self.push_decoded_key(KeyCode::Char(char::from(byte - 0x1c + b'4')), KeyModifiers::CONTROL);

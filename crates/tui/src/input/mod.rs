@@ -25,7 +25,7 @@ use super::event::{Event, RequiredEventSource};
 use crate::system::threads::spawn;
 
 /// Starts a thread that reads standard input. At the end of input, it reports the loss of
-/// [`EventSource::Keys`].
+/// [`RequiredEventSource::Keys`].
 ///
 /// # Errors
 /// The thread could not be created.

@@ -8,7 +8,7 @@
 //!
 //! Text is always exact. Intermediate previews trade precision for size (except on a fast terminal, where
 //! they are exact), and cells unaffected by an edit are not redrawn. The final preview is accurate to 1/255.
-//! [`advise`] decides which previews are worth drawing at the connection's speed.
+//! [`advise_on_preview`] decides which previews are worth drawing at the connection's speed.
 
 mod candidates;
 mod cell;

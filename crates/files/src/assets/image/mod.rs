@@ -260,10 +260,10 @@ pub fn load_embedded(
     decode_source(OpenImage::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
-/// Like [`read_dimensions`], but for an embedded image.
+/// Like [`read_dimensions_and_decoded_bytes`], but for an embedded image.
 ///
 /// # Errors
-/// Same as [`read_dimensions`].
+/// Same as [`read_dimensions_and_decoded_bytes`].
 pub fn read_embedded_dimensions(
     image: EmbeddedImage<'_>,
     encoding: ImageEncoding,

@@ -77,7 +77,7 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
 /// are black or have fewer samples. `tell` is called with the number of finished tiles and the film.
 ///
 /// # Errors
-/// Same as [`check`]. Also fails if parts are missing, a part is inconsistent, or the work is cancelled.
+/// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work is cancelled.
 pub fn merge_into_film(
     parts: &[PartFile],
     is_partial: bool,

@@ -98,7 +98,7 @@ pub enum ImageInfoReadError {
 /// Reads the properties of a part, a checkpoint, or an image in any format that glimt can write.
 ///
 /// # Errors
-/// [`ImageInfoError`].
+/// [`ImageInfoReadError`].
 pub fn read_image_info(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
     let unreadable = |why: String| ImageInfoReadError::Unreadable { path: path.to_owned(), why };
     let (opened, _) = match file::open_regular_file(path) {
@@ -108,7 +108,7 @@ pub fn read_image_info(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
     };
     let start = read_start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
     if start.starts_with(&PART_MAGIC) {
-        // `read_part` opens the file again. Use only one descriptor at a time.
+        // `read_part_file_info` opens the file again. Use only one descriptor at a time.
         drop(opened);
         return read_part_file_info(path).map_err(unreadable);
     }

@@ -25,7 +25,7 @@ pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
         (&mut file).take(length.min(kept).into()).read_to_end(&mut content).ok()?;
         match &kind {
             b"VP8X" => {
-                info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?))
+                info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?));
             }
             b"VP8L" if info.size.is_none() => info.size = Some(lossless_size(&content)?),
             b"XMP " => add_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),

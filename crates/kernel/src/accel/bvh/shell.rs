@@ -102,7 +102,7 @@ impl SphericalShell {
     }
 }
 
-/// A primitive or subtree reported by [`Bvh::visit_overlapping_surfaces`].
+/// A primitive or subtree reported by [`Bvh::visit_surfaces_overlapping_box`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OverlappingItem {
     /// A primitive whose surface may intersect the box.

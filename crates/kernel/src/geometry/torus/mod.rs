@@ -119,7 +119,7 @@ impl Torus {
     }
 
     /// Surface point for a direction from the axis and a direction from the circle, as returned by
-    /// [`Torus::circle_directions`].
+    /// [`Torus::directions_from_axis_and_circle`].
     fn surface_from_directions(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;

@@ -168,7 +168,7 @@ impl<B: Bxdf> TestSurface<B> {
         all
     }
 
-    /// Samples on either side with the same random numbers as [`TestSurface::sample_directions`].
+    /// Samples on either side with the same random numbers as [`TestSurface::sample_direction`].
     pub fn sample_either_side(
         &self,
         side: u32,

@@ -103,16 +103,16 @@ macro_rules! kinds {
             }
 
             /// Collects all textures by use.
-            fn collect_textures(&self) -> TextureCollector<'_> {
-                let mut textures = TextureCollector::default();
+            fn collect_textures(&self) -> MaterialTextureCollector<'_> {
+                let mut textures = MaterialTextureCollector::default();
                 match self { $(Self::$kind(material) => { material.look_up_parameters(&mut textures); }),+ }
                 textures
             }
 
             /// [`BxdfMaterial::packet_color_parameter`].
             #[inline]
-            fn packet_color_parameter(&self) -> Option<&ColorParameter> {
-                match self { $(Self::$kind(material) => material.packet_color_parameter()),+ }
+            fn packet_color_parameter(&self) -> Option<&ColorOrTexture> {
+                match self { $(Self::$kind(material) => material.color_for_packet_lookup()),+ }
             }
 
             /// [`BxdfMaterial::is_anisotropic`].
@@ -137,12 +137,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`facing_normal`].
+            /// [`lobe_shading_normal`].
             #[inline(always)]
             pub fn facing_normal(&self, normal: Vec3, wo: Vec3) -> Vec3 {
                 match self {
-                    $(Self::$kind(_) => facing_normal::<$bxdf>(normal, wo),)+
-                    $(Self::$part(_) => facing_normal::<$part_bxdf>(normal, wo)),+
+                    $(Self::$kind(_) => lobe_shading_normal::<$bxdf>(normal, wo),)+
+                    $(Self::$part(_) => lobe_shading_normal::<$part_bxdf>(normal, wo)),+
                 }
             }
 
@@ -219,7 +219,7 @@ macro_rules! kinds {
                 i: usize,
                 bsdf: &BxdfPoint,
                 shown: LobeFilter,
-                directions: &SurfaceDirections,
+                directions: &ShadingGeometry,
             ) {
                 $(if let (Self::$kind(row), BxdfPoint::$kind(bsdf)) = (&mut *self, bsdf) {
                     row.set_bsdf(i, bsdf, shown, directions);
@@ -240,7 +240,7 @@ macro_rules! kinds {
             ) -> u32 {
                 $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
                     let point = material.look_up_parameters(&mut WhiteLookup);
-                    let texture = material.packet_color_parameter().and_then(ColorParameter::texture);
+                    let texture = material.color_for_packet_lookup().and_then(ColorOrTexture::texture);
                     return row.set_lanes_to_material(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0
@@ -270,8 +270,8 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
                 match self {
-                    $(Self::$kind(row) => row.dispatch_f(wi, simd),)+
-                    $(Self::$part(row) => row.dispatch_f(wi, simd)),+
+                    $(Self::$kind(row) => row.f_out_of_line(wi, simd),)+
+                    $(Self::$part(row) => row.f_out_of_line(wi, simd)),+
                 }
             }
 
@@ -302,17 +302,17 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> Vec3x16 {
                 match self {
-                    $(Self::$kind(row) => row.dispatch_sample(lobes, normals, choices, u, simd),)+
-                    $(Self::$part(row) => row.dispatch_sample(lobes, normals, choices, u, simd)),+
+                    $(Self::$kind(row) => row.sample_outlined(lobes, normals, choices, u, simd),)+
+                    $(Self::$part(row) => row.sample_outlined(lobes, normals, choices, u, simd)),+
                 }
             }
 
-            /// [`BxdfPacket::has_narrow_lobes`].
+            /// [`BxdfPacket::any_has_narrow_lobe`].
             #[inline(always)]
             pub fn has_narrow_lobes(&self) -> bool {
                 match self {
-                    $(Self::$kind(row) => row.has_narrow_lobes(),)+
-                    $(Self::$part(row) => row.has_narrow_lobes()),+
+                    $(Self::$kind(row) => row.any_has_narrow_lobe(),)+
+                    $(Self::$part(row) => row.any_has_narrow_lobe()),+
                 }
             }
 

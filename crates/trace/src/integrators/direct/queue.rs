@@ -113,13 +113,13 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
+    /// Like [`DirectLightVertexQueue::add_arrived_light`], for paths with consecutive slots.
     pub fn flush_consecutive_to_accumulator(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_consecutive(first, &self.arrived);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
-    /// [`DirectLightQueue::commit_spare_batch`] or discards it.
+    /// [`DirectLightVertexQueue::commit_spare_vertices`] or discards it.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::empty());

@@ -116,7 +116,7 @@ impl TileContext<'_> {
         (Some([arrived, near]), far)
     }
 
-    /// The surface that separates two media at a hit. Requires the result of [`TileContext::find_crossing`].
+    /// The surface that separates two media at a hit. Requires the result of [`TileContext::find_interface_crossing`].
     /// `None` if both media are air.
     pub fn boundary(
         &self,

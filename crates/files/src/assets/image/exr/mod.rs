@@ -280,7 +280,7 @@ impl ChannelRow<'_> {
         match self.sample_type {
             SampleType::F32 => {
                 for_each_raw_sample(self.bytes, skipped, targets, |at, bytes| {
-                    put(at, f32::from_ne_bytes(bytes))
+                    put(at, f32::from_ne_bytes(bytes));
                 });
             }
             SampleType::F16 => {

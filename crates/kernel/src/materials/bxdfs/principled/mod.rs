@@ -172,7 +172,7 @@ impl EmissionCoat {
     }
 }
 
-/// The two tables of [`SchlickAlbedo`].
+/// The two tables of [`SchlickAlbedoPair`].
 fn build_schlick_albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     let alpha = |roughness: f32| microfacet::alphas_from_roughness(roughness, 0.0)[0];
     let weight = |cosine: f64| {

@@ -17,7 +17,7 @@ use crate::geometry::{Ray, ShapeHit};
 use any::any_hit_if_coherent;
 use closest::closest_hit_if_coherent;
 
-/// [`try_closest_hit()`] with AVX2.
+/// [`closest_hit_if_coherent()`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn try_closest_hit_avx2(
     tree: &WideBvh,
@@ -30,7 +30,7 @@ pub fn try_closest_hit_avx2(
     closest_hit_if_coherent(tree, rays, ends, hits, like, like8)
 }
 
-/// [`try_any_hit()`] with AVX2.
+/// [`any_hit_if_coherent()`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn try_any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
@@ -38,7 +38,7 @@ pub fn try_any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[O
     any_hit_if_coherent(tree, rays, ends, except, like, like8)
 }
 
-/// [`try_closest_hit()`] with AVX-512.
+/// [`closest_hit_if_coherent()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn try_closest_hit_avx512(
     tree: &WideBvh,
@@ -51,7 +51,7 @@ pub fn try_closest_hit_avx512(
     closest_hit_if_coherent(tree, rays, ends, hits, like, like8)
 }
 
-/// [`try_any_hit()`] with AVX-512.
+/// [`any_hit_if_coherent()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn try_any_hit_avx512(
     tree: &WideBvh,
