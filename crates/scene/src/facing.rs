@@ -75,7 +75,7 @@ fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DV
         let of = |mesh: &MeshReference| {
             Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))
         };
-        shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
+        shape.as_mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
     })
 }
 

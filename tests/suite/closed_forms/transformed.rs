@@ -237,7 +237,7 @@ fn transformed_planes_keep_their_texture_coordinates() {
     let plane = Shape::Plane { point: v(0.0, 1.0, 0.0), normal: DVec3::Y };
     for mirror in [1.0, -1.0] {
         let matrix = map(v(2.0, 0.3, 0.0), v(0.2, 0.5, 0.0), v(0.0, 0.4, 3.0) * mirror, v(0.0, 1.0, 0.0));
-        let transformed = matrix.transform();
+        let transformed = matrix.to_transform();
         let geometry = scene().shape(plane.clone().transformed(matrix), matte(0.5)).world().geometry;
         for (x, z) in [(0.25, 0.5), (-3.5, 1.25), (100.75, -60.5)] {
             let at = transformed.point(v(x, 1.0, -z));

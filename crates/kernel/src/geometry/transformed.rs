@@ -66,7 +66,7 @@ impl TransformedShape {
 
     /// Surface point at a hit.
     pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let local = self.shape.surface_point(&self.ray_to_local(ray), hit);
+        let local = self.shape.surface_point_at_hit(&self.ray_to_local(ray), hit);
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         let [dpdu, dpdv] = [local.dpdu, local.dpdv].map(|edge| self.to_world.vector(edge.as_dvec3()));
         let SurfacePoint { uv, barycentric, .. } = local;
@@ -263,7 +263,7 @@ pub(crate) mod tests {
             let direction = (to - from).as_vec3().as_dvec3();
             let ray = RayF64 { origin: from, direction, t_max: f64::INFINITY };
             let Some(hit) = shape.intersect(&ray) else { continue };
-            let surface = shape.surface_point(&ray, &hit);
+            let surface = shape.surface_point_at_hit(&ray, &hit);
             let local = own.to_world.inverse_point(surface.point.as_dvec3());
             let gradient = own.to_world.normal(local * 2.0);
             let distance = (local.length_squared() - 1.0).abs() / gradient.length();
@@ -313,7 +313,7 @@ pub(crate) mod tests {
             let hit = torus.intersect(&ray);
             assert_eq!(hit, same.intersect(&ray));
             if let Some(hit) = hit {
-                let [a, b] = [&torus, &same].map(|shape| shape.surface_point(&ray, &hit));
+                let [a, b] = [&torus, &same].map(|shape| shape.surface_point_at_hit(&ray, &hit));
                 let parts = |at: SurfacePoint| (at.point, at.normal, at.uv, at.dpdu, at.dpdv);
                 assert_eq!(parts(a), parts(b));
                 count += 1;

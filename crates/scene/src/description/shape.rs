@@ -203,7 +203,7 @@ pub struct AffineMap {
 
 impl AffineMap {
     /// Returns the map and its inverse.
-    pub fn transform(&self) -> Transform {
+    pub fn to_transform(&self) -> Transform {
         let [x, y, z] = self.linear;
         Transform::from_mat3_translation(DMat3::from_cols(x, y, z), self.translate)
     }
@@ -230,7 +230,7 @@ impl MeshTransform {
             Self::Steps { scale, rotate, translate } => {
                 Transform::scale_rotate_translate(scale, rotate, translate)
             }
-            Self::Matrix(map) => map.transform(),
+            Self::Matrix(map) => map.to_transform(),
         }
     }
 }
@@ -249,7 +249,7 @@ impl Shape {
     /// same texture coordinates, returns this shape, which is faster to trace.
     #[must_use]
     pub fn transformed(self, matrix: AffineMap) -> Self {
-        let map = matrix.transform();
+        let map = matrix.to_transform();
         let (at, along) = (|point: DVec3| map.point(point), |vector: DVec3| map.vector(vector));
         let flips = map.flips_handedness();
         match (self, matrix.uniform_scale()) {
@@ -282,7 +282,7 @@ impl Shape {
     }
 
     /// Lowers the shape, with coordinates relative to `origin`.
-    pub fn lowered(&self, origin: DVec3) -> LoweredShape<'_> {
+    pub fn to_traced_shape_relative_to(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
         LoweredShape::Shape(match *self {
             Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center: at(center), radius }),
@@ -310,9 +310,9 @@ impl Shape {
             Self::Transformed { ref shape, ref matrix } => {
                 // The shape's own coordinates are relative to a point near it.
                 let near = shape.representative_point().unwrap_or_default();
-                match shape.lowered(near) {
+                match shape.to_traced_shape_relative_to(near) {
                     LoweredShape::Shape(own) => geometry::Shape::Transformed(Box::new(
-                        TransformedShape::new(own, matrix.transform().relative_to_origins(near, origin)),
+                        TransformedShape::new(own, matrix.to_transform().relative_to_origins(near, origin)),
                     )),
                     mesh @ LoweredShape::Mesh(_) => return mesh,
                 }
@@ -338,7 +338,7 @@ impl Shape {
     }
 
     /// Returns the mesh instance. `None` for other shapes.
-    pub fn mesh(&self) -> Option<&MeshReference> {
+    pub fn as_mesh(&self) -> Option<&MeshReference> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
@@ -381,7 +381,7 @@ impl Shape {
             Self::Cone { base, .. } => Some(base),
             Self::Mesh(_) => None,
             Self::Transformed { ref shape, ref matrix } => {
-                Some(matrix.transform().point(shape.representative_point()?))
+                Some(matrix.to_transform().point(shape.representative_point()?))
             }
         }
     }

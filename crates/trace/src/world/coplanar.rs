@@ -283,7 +283,7 @@ pub(super) fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> boo
 /// Whether an object may have emissive faces.
 fn can_object_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
-    match (object.material, object.shape.mesh()) {
+    match (object.material, object.shape.as_mesh()) {
         (Some(material), _) => scene.materials[material].emits(),
         (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(FileMaterial::emits),
         (None, None) => false,
@@ -302,7 +302,7 @@ fn visit_flat_faces(
     let material = object.material.map(|index| &scene.materials[index]);
     let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
     let (shape, matrix) = object.shape.untransformed();
-    let map = matrix.map(|matrix| matrix.transform().relative_to_origins(DVec3::ZERO, origin));
+    let map = matrix.map(|matrix| matrix.to_transform().relative_to_origins(DVec3::ZERO, origin));
     // The map also translates the origin.
     let origin = if map.is_some() { DVec3::ZERO } else { origin };
     let mut visit = |face: Option<FlatFace>, emits: Option<EmissionSides>| {
