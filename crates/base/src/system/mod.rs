@@ -34,11 +34,11 @@ pub fn describe_error(error: &Error) -> String {
     }
 }
 
-/// Advice for errors from [`is_out_of_files`].
+/// Advice for errors from [`is_too_many_open_files`].
 pub const RAISE_FILE_LIMIT: &str = "raise the limit on open files (ulimit -n)";
 
 /// Whether too many files are open in the process or the system. Opening another file would also fail.
-pub fn is_out_of_files(error: &Error) -> bool {
+pub fn is_too_many_open_files(error: &Error) -> bool {
     matches!(error.raw_os_error(), Some(nix::libc::EMFILE | nix::libc::ENFILE))
 }
 

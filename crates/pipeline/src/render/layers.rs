@@ -6,7 +6,7 @@
 
 use super::film_state::FilmState;
 use super::scheduler::{RenderStageInputs, Scheduler};
-use crate::film::{ConvergenceModel, Quantity, RadianceImage};
+use crate::film::{ConvergenceModel, FilmQuantity, RadianceImage};
 use crate::integrators::ViewMode;
 use crate::keys;
 use crate::math::Vec3;
@@ -38,7 +38,7 @@ impl OutputLayer {
             Self::Normal => (LayerSource::View(ViewMode::Normal), DIRECTION),
             Self::Depth => (LayerSource::View(ViewMode::Depth), DISTANCE),
             Self::Variance => (LayerSource::Film(squared_standard_error_image), NUMBER),
-            Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
+            Self::Samples => (LayerSource::Film(|state| state.film.image(FilmQuantity::Samples)), NUMBER),
             Self::Ambient => (LayerSource::View(ViewMode::Ambient), COLOR),
             Self::Diffuse => (LayerSource::View(ViewMode::Diffuse), COLOR),
             Self::Specular => (LayerSource::View(ViewMode::Specular), COLOR),
@@ -58,7 +58,7 @@ impl OutputLayer {
 
 /// Returns the squared standard error of each pixel's mean luminance.
 fn squared_standard_error_image(state: &FilmState) -> RadianceImage {
-    let mut image = state.film.image(Quantity::Error);
+    let mut image = state.film.image(FilmQuantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
 }
@@ -122,7 +122,7 @@ fn render_view_at_image_samples(
     );
     let mut state = FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None)
         .map_err(AbortReason::work_failure)?;
-    state.goals = picture.goals_at_current_samples();
+    state.goals = picture.goals_from_current_samples();
     let sink = rendering.sink.for_progress_range(progress);
     let rendering = RenderStageInputs {
         tracer: Tracer { settings: &plan.settings, ..rendering.tracer },
@@ -142,7 +142,7 @@ fn render_view_at_image_samples(
     let mut scheduler = Scheduler::new(&mut state, &rendering);
     scheduler.changed = if view == ViewMode::Normal { Some(&signed) } else { None };
     scheduler.run()?;
-    Ok(state.film.image(Quantity::Radiance))
+    Ok(state.film.image(FilmQuantity::Radiance))
 }
 
 #[cfg(test)]

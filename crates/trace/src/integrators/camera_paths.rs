@@ -88,7 +88,7 @@ pub fn trace_camera_paths(
     }
     // Compute direct lighting at the vertices, and add it to the accumulator.
     wavefront.add_direct_light()?;
-    wavefront.direct.flush_consecutive_to_accumulator(slots.start, &mut wavefront.accumulator);
+    wavefront.direct.add_arrived_light_consecutive(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -107,7 +107,7 @@ pub fn trace_camera_paths(
         }
         let slots: &[PathRay] = rays;
         wavefront.add_direct_light()?;
-        wavefront.direct.add_arrived_light(
+        wavefront.direct.accumulate_arrived_light(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
         );
@@ -265,12 +265,12 @@ impl CameraWavefront<'_, '_> {
                 self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
-                let surface = packet.surface_unless_plain(self.surfaces, lane);
+                let surface = packet.scalar_shaded_surface(self.surfaces, lane);
                 walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
-                self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
+                self.add_infinite_light(&path, tile.infinite_light_with_precomputed_sky(sky, &path));
             }
         }
     }
@@ -303,7 +303,7 @@ impl CameraWavefront<'_, '_> {
                     set_bit_lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?)))
                 {
                     let cone = packet.path(tile, &rays, lane).cone.propagated_by(hit.shape.t);
-                    self.direct.store_cone(rays.queue_index(lane), cone);
+                    self.direct.store_ray_cone(rays.queue_index(lane), cone);
                 }
             }
         }
@@ -480,7 +480,7 @@ impl CameraWavefront<'_, '_> {
             }
             return;
         }
-        let is_colored = self.accumulator.aov.has_surface_colors_applied();
+        let is_colored = self.accumulator.aov.applies_surface_colors();
         let mut bsdf =
             if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
@@ -580,7 +580,7 @@ impl CameraWavefront<'_, '_> {
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let is_colored = self.accumulator.aov.has_surface_colors_applied();
+        let is_colored = self.accumulator.aov.applies_surface_colors();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
@@ -603,7 +603,7 @@ impl CameraWavefront<'_, '_> {
         if both || is_coat {
             let lookups = &mut self.counters.texture_lookups;
             let specular =
-                coated.specular_factor(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+                coated.specular_tint(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }

@@ -36,7 +36,7 @@ use crate::film::{NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_mode;
+pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
 use memory::ThreadMemory;
 pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};

@@ -286,8 +286,8 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.dispatch_pdf(lobes, normals, wi, values, simd),)+
-                    $(Self::$part(row) => row.dispatch_pdf(lobes, normals, wi, values, simd)),+
+                    $(Self::$kind(row) => row.pdf_out_of_line(lobes, normals, wi, values, simd),)+
+                    $(Self::$part(row) => row.pdf_out_of_line(lobes, normals, wi, values, simd)),+
                 }
             }
 
@@ -395,7 +395,7 @@ impl NonSpecular {
     }
 
     /// The BSDF, if the material has no textures.
-    pub fn as_constant(&self) -> Option<BxdfPoint> {
+    pub fn as_untextured(&self) -> Option<BxdfPoint> {
         self.textures().next().is_none().then(|| self.with_white_textures())
     }
 

@@ -94,7 +94,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Stores the ray cone at a path's vertex.
-    pub fn store_cone(&mut self, place: u32, cone: RayCone) {
+    pub fn store_ray_cone(&mut self, place: u32, cone: RayCone) {
         if let Some(own) = self.cones.get_mut(place as usize) {
             *own = cone;
         }
@@ -102,7 +102,7 @@ impl DirectLightVertexQueue {
 
     /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
     /// for a queue index and whether the camera sees the vertex.
-    pub fn add_arrived_light(
+    pub fn accumulate_arrived_light(
         &mut self,
         path: impl Fn(usize) -> (u32, bool),
         accumulator: &mut Accumulator<'_>,
@@ -113,9 +113,9 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Like [`DirectLightVertexQueue::add_arrived_light`], for paths with consecutive slots.
-    pub fn flush_consecutive_to_accumulator(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_direct_consecutive(first, &self.arrived);
+    /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
+    pub fn add_arrived_light_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+        accumulator.add_direct_to_consecutive_slots(first, &self.arrived);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
@@ -161,7 +161,7 @@ impl DirectLightVertexQueue {
         aov: LightAov,
         sides: ShadingSides<'_>,
     ) {
-        self.store_cone(lit.place, lit.vertex.cone);
+        self.store_ray_cone(lit.place, lit.vertex.cone);
         let interiors = self.interior_lists.push_list(lit.interiors);
         let far_side = match sides {
             ShadingSides::OneSide { .. } => None,
@@ -226,7 +226,7 @@ impl DirectLightVertexQueue {
         let mut rays = DirectLightCounters::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
         let together =
-            if tile.world.lights.sampler_for_mode(tile.behavior.receivers).is_some() { ROWS } else { 1 };
+            if tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
@@ -312,7 +312,7 @@ impl DirectLightVertexQueue {
             // Paths in microfacet lobes do not account for lights.
             CompetingTechnique::from_sharp_vertex_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
-            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobes(tile, aov) & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobe_mask(tile, aov) & request.used)
         }
     }
 
@@ -349,7 +349,7 @@ impl DirectLightVertexQueue {
         let weighed =
             SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler_for_mode(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })

@@ -90,7 +90,7 @@ impl Accumulator<'_> {
     }
 
     /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
-    pub fn add_direct_consecutive(&mut self, first: u32, contributions: &[Vec3]) {
+    pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }

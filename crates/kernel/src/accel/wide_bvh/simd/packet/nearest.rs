@@ -28,7 +28,7 @@ impl<V: SimdVector> NearestHits<V> {
     /// Updates the rays whose hit on a triangle is nearer than their best hit, or equally near with a lower
     /// index. Returns the mask of the updated rays.
     #[inline(always)]
-    pub fn test_triangle(
+    pub fn update_with_triangle(
         &mut self,
         packet: &SimdRayPacket<V>,
         pack: &TrianglePack,
@@ -72,7 +72,7 @@ impl<V: SimdVector> NearestHits<V> {
         taken
     }
 
-    /// [`NearestHits::test_triangle`] for one ray, using the scalar test.
+    /// [`NearestHits::update_with_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
     fn test_triangle_scalar(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
