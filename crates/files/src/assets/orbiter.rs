@@ -32,7 +32,7 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// `r` default to 0, and `f` to 45 degrees at 1024 × 640 pixels.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], or [`AssetError::MalformedTile`] with the line if a letter is unknown, the number
+/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line if a letter is unknown, the number
 /// of values is wrong, or a value is not finite or out of range.
 pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();

@@ -284,7 +284,7 @@ impl GltfFile {
     /// Checks that an image exists and has a valid header.
     ///
     /// # Errors
-    /// [`AssetError::MalformedTile`] with the image's index, or [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Cancelled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {

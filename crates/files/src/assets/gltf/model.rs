@@ -28,7 +28,7 @@ impl GltfFile {
     /// Converts the file's default scene. Falls back to the first scene, then to all nodes.
     ///
     /// # Errors
-    /// [`AssetError::MalformedTile`] with the location in the JSON.
+    /// [`AssetError::Malformed`] with the location in the JSON.
     pub fn convert_scene(&self, token: &CancelToken) -> Result<ModelScene, AssetError> {
         let mut walk = SceneWalk {
             container: self,

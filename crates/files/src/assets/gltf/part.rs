@@ -53,7 +53,7 @@ impl GltfFile {
     /// Builds a part as a mesh without materials.
     ///
     /// # Errors
-    /// [`AssetError::MalformedTile`] with the location in the JSON, or [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the location in the JSON, or [`AssetError::Cancelled`].
     pub fn build_part(
         &self,
         part: usize,

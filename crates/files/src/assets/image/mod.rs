@@ -159,7 +159,7 @@ impl Default for ImageLimits {
 /// 16-bit and float samples are converted to linear floats. Progress is measured in bytes of the file.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], [`AssetError::MalformedTile`] if the content contradicts the header or exceeds the
+/// [`AssetError::Unreadable`], [`AssetError::Malformed`] if the content contradicts the header or exceeds the
 /// limits, or [`AssetError::Cancelled`].
 pub fn load(
     path: &Path,

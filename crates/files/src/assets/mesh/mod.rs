@@ -39,7 +39,7 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 ///
 /// # Errors
 /// - [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB.
-/// - [`AssetError::MalformedTile`] with the line (text) or the face (binary) if the file is invalid or has no
+/// - [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
 ///   usable face.
 /// - [`AssetError::Cancelled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {

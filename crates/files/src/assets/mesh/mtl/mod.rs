@@ -75,7 +75,7 @@ impl MtlMaterial {
 /// Reads an MTL file.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], or [`AssetError::MalformedTile`] with the line.
+/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, AssetError> {
     let quiet = Monitor { progress: &crate::control::ignore_progress, ..monitor };
     let bytes = read::read_text(path, FILE_LIMIT, quiet)?;
