@@ -62,7 +62,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Ok(args) => args,
         Err(error) => return report_parse_error(&error, &arguments),
     };
-    let console = Console::new(args.color());
+    let console = Console::new(args.color_depth_choice());
     let exit = match args.command {
         Some(Subcommand::Check { scene, sets, json, .. }) => {
             commands::check::run(&scene, &sets, json, &console)

@@ -26,7 +26,7 @@ impl Film {
     /// Sets the summation order for an empty film.
     ///
     /// # Errors
-    /// [`FilmError::Memory`] if there is not enough memory for the block sums.
+    /// [`FilmCreationError::Memory`] if there is not enough memory for the block sums.
     pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmCreationError> {
         let (crop, kept) = (self.crop_rect(), blocks.kept_block_count());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;

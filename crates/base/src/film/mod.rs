@@ -1,6 +1,6 @@
 //! Films (sums of samples), tone mapping and finished images.
 //!
-//! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance`].
+//! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance_image`].
 //! [`Previewer`] scales the film to screen size during rendering. [`tone::tone_map_to_8_bits`] converts the radiance or
 //! a preview to a [`Srgb8Image`].
 //!

@@ -158,7 +158,7 @@ impl Film {
     }
 
     /// Noise in one half of every cell in a tile. `None` under the same conditions as
-    /// [`Film::cell_half_noise`].
+    /// [`Film::half_cell_noise`].
     pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {

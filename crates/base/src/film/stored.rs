@@ -22,7 +22,7 @@ impl StoredTile {
     /// Reads a tile of `area` pixels.
     ///
     /// # Errors
-    /// [`Malformed`] if there are too few or too many bytes, or invalid counts.
+    /// [`MalformedTile`] if there are too few or too many bytes, or invalid counts.
     pub fn read(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
         let mut from = ByteReader(bytes);
         let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
@@ -51,7 +51,7 @@ impl StoredTile {
     /// Adds one block from another tile to the blocks accumulated in this tile.
     ///
     /// # Errors
-    /// [`Malformed`] if the tiles differ in size or the block does not exist.
+    /// [`MalformedTile`] if the tiles differ in size or the block does not exist.
     pub fn add_block_from(&mut self, of: &Self, block: usize) -> Result<(), MalformedTile> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
@@ -123,7 +123,7 @@ impl Film {
     /// Replaces a tile with a deserialized tile.
     ///
     /// # Errors
-    /// [`Malformed`] if the tile does not fit this film.
+    /// [`MalformedTile`] if the tile does not fit this film.
     pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), MalformedTile> {
         let area = self.tile_rect(tile).ok_or(MalformedTile)?.area();
         let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;

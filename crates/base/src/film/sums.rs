@@ -242,7 +242,7 @@ impl Film {
     /// Creates an empty film for an image of this size, or for the part covered by `crop`.
     ///
     /// # Errors
-    /// [`FilmError`] if the crop is outside the image, or if there is not enough memory for the sums and the
+    /// [`FilmCreationError`] if the crop is outside the image, or if there is not enough memory for the sums and the
     /// finished image.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmCreationError> {
         Self::with_memory_limit(u64::MAX, width, height, crop)
@@ -251,7 +251,7 @@ impl Film {
     /// Like [`Film::new`], but uses at most `most_bytes` bytes of memory.
     ///
     /// # Errors
-    /// [`FilmError`] as in [`Film::new`].
+    /// [`FilmCreationError`] as in [`Film::new`].
     pub fn with_memory_limit(
         most_bytes: u64,
         width: u32,

@@ -34,7 +34,7 @@ pub fn describe_error(error: &Error) -> String {
     }
 }
 
-/// Advice for errors from [`is_out_of_files`].
+/// Advice for errors from [`is_too_many_open_files`].
 pub const RAISE_FILE_LIMIT: &str = "raise the limit on open files (ulimit -n)";
 
 /// Whether too many files are open in the process or the system. Opening another file would also fail.

@@ -144,10 +144,10 @@ pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputE
     Ok(format)
 }
 
-/// Like [`check_image_target_read_only`], but for any type of file.
+/// Like [`check_image_target_without_writing`], but for any type of file.
 ///
 /// # Errors
-/// Same as [`check_image_target_read_only`], but the extension is not checked.
+/// Same as [`check_image_target_without_writing`], but the extension is not checked.
 pub fn check_file_target_read_only(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve_writable(path).map(drop)
 }

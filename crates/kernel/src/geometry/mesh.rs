@@ -16,7 +16,7 @@ pub struct TriangleMesh {
     /// Vertex texture coordinates, or empty. v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
     /// Normal group of each vertex. The groups determine which vertices share a computed normal. If empty,
-    /// every vertex has its own normal in the group [`VertexNormalGroup::BY_ANGLE`].
+    /// every vertex has its own normal in the group [`VertexNormalSharing::BY_ANGLE`].
     pub normal_groups: Vec<VertexNormalSharing>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,

@@ -348,7 +348,7 @@ impl Shape {
             }
             Self::Cone(cone) => LocalGeometry::curved_surface_at_distance(cone.distance_from_point(point)),
             Self::Torus(torus) => LocalGeometry::curved_surface_at_distance(torus.distance_from_point(point)),
-            Self::Transformed(transformed) => transformed.local_geometry(point),
+            Self::Transformed(transformed) => transformed.geometry_near(point),
         }
     }
 

@@ -65,7 +65,7 @@ impl TransformedShape {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let local = self.shape.surface_point_at_hit(&self.ray_to_local(ray), hit);
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         let [dpdu, dpdv] = [local.dpdu, local.dpdv].map(|edge| self.to_world.vector(edge.as_dvec3()));
@@ -143,7 +143,7 @@ impl TransformedShape {
     }
 
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
-    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
+    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
             LocalSurfaceShape::Flat(extent) => {
                 let normal = self.to_world.normal(ground.normal);

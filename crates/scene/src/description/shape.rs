@@ -225,7 +225,7 @@ impl Fingerprinted for AffineMap {
 
 impl MeshTransform {
     /// Returns the transform.
-    pub fn transform(&self) -> Transform {
+    pub fn to_transform(&self) -> Transform {
         match *self {
             Self::Steps { scale, rotate, translate } => {
                 Transform::scale_rotate_translate(scale, rotate, translate)

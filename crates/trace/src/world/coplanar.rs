@@ -351,7 +351,7 @@ fn visit_flat_faces(
         }
         Shape::Mesh(ref mesh) => {
             let loaded = meshes[mesh.file];
-            let transform = mesh.placed.transform();
+            let transform = mesh.placed.to_transform();
             let own = |triangle: usize| {
                 let material = *loaded.mesh.materials.get(triangle)? as usize;
                 loaded.materials.get(material).filter(|own| own.emits()).map(|_| EmissionSides::Front)

@@ -404,7 +404,7 @@ fn lower_shape(
         LoweredShape::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
-    let transform = mesh.placed.transform().relative_to_origins(tree.loaded().mesh.origin, origin);
+    let transform = mesh.placed.to_transform().relative_to_origins(tree.loaded().mesh.origin, origin);
     let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;

@@ -8,7 +8,7 @@
 //!
 //! Text is always exact. Intermediate previews trade precision for size (except on a fast terminal, where
 //! they are exact), and cells unaffected by an edit are not redrawn. The final preview is accurate to 1/255.
-//! [`advise_on_preview`] decides which previews are worth drawing at the connection's speed.
+//! [`pace_preview`] decides which previews are worth drawing at the connection's speed.
 
 mod candidates;
 mod cell;
@@ -117,7 +117,7 @@ impl Painter {
         }
     }
 
-    /// Sets whether the terminal supports REP. See [`can_repeat`].
+    /// Sets whether the terminal supports REP. See [`terminal_supports_rep`].
     pub fn with_repeat_support(self, can_repeat: bool) -> Self {
         Self { can_repeat, ..self }
     }

@@ -24,7 +24,7 @@ const COMPARED: usize = 64;
 const BATCH: usize = 1 << 16;
 
 /// Computes a unit normal for each vertex, pointing to the front side of its faces. Each face is weighted by
-/// its angle at the vertex. Coincident vertices share a normal if they are in the same [`VertexNormalGroup`] and
+/// its angle at the vertex. Coincident vertices share a normal if they are in the same [`VertexNormalSharing`] and
 /// their normals differ by at most 45 degrees. If the face normals cancel out, the normal of one face is
 /// used. The result does not depend on the number of threads.
 ///

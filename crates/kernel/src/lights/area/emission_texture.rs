@@ -49,7 +49,7 @@ impl EmissionModulation {
         Self::new_with_coat(texture, opacity, None, chart)
     }
 
-    /// [`EmissionTexture::new`] under a clear coat.
+    /// [`EmissionModulation::new`] under a clear coat.
     pub fn new_with_coat(
         texture: Option<&Arc<Texture>>,
         opacity: Option<&Opacity>,
@@ -100,7 +100,7 @@ impl EmissionModulation {
             * self.coat_transmittance(point, primitive, direction)
     }
 
-    /// [`EmissionTexture::radiance_factor`] without the coat.
+    /// [`EmissionModulation::radiance_factor`] without the coat.
     pub fn radiance_factor_without_coat(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.lookup_texture_point(&self.chart.texture_point(point.as_dvec3(), primitive))
     }

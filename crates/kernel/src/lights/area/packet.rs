@@ -24,7 +24,7 @@ macro_rules! triangle_packet_of {
 pub(crate) use triangle_packet_of;
 
 impl AreaLight {
-    /// [`AreaLight::sample_untextured`] for the points in the mask `used`.
+    /// [`AreaLight::sample_without_texture_factor`] for the points in the mask `used`.
     #[inline(always)]
     pub fn sample_untextured_packet(
         &self,

@@ -286,8 +286,8 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.dispatch_pdf(lobes, normals, wi, values, simd),)+
-                    $(Self::$part(row) => row.dispatch_pdf(lobes, normals, wi, values, simd)),+
+                    $(Self::$kind(row) => row.pdf_out_of_line(lobes, normals, wi, values, simd),)+
+                    $(Self::$part(row) => row.pdf_out_of_line(lobes, normals, wi, values, simd)),+
                 }
             }
 

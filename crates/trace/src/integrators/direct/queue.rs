@@ -113,7 +113,7 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Like [`DirectLightVertexQueue::add_arrived_light`], for paths with consecutive slots.
+    /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
     pub fn add_arrived_light_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived);
     }

@@ -20,7 +20,7 @@ soa! {
     pub struct BatchVertex in VertexBatch {
         /// Origin of light samples and shadow rays.
         pub from: Vec3 = Vec3::ZERO,
-        /// Triangle at the origin; see [`VertexBatch::start_triangles`].
+        /// Triangle at the origin; see [`VertexBatch::ray_start_triangles`].
         pub start: u32 = Ray::NO_TRIANGLE,
         /// Horizon normal, if `has_horizon`. Light from behind it is occluded.
         pub horizon: Vec3 = Vec3::ZERO,
@@ -263,7 +263,7 @@ impl VertexBatch {
         starts
     }
 
-    /// Like [`VertexBatch::start_triangles`], for a single vertex.
+    /// Like [`VertexBatch::ray_start_triangles`], for a single vertex.
     pub fn ray_start_triangle(&self, i: usize, direction: Vec3) -> u32 {
         let normal = if self.has_facet & 1 << i != 0 { &self.facet } else { &self.normal };
         if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }

@@ -165,7 +165,7 @@ pub(super) fn triangles_relative_to<'a>(
     origin: DVec3,
 ) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     let own = &loaded.mesh;
-    let place = placed.placed.transform().relative_to_origins(own.origin, origin);
+    let place = placed.placed.to_transform().relative_to_origins(own.origin, origin);
     let corners = move |number: u32| own.corners(number).map(|corner| place.point(corner.as_dvec3()));
     (0..own.triangles.len() as u32).map(corners)
 }

@@ -194,7 +194,7 @@ impl GlassParts {
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
-        let place = placed.placed.transform().relative_to_origins(mesh.origin, self.origin);
+        let place = placed.placed.to_transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
             GlassTriangles::All => true,
@@ -237,7 +237,7 @@ fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     let of_mesh = |placed: &MeshReference| {
         let mesh = &meshes[placed.file].mesh;
         let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
-        placed.placed.transform().point(mesh.origin + first)
+        placed.placed.to_transform().point(mesh.origin + first)
     };
     shape.representative_point().or_else(|| shape.as_mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }

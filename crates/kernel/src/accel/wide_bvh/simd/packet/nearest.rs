@@ -72,7 +72,7 @@ impl<V: SimdVector> NearestHits<V> {
         taken
     }
 
-    /// [`NearestHits::test_triangle`] for one ray, using the scalar test.
+    /// [`NearestHits::update_with_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
     fn test_triangle_scalar(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
