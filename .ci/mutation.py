@@ -293,7 +293,7 @@ FAULTS = [
      FROSTED + "sheet_on_glass_transmits_into_the_glass"),
     ("a camera unaware of assembled solids", "world/camera_interior.rs", "material.filter(|_| ⟦votes > 0⟧)", "false",
      "closed_forms::bodies::camera_inside_split_solid_is_in_glass"),
-    ("photons unaware of assembled solids", "integrators/photons/emit.rs", "let material = ⟦world.material_around(body, point, emitter())⟧?;", "None",
+    ("photons unaware of assembled solids", "integrators/photons/emit.rs", "let material = ⟦world.enclosing_glass_material(body, point, emitter())⟧?;", "None",
      "closed_forms::bodies::light_inside_split_solid_emits_photons"),
     ("roughness of the earlier touching glass", "integrators/transport/crossing.rs",
      "let later = ⟦near.glass().max(far.glass())⟧?;", "near.glass().or(far.glass())",
