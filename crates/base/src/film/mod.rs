@@ -10,6 +10,7 @@
 mod block_sums;
 mod convergence;
 mod curves;
+mod layers;
 mod noise;
 mod pixel_subset;
 mod prepass;
@@ -101,6 +102,8 @@ pub struct TileSamples {
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobeSamples>,
+    /// Values of the film's layers, one list per layer, in the order of `radiance`.
+    pub layers: Vec<Vec<Vec3>>,
 }
 
 /// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other

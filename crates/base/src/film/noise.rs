@@ -232,7 +232,13 @@ mod tests {
             let radiance = values.iter().map(|&value| Vec3::splat(value)).collect();
             film.add_samples(
                 x / TILE_SIZE as usize,
-                &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: values.len() as u32,
+                    radiance,
+                    negative: None,
+                    layers: Vec::new(),
+                },
             );
         }
         film
@@ -324,7 +330,13 @@ mod tests {
             }
             film.add_samples(
                 tile,
-                &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: count,
+                    radiance,
+                    negative: None,
+                    layers: Vec::new(),
+                },
             );
         }
         (film, (square / f64::from(SIDE * SIDE)).sqrt() / truth)

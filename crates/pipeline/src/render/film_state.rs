@@ -432,7 +432,10 @@ mod tests {
         let pixels = SelectedPixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
-        state.film.add_samples(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
+        state.film.add_samples(
+            tile,
+            &TileSamples { pixels, samples: count, radiance, negative: None, layers: Vec::new() },
+        );
         let job = TileJob { tile, pixels, samples };
         state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
     }
