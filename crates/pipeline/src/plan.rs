@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::render::layers::sample_layers;
 use super::settings::{
     CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
 };
@@ -97,6 +98,7 @@ pub(super) fn resolve_plan(
             .photons
             .unwrap_or(scene.photons.enabled)
             .then(|| photon_settings(&scene.photons, (render.width, render.height))),
+        layers: sample_layers(&overrides.layers),
     };
     let threads = thread_count(overrides);
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);

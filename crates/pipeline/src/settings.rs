@@ -201,7 +201,8 @@ pub struct EffectiveSettings {
 
 impl EffectiveSettings {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
-        let RenderSettings { render, dof, view, photons } = settings.without_ineffective_settings();
+        let RenderSettings { render, dof, view, photons, layers: _ } =
+            settings.without_ineffective_settings();
         Self {
             width: render.width,
             height: render.height,

@@ -87,7 +87,7 @@ mod tests {
                         samples: count as u32,
                         radiance,
                         negative: None,
-                        layers: Vec::new(),
+                        layers: Default::default(),
                     },
                 );
                 rest = others;

@@ -1,36 +1,65 @@
 //! Layers: further quantities of the image's samples, such as the albedo at the first hit.
 
-use super::sums::{Film, FilmError, NegativeLobeSums, Tile, add_finite, can_allocate, tile_rect};
-use super::{RadianceImage, Rect};
+use super::sums::{
+    Film, FilmError, NegativeLobeSums, Tile, add_finite, can_allocate, pixel_index_in_rect, tile_rect,
+};
+use super::{RadianceImage, Rect, SelectedPixels};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
 
-/// Sums of a layer's values in one tile. The image's sample counts apply.
-#[derive(Debug, Default)]
-pub(super) struct LayerSums {
+/// Sums of the layers' values in some pixels, pixel by pixel. The image's sample counts apply.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LayerSums {
+    /// Number of layers.
+    pub(super) count: usize,
     pub(super) sums: Vec<DVec3>,
-    /// Sums of the samples in the filter's negative lobes, which `sums` excludes. Empty until there is such a
+    /// Sums of the samples in the filter's negative lobes, which `sums` excludes. Empty if there is no such
     /// sample.
     pub(super) negative: Vec<DVec3>,
 }
 
 impl LayerSums {
-    /// Resizes the sums to `area` pixels. Cannot fail because the film reserved the memory.
-    pub(super) fn resize(&mut self, area: usize) {
-        self.sums.resize(area, DVec3::ZERO);
+    /// Creates zero sums of `count` layers in `area` pixels.
+    pub fn zero(count: usize, area: usize) -> Self {
+        Self { count, sums: vec![DVec3::ZERO; count * area], negative: Vec::new() }
     }
 
-    /// Adds consecutive samples to a pixel. `is_negative` contains one flag per sample. Non-finite values are
-    /// treated as black.
-    pub(super) fn add(&mut self, index: usize, values: &[Vec3], is_negative: Option<&[bool]>) {
+    /// Adds consecutive samples of a layer to a pixel. `is_negative` contains one flag per sample if the filter
+    /// has negative lobes. Non-finite values are treated as black.
+    pub fn add(&mut self, (pixel, layer): (usize, usize), values: &[Vec3], is_negative: Option<&[bool]>) {
+        let place = pixel * self.count + layer;
         let Some(is_negative) = is_negative else {
-            add_finite(&mut self.sums[index], values);
+            add_finite(&mut self.sums[place], values);
             return;
         };
         self.negative.resize(self.sums.len(), DVec3::ZERO);
         for (value, &is_negative) in values.iter().zip(is_negative) {
             let sums = if is_negative { &mut self.negative } else { &mut self.sums };
-            add_finite(&mut sums[index], std::slice::from_ref(value));
+            add_finite(&mut sums[place], std::slice::from_ref(value));
+        }
+    }
+
+    /// Resizes the sums to `area` pixels. Cannot fail because the film reserved the memory.
+    pub(super) fn resize(&mut self, area: usize) {
+        self.sums.resize(area * self.count, DVec3::ZERO);
+    }
+
+    /// Replaces the sums of all pixels, without allocating memory for the sums outside negative lobes.
+    pub(super) fn replace_all(&mut self, other: &Self) {
+        if self.sums.len() == other.sums.len() {
+            self.sums.copy_from_slice(&other.sums);
+            self.negative.clone_from(&other.negative);
+        }
+    }
+
+    /// Replaces a pixel's sums with those of pixel `from` in `other`.
+    pub(super) fn replace_pixel(&mut self, pixel: usize, other: &Self, from: usize) {
+        let [to, from] = [pixel, from].map(|pixel| pixel * self.count..(pixel + 1) * self.count);
+        let (Some(sums), true) = (other.sums.get(from.clone()), self.count == other.count) else { return };
+        self.sums[to.clone()].copy_from_slice(sums);
+        if let Some(negative) = other.negative.get(from) {
+            self.negative.resize(self.sums.len(), DVec3::ZERO);
+            self.negative[to].copy_from_slice(negative);
         }
     }
 }
@@ -38,16 +67,31 @@ impl LayerSums {
 impl Tile {
     /// Mean of a pixel's values in a layer. `None` if the pixel has no samples or the layer does not exist.
     fn layer_mean(&self, layer: usize, index: usize) -> Option<DVec3> {
-        let LayerSums { sums, negative } = self.layers.get(layer)?;
-        self.signed_mean(
-            index,
-            || sums[index],
-            |_: &NegativeLobeSums| negative.get(index).copied().unwrap_or_default(),
-        )
+        let LayerSums { count, sums, negative } = &self.layers;
+        let place = index * count + layer;
+        let below = |_: &NegativeLobeSums| negative.get(place).copied().unwrap_or_default();
+        if layer < *count { self.signed_mean(index, || sums[place], below) } else { None }
     }
 }
 
 impl Film {
+    /// Sums of the layers in some of a tile's pixels, to which further samples can be added.
+    pub fn layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
+        let mut sums = LayerSums::zero(self.layers, pixels.count());
+        let Some(rect) = self.tile_rect(tile) else { return sums };
+        let tile = self.lock_tile(tile);
+        if pixels == rect.into() && !tile.counts.is_empty() {
+            return tile.layers.clone();
+        }
+        for i in 0..pixels.count() {
+            let (x, y) = pixels.image_position(i as u32);
+            if let Some(index) = pixel_index_in_rect(rect, x, y) {
+                sums.replace_pixel(i, &tile.layers, index);
+            }
+        }
+        sums
+    }
+
     /// Adds layers to an empty film.
     ///
     /// # Errors
@@ -61,13 +105,9 @@ impl Film {
         }
         for tile in 0..self.tile_count() {
             let area = self.tile_rect(tile).map_or(0, |rect| rect.area());
-            let mut layers = Vec::with_capacity(count);
-            for _ in 0..count {
-                let mut sums = Vec::new();
-                try_reserve_exact(&mut sums, area).map_err(|_| lacks())?;
-                layers.push(LayerSums { sums, negative: Vec::new() });
-            }
-            self.lock_tile(tile).layers = layers;
+            let mut sums = Vec::new();
+            try_reserve_exact(&mut sums, area * count).map_err(|_| lacks())?;
+            self.lock_tile(tile).layers = LayerSums { count, sums, negative: Vec::new() };
         }
         self.layers = count;
         Ok(self)
@@ -78,16 +118,21 @@ impl Film {
         crop.area() as u64 * (count * size_of::<DVec3>()) as u64
     }
 
-    /// Mean of a layer's values in every pixel, black outside the crop and in pixels without samples.
-    pub fn layer_image(&self, layer: usize) -> RadianceImage {
-        let mut image = RadianceImage::black(self.width(), self.height());
+    /// For each layer, the mean of its values in every pixel, black outside the crop and in pixels without
+    /// samples.
+    pub fn layer_images(&self) -> Vec<RadianceImage> {
+        let mut images = vec![RadianceImage::black(self.width(), self.height()); self.layers];
         for number in 0..self.tile_count() {
             let (rect, tile) = (tile_rect(self.crop(), number), self.lock_tile(number));
-            let mean = |index: usize| tile.layer_mean(layer, index).map_or(Vec3::ZERO, DVec3::as_vec3);
-            let pixels: Vec<Vec3> = (0..rect.area()).map(mean).collect();
-            image.set_rect(rect, &pixels);
+            for index in 0..rect.area() {
+                let (x, y) = (index % rect.width as usize, index / rect.width as usize);
+                let place = (rect.y as usize + y) * self.width() as usize + rect.x as usize + x;
+                for (layer, image) in images.iter_mut().enumerate() {
+                    image.pixels[place] = tile.layer_mean(layer, index).map_or(Vec3::ZERO, DVec3::as_vec3);
+                }
+            }
         }
-        image
+        images
     }
 }
 
@@ -97,16 +142,23 @@ mod tests {
     use crate::film::{NegativeLobeSamples, StoredTile, TileSamples};
     use crate::math::random::unit_generator;
 
-    /// Samples of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter has negative lobes
-    /// if `is_signed`.
+    /// Five samples per pixel of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter has
+    /// negative lobes if `is_signed`.
     fn samples(film: &Film, tile: usize, seed: u64, is_signed: bool) -> TileSamples {
-        let rect = film.tile_rect(tile).expect("a tile");
+        let pixels = SelectedPixels::from(film.tile_rect(tile).expect("a tile"));
         let mut next = unit_generator(seed);
-        let radiance: Vec<Vec3> = (0..5 * rect.area()).map(|_| Vec3::new(next(), next(), next())).collect();
+        let radiance: Vec<Vec3> =
+            (0..5 * pixels.count()).map(|_| Vec3::new(next(), next(), next())).collect();
         let is_negative: Vec<bool> = radiance.iter().map(|value| value.x > 0.7).collect();
+        let mut layers = film.layer_sums(tile, pixels);
+        for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
+            let double: Vec<Vec3> = values.iter().map(|value| value * 2.0).collect();
+            for (layer, values) in [values, &double].into_iter().enumerate() {
+                layers.add((pixel, layer), values, is_signed.then_some(signs));
+            }
+        }
         let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
-        let layers = vec![radiance.clone(), radiance.iter().map(|value| value * 2.0).collect()];
-        TileSamples { pixels: rect.into(), samples: 5, radiance, negative, layers }
+        TileSamples { pixels, samples: 5, radiance, negative, layers }
     }
 
     fn film() -> Film {
@@ -121,11 +173,11 @@ mod tests {
                 film.add_samples(tile, &samples(&film, tile, seed, is_signed));
             }
             let image = film.radiance().pixels;
-            assert_eq!(film.layer_image(0).pixels, image);
-            for (double, pixel) in film.layer_image(1).pixels.iter().zip(&image) {
+            let layers = film.layer_images();
+            assert_eq!((layers.len(), &layers[0].pixels), (2, &image));
+            for (double, pixel) in layers[1].pixels.iter().zip(&image) {
                 assert!((*double - *pixel * 2.0).abs().max_element() < 1e-6, "{double} {pixel}");
             }
-            assert_eq!(film.layer_image(2), RadianceImage::black(40, 3));
         }
     }
 
@@ -146,22 +198,14 @@ mod tests {
                     film.add_samples(tile, &samples(film, tile, 6, is_signed));
                 }
             }
-            for layer in 0..2 {
-                assert_eq!(whole.layer_image(layer), restored.layer_image(layer));
-            }
+            assert_eq!(whole.layer_images(), restored.layer_images());
         }
     }
 
     #[test]
     fn non_finite_layer_values_are_black() {
-        let film = film();
-        let mut samples = samples(&film, 1, 9, false);
-        for values in &mut samples.layers {
-            values.fill(Vec3::new(f32::NAN, 1.0, 1.0));
-            values.iter_mut().step_by(5).for_each(|value| *value = Vec3::ONE);
-        }
-        film.add_samples(1, &samples);
-        assert_eq!(film.non_finite_samples(), 0);
-        assert!(film.layer_image(0).pixels.iter().skip(32).take(8).all(|pixel| *pixel == Vec3::splat(0.2)));
+        let mut sums = LayerSums::zero(2, 2);
+        sums.add((1, 0), &[Vec3::new(f32::NAN, 1.0, 1.0), Vec3::ONE, Vec3::ONE], None);
+        assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO]);
     }
 }

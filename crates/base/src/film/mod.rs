@@ -26,6 +26,7 @@ mod sums;
 pub mod tone;
 
 pub use convergence::Convergence;
+pub use layers::LayerSums;
 pub use noise::{CellHalfNoise, ImageNoise, total_samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepass, PREPASS_SAMPLES};
@@ -102,8 +103,8 @@ pub struct TileSamples {
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobeSamples>,
-    /// Values of the film's layers, one list per layer, in the order of `radiance`.
-    pub layers: Vec<Vec<Vec3>>,
+    /// Sums of the layers in these pixels, including the film's earlier samples; see [`Film::layer_sums`].
+    pub layers: LayerSums,
 }
 
 /// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other

@@ -237,7 +237,7 @@ mod tests {
                     samples: values.len() as u32,
                     radiance,
                     negative: None,
-                    layers: Vec::new(),
+                    layers: Default::default(),
                 },
             );
         }
@@ -335,7 +335,7 @@ mod tests {
                     samples: count,
                     radiance,
                     negative: None,
-                    layers: Vec::new(),
+                    layers: Default::default(),
                 },
             );
         }

@@ -244,7 +244,7 @@ mod tests {
                             samples: 1,
                             radiance: vec![Vec3::splat(value)],
                             negative: None,
-                            layers: Vec::new(),
+                            layers: Default::default(),
                         },
                     );
                 }
@@ -317,7 +317,7 @@ mod tests {
             samples: 2,
             radiance: vec![Vec3::Y; rect.area() * 2],
             negative: None,
-            layers: Vec::new(),
+            layers: Default::default(),
         };
         first.add_samples(1, &samples);
         let changed = picture(&first);
@@ -340,7 +340,7 @@ mod tests {
                     samples: 1,
                     radiance: vec![value; rect.area()],
                     negative: None,
-                    layers: Vec::new(),
+                    layers: Default::default(),
                 },
             );
         }
@@ -383,7 +383,7 @@ mod tests {
                 samples: 1,
                 radiance: vec![Vec3::splat(1e6); rect.area()],
                 negative: None,
-                layers: Vec::new(),
+                layers: Default::default(),
             },
         );
         for _ in 0..slices {

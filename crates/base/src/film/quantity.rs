@@ -117,7 +117,7 @@ mod tests {
                 samples: count,
                 radiance,
                 negative: None,
-                layers: Vec::new(),
+                layers: Default::default(),
             },
         );
         film

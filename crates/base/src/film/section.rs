@@ -68,7 +68,7 @@ mod tests {
                     samples: 1,
                     radiance,
                     negative: None,
-                    layers: Vec::new(),
+                    layers: Default::default(),
                 },
             );
         }

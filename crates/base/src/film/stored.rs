@@ -43,11 +43,9 @@ impl StoredTile {
             tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
         tile.steps = SquaredMeanChanges::read(area, levels, &mut || from.u32())?;
-        for _ in 0..layers {
-            let sums = from.vectors(area)?;
-            let negative = if is_signed { from.vectors(area)? } else { Vec::new() };
-            tile.layers.push(LayerSums { sums, negative });
-        }
+        let sums = from.vectors(area * layers)?;
+        let negative = if is_signed { from.vectors(area * layers)? } else { Vec::new() };
+        tile.layers = LayerSums { count: layers, sums, negative };
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
@@ -114,7 +112,7 @@ impl Film {
             return false;
         }
         let (signed, levels) = (tile.negative.is_some(), tile.steps.level_count());
-        for count in [tile.earlier.len(), usize::from(signed), levels, tile.layers.len()] {
+        for count in [tile.earlier.len(), usize::from(signed), levels, tile.layers.count] {
             put(bytes, count as u32);
         }
         put_sums(bytes, &tile.sums, &tile.earlier);
@@ -125,10 +123,7 @@ impl Film {
             append_numbers(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
         tile.steps.write_words(&mut |word| put(bytes, word));
-        for LayerSums { sums, negative } in &tile.layers {
-            put_sums(bytes, sums, &[]);
-            put_sums(bytes, negative, &[]);
-        }
+        put_sums(bytes, &tile.layers.sums, &[&tile.layers.negative]);
         true
     }
 
@@ -140,7 +135,7 @@ impl Film {
         let area = self.tile_rect(tile).ok_or(Malformed)?.area();
         let Tile { sums, earlier, counts, negative, steps, layers, .. } = stored.tile;
         let blocks = self.sum_order().kept_block_count();
-        if sums.len() != area || earlier.len() != blocks || layers.len() != self.layers {
+        if sums.len() != area || earlier.len() != blocks || layers.count != self.layers {
             return Err(Malformed);
         }
         let mut own = self.lock_tile(tile);
@@ -171,8 +166,8 @@ fn put(bytes: &mut Vec<u8>, word: u32) {
     bytes.extend_from_slice(&word.to_le_bytes());
 }
 
-fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
-    for sums in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)) {
+fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[impl AsRef<[DVec3]>]) {
+    for sums in [sums].into_iter().chain(earlier.iter().map(AsRef::as_ref)) {
         append_numbers(
             bytes,
             sums.iter().map(|sum| {
@@ -255,7 +250,7 @@ mod tests {
             let samples = range.end - range.start;
             film.add_samples(
                 tile,
-                &TileSamples { pixels: rect.into(), samples, radiance, negative, layers: Vec::new() },
+                &TileSamples { pixels: rect.into(), samples, radiance, negative, layers: Default::default() },
             );
         }
     }

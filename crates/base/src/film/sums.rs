@@ -96,7 +96,7 @@ pub(super) struct Tile {
     /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
     pub(super) negative: Option<NegativeLobeSums>,
     pub(super) steps: SquaredMeanChanges,
-    pub(super) layers: Vec<LayerSums>,
+    pub(super) layers: LayerSums,
     /// Incremented whenever the tile changes.
     pub(super) revision: u64,
 }
@@ -173,7 +173,7 @@ impl Tile {
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
         self.counts.resize(area, 0);
         self.steps.resize(area);
-        self.layers.iter_mut().for_each(|layer| layer.resize(area));
+        self.layers.resize(area);
     }
 
     /// Adds consecutive samples to a pixel in the specified cell and half. Returns the number of non-finite
@@ -356,6 +356,7 @@ impl Film {
         let tile = &mut *guard;
         tile.resize(rect.area());
         let count = samples.samples as usize;
+        let is_whole = samples.pixels == rect.into();
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = samples.pixels.image_position(i as u32);
             let Some(index) = pixel_index_in_rect(rect, x, y) else { continue };
@@ -365,11 +366,12 @@ impl Film {
             let half = pixel_index_in_rect(inside, x, y)
                 .map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
             non_finite += tile.add_pixel_samples((index, cell, half), pixel, lobes, self.blocks);
-            for (layer, values) in tile.layers.iter_mut().zip(&samples.layers) {
-                if let Some(values) = values.chunks_exact(count).nth(i) {
-                    layer.add(index, values, lobes.map(|(_, is_negative)| is_negative));
-                }
+            if !is_whole {
+                tile.layers.replace_pixel(index, &samples.layers, i);
             }
+        }
+        if is_whole {
+            tile.layers.replace_all(&samples.layers);
         }
         tile.revision += 1;
         drop(guard);
@@ -413,7 +415,7 @@ fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
     tile.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
+pub(super) fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
     let (x, y) = (x.checked_sub(rect.x)?, y.checked_sub(rect.y)?);
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }

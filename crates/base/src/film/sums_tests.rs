@@ -20,7 +20,7 @@ fn varied_samples(rect: Rect, first: u32, count: u32) -> TileSamples {
         samples: count,
         radiance: (0..rect.area() as u32).flat_map(pixel).collect(),
         negative: None,
-        layers: Vec::new(),
+        layers: Default::default(),
     }
 }
 
@@ -110,7 +110,7 @@ fn pixel_means_and_counts_are_correct() {
                 samples: values.len() as u32,
                 radiance,
                 negative: None,
-                layers: Vec::new(),
+                layers: Default::default(),
             },
         );
     };
@@ -136,7 +136,13 @@ fn non_finite_samples_are_black_and_counted() {
     ];
     film.add_samples(
         0,
-        &TileSamples { pixels: film.crop().into(), samples: 4, radiance, negative: None, layers: Vec::new() },
+        &TileSamples {
+            pixels: film.crop().into(),
+            samples: 4,
+            radiance,
+            negative: None,
+            layers: Default::default(),
+        },
     );
     assert_eq!(film.non_finite_samples(), 3);
     assert_eq!(film.radiance().pixels, [Vec3::ONE]);
@@ -154,7 +160,7 @@ fn samples_outside_the_tile_are_ignored() {
             samples: 1,
             radiance: vec![Vec3::ONE; 20],
             negative: None,
-            layers: Vec::new(),
+            layers: Default::default(),
         },
     );
     film.add_samples(
@@ -164,7 +170,7 @@ fn samples_outside_the_tile_are_ignored() {
             samples: 2,
             radiance: vec![Vec3::ONE; 3],
             negative: None,
-            layers: Vec::new(),
+            layers: Default::default(),
         },
     );
     film.add_samples(
@@ -174,7 +180,7 @@ fn samples_outside_the_tile_are_ignored() {
             samples: 1,
             radiance: vec![Vec3::ONE; 27],
             negative: None,
-            layers: Vec::new(),
+            layers: Default::default(),
         },
     );
     film.add_samples(
@@ -184,7 +190,7 @@ fn samples_outside_the_tile_are_ignored() {
             samples: 0,
             radiance: Vec::new(),
             negative: None,
-            layers: Vec::new(),
+            layers: Default::default(),
         },
     );
     assert_eq!([29, 30, 31, 32].map(|x| pixel_sample_count(&film, x, 0)), [0, 2, 0, 1]);
@@ -227,7 +233,7 @@ fn snapshots_are_consistent_during_rendering() {
                                     samples: 1,
                                     radiance,
                                     negative: None,
-                                    layers: Vec::new(),
+                                    layers: Default::default(),
                                 },
                             );
                             assert!(film.sample_count_stats().max <= pass + 9);

@@ -233,7 +233,7 @@ pub(crate) mod tests {
             let radiance = (0..COLUMNS * samples).map(sample).collect();
             film.add_samples(
                 0,
-                &TileSamples { pixels, samples, radiance, negative: None, layers: Vec::new() },
+                &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
             );
         }
         film
@@ -299,7 +299,7 @@ pub(crate) mod tests {
                     samples: 16,
                     radiance,
                     negative: None,
-                    layers: Vec::new(),
+                    layers: Default::default(),
                 },
             );
         }
@@ -323,7 +323,7 @@ pub(crate) mod tests {
                 let radiance = (0..8 * samples).map(sample).collect();
                 film.add_samples(
                     0,
-                    &TileSamples { pixels, samples, radiance, negative: None, layers: Vec::new() },
+                    &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
                 );
                 done[0][half] += samples;
             }

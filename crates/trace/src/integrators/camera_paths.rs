@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use super::RayCounters;
+use super::aov::{record_first_hit, record_plain_first_hits, record_vertex};
 use super::behavior::PathBehavior;
 use super::direct::queue::{DirectLightQueue, ShadingSides};
 use super::memory::ThreadMemory;
@@ -59,7 +60,7 @@ pub fn trace_camera_paths(
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let ThreadMemory { scratch, direct } = memory;
+    let ThreadMemory { scratch, direct, .. } = memory;
     let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
     next.clear();
     let mut wavefront = CameraWavefront {
@@ -73,10 +74,18 @@ pub fn trace_camera_paths(
         next,
         crossing,
         place: 0,
+        is_first_hit_pending: false,
         counters,
     };
     wavefront.prepare_bounce_continuation();
-    wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
+    let has_fractions = match wavefront.accumulator.fractions() {
+        Some(fractions) => {
+            fractions.begin(slots.len());
+            true
+        }
+        None => false,
+    };
+    wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0, has_fractions);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
         tile.generate_camera_packets(start..slots.end, camera);
@@ -92,7 +101,7 @@ pub fn trace_camera_paths(
     wavefront.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
-        wavefront.direct.begin_bounce(rays.len(), tile.pixel_spread > 0.0);
+        wavefront.direct.begin_bounce(rays.len(), tile.pixel_spread > 0.0, has_fractions);
         if tile.behavior.scatters {
             // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
@@ -140,6 +149,8 @@ struct CameraWavefront<'a, 's> {
     next: &'a mut Vec<PathRay>,
     /// Index of the current path in this bounce's queue.
     place: u32,
+    /// Whether the layers that show the first hit of the current camera ray are not recorded yet.
+    is_first_hit_pending: bool,
     crossing: &'a mut CrossingBuffers,
     counters: &'a mut RayCounters,
 }
@@ -161,9 +172,12 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     }
 
     #[inline(always)]
-    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, _has_passed: bool) {
+    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
+                if !has_passed && matches!(hit, OpaqueHit::Direct(_)) {
+                    self.record_camera_vertex(path, vertex);
+                }
                 if self.add_emission(path, vertex, hit) {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
@@ -174,6 +188,9 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 }
             }
             Interaction::Glass(vertex, hit, Interface { far, rough }) => {
+                if !has_passed {
+                    self.record_camera_vertex(path, vertex);
+                }
                 if self.add_emission(path, vertex, OpaqueHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
@@ -181,7 +198,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                     }
                 }
             }
-            Interaction::Hidden if self.may_scatter() => self.next.push(*path),
+            Interaction::Hidden if self.may_scatter() => self.push_specular(*path),
             Interaction::Hidden => {}
             Interaction::Nothing => self.add_escaped_light(path),
         }
@@ -229,8 +246,13 @@ impl CameraWavefront<'_, '_> {
             let maps = maps?;
             Some(tile.world.geometry.instruction_set().run(GatherPhotons { tile, row, maps, depth, aov }))
         };
-        let rays =
-            self.direct.compute_direct_light(tile, aov, (self.continuation, depth), gather, self.next)?;
+        let rays = self.direct.compute_direct_light(
+            tile,
+            aov,
+            (self.continuation, depth),
+            gather,
+            (&mut *self.next, self.accumulator.fractions()),
+        )?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -246,6 +268,9 @@ impl CameraWavefront<'_, '_> {
     fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
+        if let Some(fractions) = self.accumulator.fractions() {
+            fractions.next_bounce();
+        }
         self.depth += 1;
         self.prepare_bounce_continuation();
     }
@@ -260,7 +285,17 @@ impl CameraWavefront<'_, '_> {
             }
             Some(hit) => {
                 let surface = packet.surface_unless_plain(self.surfaces, lane);
+                let camera_path = (self.depth == 0 && self.accumulator.first_hit_layers().is_some())
+                    .then_some(path)
+                    .filter(|_| !tile.world.has_see_through());
+                self.is_first_hit_pending = camera_path.is_some();
                 walk_to_interaction(self, &mut path, (hit, surface));
+                if let Some(path) = camera_path.filter(|_| self.is_first_hit_pending)
+                    && let Some(values) = self.accumulator.first_hit_layers()
+                {
+                    // The walk passed through the surface.
+                    record_first_hit(tile, (&path, &hit), values, self.counters);
+                }
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky_radiance(lane));
@@ -304,7 +339,7 @@ impl CameraWavefront<'_, '_> {
         // Select the rays that hit a light or escape to an infinite light, and the rays that must be shaded
         // one by one.
         let render = &tile.settings.render;
-        let all = ((1_u64 << rays.count()) - 1) as u32;
+        let all = rays.mask();
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
         let is_dark_beyond = render.background == Vec3::ZERO && !tile.world.lights.has_infinite_lights();
         let beyond = if is_dark_beyond { 0 } else { all & !packet.any };
@@ -312,6 +347,7 @@ impl CameraWavefront<'_, '_> {
         match rays {
             PacketSource::Camera(row, first, ..) => {
                 self.add_visible_emission(&row.rays, first, &packet, (plain, beyond));
+                self.record_first_hits(&rays, &packet, first);
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
@@ -325,6 +361,32 @@ impl CameraWavefront<'_, '_> {
             self.add_direct_light()?;
         }
         Ok(())
+    }
+
+    /// Records the layers that show the first hits of camera rays, except for the hits that [`Self::interact`]
+    /// records.
+    fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
+        let tile = self.tile;
+        let Some(values) = self.accumulator.first_hit_layers() else { return };
+        let mut left = record_plain_first_hits(tile, (packet, self.surfaces), first, values);
+        // Paths may pass through surfaces that the layers show.
+        if tile.world.has_see_through() {
+            left |= packet.any & !packet.plain & rays.mask();
+        }
+        for lane in lane_indices(left) {
+            let Some(hit) = packet.hit(lane) else { continue };
+            record_first_hit(tile, (&packet.path(tile, rays, lane), &hit), values, self.counters);
+        }
+    }
+
+    /// Records the layers that show first hits at the vertex where a camera ray's walk ended.
+    fn record_camera_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
+        if self.is_first_hit_pending
+            && let Some(values) = self.accumulator.first_hit_layers()
+        {
+            record_vertex(self.tile, path.slot, vertex, values, self.counters);
+            self.is_first_hit_pending = false;
+        }
     }
 
     /// Adds the emission visible to camera rays: from plain surfaces, the background and infinite lights. It
@@ -380,7 +442,7 @@ impl CameraWavefront<'_, '_> {
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
             let Some(ambient) = material.ambient else { return };
-            self.accumulator.add_ambient(path, path.throughput * render.ambient * ambient);
+            self.accumulator.add_ambient(path, self.place, path.throughput * render.ambient * ambient);
         }
     }
 
@@ -397,7 +459,7 @@ impl CameraWavefront<'_, '_> {
                 path.throughput * radiance,
             );
         } else {
-            self.accumulator.add_emitter_hit(path, path.throughput * radiance * weight);
+            self.accumulator.add_emitter_hit(path, self.place, path.throughput * radiance * weight);
         }
     }
 
@@ -425,7 +487,7 @@ impl CameraWavefront<'_, '_> {
                 path.throughput * (background + beyond),
             );
         } else if beyond != Vec3::ZERO && !self.is_light_counted_elsewhere(path) {
-            self.accumulator.add_emitter_hit(path, path.throughput * beyond);
+            self.accumulator.add_emitter_hit(path, self.place, path.throughput * beyond);
         }
     }
 
@@ -462,7 +524,7 @@ impl CameraWavefront<'_, '_> {
         if !self.accumulator.accepts_reflected() {
             if accepts_ambient {
                 let reflectance = vertex.times_vertex_color(rough.look_up_ambient(at, lookups));
-                self.accumulator.add_ambient(path, path.throughput * ambient * reflectance);
+                self.accumulator.add_ambient(path, self.place, path.throughput * ambient * reflectance);
             }
             return;
         }
@@ -473,7 +535,11 @@ impl CameraWavefront<'_, '_> {
             vertex.tint_by_vertex_color(&mut bsdf);
         }
         if accepts_ambient {
-            self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient_reflectance());
+            self.accumulator.add_ambient(
+                path,
+                self.place,
+                path.throughput * ambient * bsdf.ambient_reflectance(),
+            );
         }
         if bsdf.is_black() {
             return;
@@ -625,14 +691,22 @@ impl CameraWavefront<'_, '_> {
     fn roulette_and_push_reflected(&mut self, ray: PathRay) {
         let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.reflected_rays += 1;
-        self.next.push(ray);
+        self.push_specular(ray);
     }
 
     fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
         let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.refracted_rays += 1;
+        self.push_specular(ray);
+    }
+
+    /// Queues a ray with which the current path continues without a diffuse or glossy vertex.
+    fn push_specular(&mut self, ray: PathRay) {
         self.next.push(ray);
+        if let Some(fractions) = self.accumulator.fractions() {
+            fractions.inherit(self.place);
+        }
     }
 
     fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {

@@ -10,7 +10,7 @@ use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
-use crate::integrators::transport::accumulator::Accumulator;
+use crate::integrators::transport::accumulator::{Accumulator, DiffuseFractions};
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
@@ -39,6 +39,8 @@ pub struct DirectLightQueue {
     open: [[usize; BxdfKind::ALL.len()]; 4],
     /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
+    /// The parts of `arrived` from wide lobes at vertices that the camera sees. Empty if they are not needed.
+    arrived_diffuse: Vec<Vec3>,
     /// Media at the vertices.
     interior_lists: InteriorLists,
     /// Shadow rays of several packets.
@@ -81,13 +83,16 @@ impl DirectLightQueue {
         self.count >= Self::FULL
     }
 
-    /// Begins a bounce with `paths` paths. If `has_cones`, also allocates ray cones for them.
-    pub fn begin_bounce(&mut self, paths: usize, has_cones: bool) {
+    /// Begins a bounce with `paths` paths. If `has_cones`, also allocates ray cones for them. If
+    /// `splits_lobes`, separates the light from wide lobes at vertices that the camera sees.
+    pub fn begin_bounce(&mut self, paths: usize, has_cones: bool, splits_lobes: bool) {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, RayCone::default());
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
+        self.arrived_diffuse.clear();
+        self.arrived_diffuse.resize(if splits_lobes { paths } else { 0 }, Vec3::ZERO);
         self.interior_lists.clear();
     }
 
@@ -107,13 +112,15 @@ impl DirectLightQueue {
     ) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, only_specular_before) = path(place);
-            accumulator.add_clamped_direct(slot, *light, only_specular_before);
+            let visible = self.arrived_diffuse.get(place).copied().filter(|_| only_specular_before);
+            let diffuse = accumulator.diffuse_part(place as u32, *light, visible);
+            accumulator.add_clamped_direct(slot, (*light, diffuse), only_specular_before);
         }
     }
 
     /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
     pub fn flush_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_direct_consecutive(first, &self.arrived);
+        accumulator.add_direct_consecutive(first, &self.arrived, &self.arrived_diffuse);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
@@ -206,16 +213,16 @@ impl DirectLightQueue {
     }
 
     /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
-    /// traced. `gather` returns the light that another technique adds at a packet. Rays of continuing paths
-    /// are added to `next`. `continuation` determines how paths continue. Without `continuation`, they
+    /// traced. `gather` returns the light that another technique adds at a packet, and its part from wide lobes.
+    /// Rays of continuing paths and their diffuse fractions are added to `next`. `continuation` determines how paths continue. Without `continuation`, they
     /// continue only in microfacet lobes. `depth` is the number of bounces so far.
     pub fn compute_direct_light(
         &mut self,
         tile: &TileContext<'_>,
         aov: LightAov,
         (continuation, depth): (Option<ContinuationPolicy>, u32),
-        gather: impl Fn(&VertexBatch) -> Option<Vec3x16>,
-        next: &mut Vec<PathRay>,
+        gather: impl Fn(&VertexBatch) -> Option<[Vec3x16; 2]>,
+        (next, mut fractions): (&mut Vec<PathRay>, Option<&mut DiffuseFractions>),
     ) -> Result<DirectLightCounters, Cancelled> {
         let mut rays = DirectLightCounters::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
@@ -268,19 +275,22 @@ impl DirectLightQueue {
                     shares_with_paths,
                 };
                 let mut arrived = self.reflected_light_with_lobe_rays(request, tile, aov, sums);
-                if let Some(gathered) = gather(row) {
+                if let Some([gathered, diffuse]) = gather(row) {
                     add_masked_lanes(row.used, &gathered, &mut arrived.light);
+                    add_masked_lanes(row.used, &diffuse, &mut arrived.diffuse);
                 }
                 rays += arrived.rays;
-                self.store_reflected_light(number, aov, &arrived.light);
+                self.store_reflected_light(number, aov, &arrived);
             }
             // Continue the paths.
             for row in &self.rows[first..end] {
                 if let Some(continuation) = of_row(row) {
-                    SampleBsdf { tile, row, used: row.used, continuation }.scatter(
+                    let has_fractions = fractions.is_some() && row.only_specular_before != 0;
+                    SampleBsdf { tile, row, used: row.used, continuation, has_fractions }.scatter(
                         &self.interior_lists,
                         &self.cones,
                         next,
+                        fractions.as_deref_mut(),
                     );
                 }
             }
@@ -331,6 +341,7 @@ impl DirectLightQueue {
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
+        let (only_infinite, splits_lobes) = (false, self.lobe_split(row) == LobeSplit::Mixed);
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -338,10 +349,19 @@ impl DirectLightQueue {
             aov,
             competing,
             interior_lists,
-            only_infinite: false,
+            only_infinite,
+            splits_lobes,
         };
-        let weighed =
-            SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
+        let weighed = SampleAllLights::<true> {
+            tile,
+            row,
+            used,
+            aov,
+            competing,
+            interior_lists,
+            only_infinite,
+            splits_lobes,
+        };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let sums = match (competing, tile.world.lights.sampler_for_mode(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
@@ -379,13 +399,35 @@ impl DirectLightQueue {
         }
     }
 
+    /// How to divide a packet's reflected light.
+    fn lobe_split(&self, row: &VertexBatch) -> LobeSplit {
+        if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
+            return LobeSplit::Unused;
+        }
+        match (row.bsdf.has_wide_lobes(), row.bsdf.has_narrow_lobes()) {
+            (_, false) => LobeSplit::OnlyWide,
+            (false, true) => LobeSplit::OnlyNarrow,
+            (true, true) => LobeSplit::Mixed,
+        }
+    }
+
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
+    fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &ReflectedLight) {
         let row = &self.rows[number];
         let light = match aov {
-            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
-            LightAov::TraversalCost => *arrived,
+            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
+            LightAov::TraversalCost => arrived.light,
         };
+        let diffuse = match self.lobe_split(row) {
+            LobeSplit::Unused | LobeSplit::OnlyNarrow => None,
+            LobeSplit::OnlyWide => Some(light),
+            LobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
+        };
+        if let Some(diffuse) = diffuse {
+            for i in lane_indices(row.used) {
+                self.arrived_diffuse[row.place[i] as usize] += lane(&diffuse, i);
+            }
+        }
         match row.first_consecutive_index() {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..PACKET_SIZE];
@@ -400,6 +442,19 @@ impl DirectLightQueue {
             }
         }
     }
+}
+
+/// How a packet's reflected light is divided into light from wide lobes and light from narrow lobes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum LobeSplit {
+    /// The parts are not needed.
+    Unused,
+    /// All lobes are wide.
+    OnlyWide,
+    /// All lobes are narrow.
+    OnlyNarrow,
+    /// The surfaces may have wide and narrow lobes.
+    Mixed,
 }
 
 /// Mask of vertices whose direct light is visible in the view and may be nonzero.
