@@ -15,18 +15,18 @@
 //! photons             photon emission, photon maps, density estimation
 //! memory              reused per-thread buffers
 //! aov                 first-hit AOVs
-//! camera_paths        paths from the camera, bounce by bounce, for whitted and path
+//! path                paths from the camera, bounce by bounce, for whitted and path
 //! bounds              bounding-box overlay
 //! ```
 
 mod aov;
 mod behavior;
 mod bounds;
-mod camera_paths;
 mod counters;
 mod direct;
 mod layers;
 mod memory;
+mod path;
 mod photons;
 mod settings;
 mod transport;
@@ -134,7 +134,7 @@ pub fn render_tile_with_layers(
                 });
                 let accumulator =
                     Accumulator { aov: shown.light_aov(), radiance: &mut radiance, clamp, layers: recorded };
-                camera_paths::trace_camera_paths(
+                path::trace_camera_paths(
                     (&tile, photons),
                     slots.clone(),
                     &mut memory,

@@ -64,6 +64,14 @@ pub struct ReflectedLight {
     pub rays: DirectLightCounters,
 }
 
+impl ReflectedLight {
+    /// Adds reflected light and its part from wide lobes in the lanes set in `bits`.
+    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2]) {
+        add_masked_lanes(bits, light, &mut self.light);
+        add_masked_lanes(bits, diffuse, &mut self.diffuse);
+    }
+}
+
 /// Sums over all light samples.
 #[repr(align(64))]
 pub struct LightSums {

@@ -1,8 +1,10 @@
 //! Queue of vertex packets that await direct lighting, and the light that the vertices reflect.
 
+use std::ops::Range;
+
 use arrayvec::ArrayVec;
 
-use super::all_lights::{DirectLightCounters, LightSums, ReflectedLight, SampleAllLights, add_masked_lanes};
+use super::all_lights::{LightSums, ReflectedLight, SampleAllLights};
 use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayKernel;
 use super::mis::CompetingTechnique;
@@ -10,20 +12,18 @@ use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
-use crate::integrators::transport::accumulator::{Accumulator, DiffuseFractions};
+use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{ContinuationPolicy, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
 use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::materials::BxdfKind;
-use crate::materials::bsdf::SampledLobes;
 use crate::math::Vec3;
-use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
+use crate::math::lanes::{PACKET_SIZE, Simd, lane};
 use crate::scene::description::ShadowMode;
 use crate::world::{Geometry, SimdKernel};
 
@@ -68,8 +68,8 @@ pub enum ShadingSides<'m> {
     },
 }
 
-/// Number of packets processed together if lights are picked from a tree.
-const ROWS: usize = 64;
+/// Number of packets in a group if lights are picked from a tree.
+pub const MAX_GROUP_SIZE: usize = 64;
 
 impl DirectLightQueue {
     /// The queue is processed when it contains this many packets, while their data is still in the cache.
@@ -103,15 +103,11 @@ impl DirectLightQueue {
         }
     }
 
-    /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
-    /// for a queue index and whether the camera sees the vertex.
-    pub fn flush_to_accumulator(
-        &mut self,
-        path: impl Fn(usize) -> (u32, bool),
-        accumulator: &mut Accumulator<'_>,
-    ) {
+    /// Ends the bounce of these paths and adds their direct light to the accumulator, in path order.
+    pub fn flush_to_accumulator(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
-            let (slot, only_specular_before) = path(place);
+            let path = &paths[place];
+            let (slot, only_specular_before) = (path.slot, path.state.only_specular_before);
             let visible = self.arrived_diffuse.get(place).copied().filter(|_| only_specular_before);
             let diffuse = accumulator.diffuse_part(place as u32, *light, visible);
             accumulator.add_clamped_direct(slot, (*light, diffuse), only_specular_before);
@@ -206,97 +202,73 @@ impl DirectLightQueue {
     }
 
     /// Removes all vertices.
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         (self.count, self.open) = (0, Default::default());
         // A canceled bounce may have left rays in the pool.
         self.pool.clear();
     }
 
-    /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
-    /// traced. `gather` returns the light that another technique adds at a packet, and its part from wide lobes.
-    /// Rays of continuing paths and their diffuse fractions are added to `next`. `continuation` determines how paths continue. Without `continuation`, they
-    /// continue only in microfacet lobes. `depth` is the number of bounces so far.
-    pub fn compute_direct_light(
+    /// Groups of consecutive packets whose lights are sampled together.
+    pub fn groups(&self, tile: &TileContext<'_>) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (count, picks_lights) =
+            (self.count, tile.world.lights.sampler_for_mode(tile.behavior.receivers).is_some());
+        let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
+        (0..count).step_by(size).map(move |first| first..(first + size).min(count))
+    }
+
+    /// A packet of vertices.
+    pub fn batch(&self, number: usize) -> &VertexBatch {
+        &self.rows[number]
+    }
+
+    /// Media at the vertices.
+    pub fn interior_lists(&self) -> &InteriorLists {
+        &self.interior_lists
+    }
+
+    /// Ray cones at the vertices, indexed by queue index. Empty if ray cones are not used.
+    pub fn cones(&self) -> &[RayCone] {
+        &self.cones
+    }
+
+    /// Samples lights at the packets of a group, and returns the light that each packet reflects.
+    /// `shares_with_paths` is true if continuing paths compete with the light samples.
+    pub fn sample_lights(
         &mut self,
+        group: Range<usize>,
         tile: &TileContext<'_>,
         aov: LightAov,
-        (continuation, depth): (Option<ContinuationPolicy>, u32),
-        gather: impl Fn(&VertexBatch) -> Option<[Vec3x16; 2]>,
-        (next, mut fractions): (&mut Vec<PathRay>, Option<&mut DiffuseFractions>),
-    ) -> Result<DirectLightCounters, Cancelled> {
-        let mut rays = DirectLightCounters::default();
-        let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
-        let together =
-            if tile.world.lights.sampler_for_mode(tile.behavior.receivers).is_some() { ROWS } else { 1 };
-        // Hard shadows are computed only with light samples.
-        let shares_with_paths = continuation.is_some()
-            && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
-        let mirrors =
-            || tile.behavior.mirrors.then(|| ContinuationPolicy::new(tile, depth, SampledLobes::Narrow));
-        let of_row = |row: &VertexBatch| {
-            let own = if row.bsdf.extends_narrow_lobe_paths() {
-                continuation.or_else(mirrors)
-            } else {
-                continuation
-            };
-            own.filter(|continuation| continuation.continues)
+        shares_with_paths: bool,
+    ) -> Result<ArrayVec<ReflectedLight, MAX_GROUP_SIZE>, Cancelled> {
+        let mut sums: ArrayVec<LightSums, MAX_GROUP_SIZE> = ArrayVec::new();
+        let request = |number: usize, row: &VertexBatch| DirectLightPacketRequest {
+            number,
+            used: row.used & contributing_vertex_mask(row, aov),
+            shares_with_paths,
         };
-        for first in (0..self.count).step_by(together) {
-            let end = (first + together).min(self.count);
-            // Sample lights at each packet, and pool the shadow rays to picked lights.
-            for number in first..end {
-                tile.token.check()?;
-                let row = &mut self.rows[number];
-                if row.may_lift != 0 {
-                    tile.world
-                        .geometry
-                        .instruction_set()
-                        .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
-                }
-                let request = DirectLightPacketRequest {
-                    number,
-                    used: row.used & contributing_vertex_mask(row, aov),
-                    shares_with_paths,
-                };
-                let sums = self.sample_lights(request, tile, aov, group.len() as u32);
-                group.push(sums);
-                if self.pool.is_full() {
-                    self.pool.trace(tile, aov, &mut group);
-                }
+        // Sample lights at each packet, and pool the shadow rays to picked lights.
+        for number in group.clone() {
+            tile.token.check()?;
+            let row = &mut self.rows[number];
+            if row.may_lift != 0 {
+                tile.world
+                    .geometry
+                    .instruction_set()
+                    .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
             }
-            // Trace the remaining pooled rays.
-            self.pool.trace(tile, aov, &mut group);
-            // Add light from lobe rays and photons, and store the result.
-            for (number, sums) in (first..end).zip(group.drain(..)) {
-                let row = &self.rows[number];
-                let request = DirectLightPacketRequest {
-                    number,
-                    used: row.used & contributing_vertex_mask(row, aov),
-                    shares_with_paths,
-                };
-                let mut arrived = self.reflected_light_with_lobe_rays(request, tile, aov, sums);
-                if let Some([gathered, diffuse]) = gather(row) {
-                    add_masked_lanes(row.used, &gathered, &mut arrived.light);
-                    add_masked_lanes(row.used, &diffuse, &mut arrived.diffuse);
-                }
-                rays += arrived.rays;
-                self.store_reflected_light(number, aov, &arrived);
-            }
-            // Continue the paths.
-            for row in &self.rows[first..end] {
-                if let Some(continuation) = of_row(row) {
-                    let has_fractions = fractions.is_some() && row.only_specular_before != 0;
-                    SampleBsdf { tile, row, used: row.used, continuation, has_fractions }.scatter(
-                        &self.interior_lists,
-                        &self.cones,
-                        next,
-                        fractions.as_deref_mut(),
-                    );
-                }
+            let request = request(number, row);
+            sums.push(self.sample_lights_at_packet(request, tile, aov, sums.len() as u32));
+            if self.pool.is_full() {
+                self.pool.trace(tile, aov, &mut sums);
             }
         }
-        self.clear();
-        Ok(rays)
+        // Trace the remaining pooled rays.
+        self.pool.trace(tile, aov, &mut sums);
+        // Add the light found by lobe rays.
+        let light = group.zip(sums).map(|(number, sums)| {
+            self.reflected_light_with_lobe_rays(request(number, &self.rows[number]), tile, aov, sums)
+        });
+        Ok(light.collect())
     }
 
     /// The technique that competes with light samples at a packet.
@@ -326,7 +298,7 @@ impl DirectLightQueue {
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
-    fn sample_lights(
+    fn sample_lights_at_packet(
         &mut self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
@@ -412,7 +384,7 @@ impl DirectLightQueue {
     }
 
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &ReflectedLight) {
+    pub fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &ReflectedLight) {
         let row = &self.rows[number];
         let light = match aov {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
