@@ -4,9 +4,8 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::render::layers::sample_layers;
 use super::settings::{
-    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
+    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide, sample_layers,
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;

@@ -1,68 +1,10 @@
 //! Layers: further quantities of the image's samples, such as the albedo at the first hit.
 
-use super::sums::{
-    Film, FilmError, NegativeLobeSums, Tile, add_finite, can_allocate, pixel_index_in_rect, tile_rect,
-};
+use super::layer_sums::LayerSums;
+use super::sums::{Film, FilmError, NegativeLobeSums, Tile, can_allocate, pixel_index_in_rect, tile_rect};
 use super::{RadianceImage, Rect, SelectedPixels};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
-
-/// Sums of the layers' values in some pixels, pixel by pixel. The image's sample counts apply.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LayerSums {
-    /// Number of layers.
-    pub(super) count: usize,
-    pub(super) sums: Vec<DVec3>,
-    /// Sums of the samples in the filter's negative lobes, which `sums` excludes. Empty if there is no such
-    /// sample.
-    pub(super) negative: Vec<DVec3>,
-}
-
-impl LayerSums {
-    /// Creates zero sums of `count` layers in `area` pixels.
-    pub fn zero(count: usize, area: usize) -> Self {
-        Self { count, sums: vec![DVec3::ZERO; count * area], negative: Vec::new() }
-    }
-
-    /// Adds consecutive samples of a layer to a pixel. `is_negative` contains one flag per sample if the filter
-    /// has negative lobes. Non-finite values are treated as black.
-    pub fn add(&mut self, (pixel, layer): (usize, usize), values: &[Vec3], is_negative: Option<&[bool]>) {
-        let place = pixel * self.count + layer;
-        let Some(is_negative) = is_negative else {
-            add_finite(&mut self.sums[place], values);
-            return;
-        };
-        self.negative.resize(self.sums.len(), DVec3::ZERO);
-        for (value, &is_negative) in values.iter().zip(is_negative) {
-            let sums = if is_negative { &mut self.negative } else { &mut self.sums };
-            add_finite(&mut sums[place], std::slice::from_ref(value));
-        }
-    }
-
-    /// Resizes the sums to `area` pixels. Cannot fail because the film reserved the memory.
-    pub(super) fn resize(&mut self, area: usize) {
-        self.sums.resize(area * self.count, DVec3::ZERO);
-    }
-
-    /// Replaces the sums of all pixels, without allocating memory for the sums outside negative lobes.
-    pub(super) fn replace_all(&mut self, other: &Self) {
-        if self.sums.len() == other.sums.len() {
-            self.sums.copy_from_slice(&other.sums);
-            self.negative.clone_from(&other.negative);
-        }
-    }
-
-    /// Replaces a pixel's sums with those of pixel `from` in `other`.
-    pub(super) fn replace_pixel(&mut self, pixel: usize, other: &Self, from: usize) {
-        let [to, from] = [pixel, from].map(|pixel| pixel * self.count..(pixel + 1) * self.count);
-        let (Some(sums), true) = (other.sums.get(from.clone()), self.count == other.count) else { return };
-        self.sums[to.clone()].copy_from_slice(sums);
-        if let Some(negative) = other.negative.get(from) {
-            self.negative.resize(self.sums.len(), DVec3::ZERO);
-            self.negative[to].copy_from_slice(negative);
-        }
-    }
-}
 
 impl Tile {
     /// Mean of a pixel's values in a layer. `None` if the pixel has no samples or the layer does not exist.
@@ -77,12 +19,13 @@ impl Tile {
 impl Film {
     /// Sums of the layers in some of a tile's pixels, to which further samples can be added.
     pub fn layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
-        let mut sums = LayerSums::zero(self.layers, pixels.count());
-        let Some(rect) = self.tile_rect(tile) else { return sums };
+        let zero = || LayerSums::zero(self.layers, pixels.count());
+        let Some(rect) = self.tile_rect(tile) else { return zero() };
         let tile = self.lock_tile(tile);
         if pixels == rect.into() && !tile.counts.is_empty() {
             return tile.layers.clone();
         }
+        let mut sums = zero();
         for i in 0..pixels.count() {
             let (x, y) = pixels.image_position(i as u32);
             if let Some(index) = pixel_index_in_rect(rect, x, y) {
@@ -153,9 +96,7 @@ mod tests {
         let mut layers = film.layer_sums(tile, pixels);
         for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
             let double: Vec<Vec3> = values.iter().map(|value| value * 2.0).collect();
-            for (layer, values) in [values, &double].into_iter().enumerate() {
-                layers.add((pixel, layer), values, is_signed.then_some(signs));
-            }
+            layers.add(pixel, &[(0, values), (1, &double)], is_signed.then_some(signs));
         }
         let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
         TileSamples { pixels, samples: 5, radiance, negative, layers }
@@ -200,12 +141,5 @@ mod tests {
             }
             assert_eq!(whole.layer_images(), restored.layer_images());
         }
-    }
-
-    #[test]
-    fn non_finite_layer_values_are_black() {
-        let mut sums = LayerSums::zero(2, 2);
-        sums.add((1, 0), &[Vec3::new(f32::NAN, 1.0, 1.0), Vec3::ONE, Vec3::ONE], None);
-        assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO]);
     }
 }

@@ -10,6 +10,7 @@
 mod block_sums;
 mod convergence;
 mod curves;
+mod layer_sums;
 mod layers;
 mod noise;
 mod pixel_subset;
@@ -26,7 +27,7 @@ mod sums;
 pub mod tone;
 
 pub use convergence::Convergence;
-pub use layers::LayerSums;
+pub use layer_sums::LayerSums;
 pub use noise::{CellHalfNoise, ImageNoise, total_samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepass, PREPASS_SAMPLES};

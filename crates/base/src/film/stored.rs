@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::convergence::SquaredMeanChanges;
-use super::layers::LayerSums;
+use super::layer_sums::LayerSums;
 use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;

@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::convergence::{Convergence, SquaredMeanChanges, luminance};
-use super::layers::LayerSums;
+use super::layer_sums::LayerSums;
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, sum_with_blocks};
+use super::sum_order::{SumOrder, add_finite, sum_with_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -228,24 +228,6 @@ impl Tile {
         }
         non_finite
     }
-}
-
-/// Adds the finite radiances and returns the number of non-finite radiances.
-pub(super) fn add_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
-    let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
-    if all.is_finite() {
-        *sum = all;
-        return 0;
-    }
-    let mut non_finite = 0;
-    for radiance in radiances {
-        if radiance.is_finite() {
-            *sum += radiance.as_dvec3();
-        } else {
-            non_finite += 1;
-        }
-    }
-    non_finite
 }
 
 impl Film {

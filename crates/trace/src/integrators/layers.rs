@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use arrayvec::ArrayVec;
+
 use crate::film::LayerSums;
 use crate::math::Vec3;
 
@@ -177,18 +179,16 @@ impl LayerValues {
                     .for_each(|value| *value = Vec3::ZERO);
             }
         }
-        let is_used = |layer: SampleLayer| self.used.contains(layer);
-        for (position, layer) in self.set.iter().enumerate().filter(|(_, layer)| is_used(*layer)) {
-            let mut values = self.lists[layer as usize].as_slice();
-            let mut slot = begin;
-            while let Some((some, rest)) =
-                values.split_at_checked((samples - slot % samples).min(values.len()))
-                && !some.is_empty()
-            {
-                let signs = is_negative.map(|signs| &signs[slot..slot + some.len()]);
-                sums.add((slot / samples, position), some, signs);
-                (values, slot) = (rest, slot + some.len());
-            }
+        let used: ArrayVec<(usize, &[Vec3]), 7> = (self.set.iter().enumerate())
+            .filter(|(_, layer)| self.used.contains(*layer))
+            .map(|(position, layer)| (position, self.lists[layer as usize].as_slice()))
+            .collect();
+        for pixel in begin / samples..end.div_ceil(samples) {
+            let slots = begin.max(pixel * samples)..end.min((pixel + 1) * samples);
+            let here = slots.start - begin..slots.end - begin;
+            let values: ArrayVec<_, 7> =
+                used.iter().map(|(position, values)| (*position, &values[here.clone()])).collect();
+            sums.add(pixel, &values, is_negative.map(|signs| &signs[slots]));
         }
     }
 }
@@ -220,8 +220,8 @@ mod tests {
         }
         let mut expected = LayerSums::zero(set.len(), 2);
         for layer in 0..2 {
-            expected.add((0, layer), &[Vec3::ONE; 2], None);
-            expected.add((1, layer), &[Vec3::ONE], None);
+            expected.add(0, &[(layer, &[Vec3::ONE; 2])], None);
+            expected.add(1, &[(layer, &[Vec3::ONE])], None);
         }
         assert_eq!(sums, expected);
     }
