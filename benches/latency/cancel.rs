@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
 use glimt::pipeline::settings::Overrides;
 use glimt::pipeline::{Handle, start};
 
@@ -54,8 +54,8 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
         generation: *generation,
         scene: scene.to_owned(),
         overrides,
-        preview: Some(PreviewSize { width: 118, height: 74, around: None }),
-        write: WriteMode::No,
+        preview: Some(MaxPreviewSize { width: 118, height: 74, around: None }),
+        write: WriteRequirement::No,
         own: None,
         saves: 0,
         force: false,

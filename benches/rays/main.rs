@@ -264,7 +264,8 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
 fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     let count = mesh.triangles.len() as u32;
     let build = || {
-        KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("the token is not cancelled")
+        KdTree::from_triangles(count, |id| mesh.corners(id), &CancelToken::new())
+            .expect("the token is not cancelled")
     };
     let mut best = f64::INFINITY;
     let mut tree = None;

@@ -22,9 +22,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glimt::film::Srgb8Image;
-use glimt::pipeline::protocol::PreviewSize;
+use glimt::pipeline::protocol::MaxPreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, advise};
+use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, advise_on_preview};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -102,7 +102,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Renders a scene and its edited version, and prints a line for each.
 fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
-    let size = PreviewSize {
+    let size = MaxPreviewSize {
         width: u32::from(columns - BESIDE),
         height: 2 * u32::from(rows - ABOVE_AND_BELOW),
         around: None,
@@ -173,7 +173,7 @@ impl Window {
                 is_final: shot.is_final,
                 final_in: None,
             };
-            if let PacingAdvice::Aim(fidelity) = advise(&moment) {
+            if let PacingAdvice::Aim(fidelity) = advise_on_preview(&moment) {
                 (aimed, at) = (shot.samples, shot.seconds);
                 bytes += self.aim(&shot.picture, fidelity);
                 pictures += 1;

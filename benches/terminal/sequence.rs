@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
 use glimt::pipeline::settings::Overrides;
 
 /// A preview of an unfinished or finished image.
@@ -25,14 +25,14 @@ pub(crate) fn render(
     handle: &Handle,
     generation: u64,
     scene: &Path,
-    size: PreviewSize,
+    size: MaxPreviewSize,
 ) -> Result<Vec<RecordedPreview>, Box<dyn Error>> {
     let request = Request {
         generation,
         scene: scene.to_owned(),
         overrides: Overrides::default(),
         preview: Some(size),
-        write: WriteMode::No,
+        write: WriteRequirement::No,
         own: None,
         saves: 0,
         force: false,

@@ -4,17 +4,17 @@ use std::error::Error;
 
 use glimt::control::CancelToken;
 use glimt::output::{EncodeOptions, Format, encode};
-use glimt::pipeline::{session::Session, settings::Overrides};
+use glimt::pipeline::{session::HeadlessSession, settings::Overrides};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    picture("scenes/cornell.toml", "cornell.png")
+    render_to_png("scenes/cornell.toml", "cornell.png")
 }
 
 /// Renders a scene with 4 samples per pixel and writes it as a PNG file.
-pub(crate) fn picture(scene: &str, png: &str) -> Result<(), Box<dyn Error>> {
+pub(crate) fn render_to_png(scene: &str, png: &str) -> Result<(), Box<dyn Error>> {
     let token = CancelToken::new();
     let options = Overrides { samples: Some(4), ..Overrides::default() };
-    let rendered = Session::default().render(scene.as_ref(), &options, &token)?;
+    let rendered = HeadlessSession::default().render(scene.as_ref(), &options, &token)?;
     let bytes = encode(&rendered.image, &EncodeOptions::default(), Format::Png, &token)?;
     Ok(std::fs::write(png, bytes)?)
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, PoisonError};
 
 use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
 use glimt::pipeline::settings::Overrides;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{Fidelity, Painter};
@@ -14,10 +14,10 @@ use ratatui::layout::Rect;
 use ratatui::style::Color;
 
 /// Window sizes, and the preview sizes next to the side panel.
-const SIZES: [(Rect, PreviewSize); 3] = [
-    (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40, around: None }),
-    (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72, around: None }),
-    (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112, around: None }),
+const SIZES: [(Rect, MaxPreviewSize); 3] = [
+    (Rect { x: 0, y: 0, width: 80, height: 24 }, MaxPreviewSize { width: 60, height: 40, around: None }),
+    (Rect { x: 0, y: 0, width: 120, height: 40 }, MaxPreviewSize { width: 90, height: 72, around: None }),
+    (Rect { x: 0, y: 0, width: 200, height: 60 }, MaxPreviewSize { width: 170, height: 112, around: None }),
 ];
 /// Width and height of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
@@ -25,13 +25,13 @@ const FILM: u32 = 320;
 /// Renders previews, one scene at a time.
 struct PreviewRenderer {
     handle: Handle,
-    preview: PreviewSize,
+    preview: MaxPreviewSize,
     generation: u64,
     folder: tempfile::TempDir,
 }
 
 impl PreviewRenderer {
-    fn new(preview: PreviewSize) -> Self {
+    fn new(preview: MaxPreviewSize) -> Self {
         let handle = glimt::pipeline::start(0).expect("a worker");
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a temporary folder") }
     }
@@ -54,7 +54,7 @@ impl PreviewRenderer {
             scene: path,
             overrides,
             preview: Some(self.preview),
-            write: WriteMode::No,
+            write: WriteRequirement::No,
             own: None,
             saves: 0,
             force: false,

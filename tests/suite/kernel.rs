@@ -118,8 +118,8 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
 /// Number of rays that escape from a closed mesh in a k-d tree. See [`leaks`].
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
-    let tree =
-        KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("the token is not cancelled");
+    let tree = KdTree::from_triangles(count, |id| mesh.corners(id), &CancelToken::new())
+        .expect("the token is not cancelled");
     let mut random = UnitRandom(rays as u64 + 1);
     let mut leaks = 0;
     for i in 0..rays {
@@ -304,7 +304,8 @@ fn hits_close_to_the_ray_origin_are_found() {
     let count = slivers.len() as u32;
     let corners = |id: u32| slivers[id as usize];
     let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("the token is not cancelled");
-    let planes = KdTree::build(count, corners, &CancelToken::new()).expect("the token is not cancelled");
+    let planes =
+        KdTree::from_triangles(count, corners, &CancelToken::new()).expect("the token is not cancelled");
     let trees = InstructionSet::ALL.map(|instructions| boxes.clone().with_instruction_set(instructions));
     let (mut before, mut behind, mut missed, mut wrong) = (0, 0, 0, 0);
     for i in 0..40_000 {

@@ -14,10 +14,10 @@ use clap::builder::styling::{AnsiColor, Styles};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
-pub use self::parts::{FarmArgs, MergeArgs, Scheduler};
+pub use self::parts::{ClusterScheduler, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
-use crate::console::stdout_columns;
+use crate::console::stdout_columns_or_default;
 use crate::environment;
 use crate::film::Rect;
 use crate::output::{AnimationFormat, Format};
@@ -26,7 +26,7 @@ use crate::pipeline::settings::{
 };
 use crate::pipeline::turntable::{self, TurntableFrame};
 use crate::scene::description::{Accel, Integrator, KeyRange, RenderOptions, ShadowMode, render_keys};
-use crate::tui::{ColorChoice, PreviewChoice};
+use crate::tui::{ColorDepthChoice, PreviewChoice};
 
 /// Examples for the long help and the manual page, in lines of at most 80 columns.
 pub(super) const EXAMPLES: &str = "  \
@@ -55,7 +55,7 @@ pub(super) const EXIT_CODES: &str = "\
 /// Returns the help width in columns: `COLUMNS` if set, else the terminal's width, else 80.
 fn help_columns() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
-    columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns)
+    columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns_or_default)
 }
 
 /// Text after the options in `-h`.
@@ -87,7 +87,7 @@ pub struct Args {
 
 impl Args {
     /// Returns the command's `--color` option.
-    pub(super) fn color(&self) -> ColorChoice {
+    pub(super) fn color(&self) -> ColorDepthChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
             Some(Subcommand::Bench(bench)) => bench.color,
@@ -126,7 +126,7 @@ pub enum Subcommand {
         json: bool,
         /// Colors: auto, truecolor, 256, 16, none
         #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-        color: ColorChoice,
+        color: ColorDepthChoice,
     },
     /// Write a commented starter scene; never overwrites a file
     New {
@@ -298,7 +298,7 @@ pub struct ImportArgs {
     pub strict: bool,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
 }
 
 const INFO_HELP: &str = "\
@@ -317,7 +317,7 @@ pub struct InfoArgs {
     pub json: bool,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
 }
 
 const COMPARE_HELP: &str = "\
@@ -361,10 +361,10 @@ pub struct CompareArgs {
     pub json: bool,
     /// Show the images and their difference: auto, on, off
     #[arg(long, value_parser = choice_parser::<ImageVisibility>(), hide_possible_values = true, long_help = choice_long_help::<ImageVisibility>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub pictures: ImageVisibility,
+    pub pictures: CompareImageVisibility,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
 }
 
 /// Arguments of a render. Options override the scene's settings for this run.
@@ -506,7 +506,7 @@ pub struct RenderArgs {
     pub preview: PreviewChoice,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
     /// Minimum render time for notifications; 0 disables them
     ///
     /// When a longer render ends while the window is not focused, the terminal shows a desktop notification.
@@ -579,7 +579,7 @@ choice! {
 
 choice! {
     /// Whether `compare` shows images.
-    pub enum ImageVisibility {
+    pub enum CompareImageVisibility {
         /// On a terminal with at least 30 columns.
         Auto = "auto",
         /// Always; 80 columns wide without a terminal.
@@ -748,7 +748,7 @@ fn parse_shard(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-fn parse_error_bound(text: &str) -> Result<f64, String> {
+fn parse_nonnegative_number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a nonnegative number".to_owned()),

@@ -11,7 +11,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::{ReportStyle, render_report};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::system::describe_error;
-use crate::tui::ColorChoice;
+use crate::tui::ColorDepthChoice;
 
 /// Writes to stderr and stdout.
 #[derive(Clone, Debug)]
@@ -26,14 +26,14 @@ pub(super) struct Console {
 const DEFAULT_COLUMNS: usize = 120;
 
 impl Console {
-    pub(super) fn new(color: ColorChoice) -> Self {
+    pub(super) fn new(color: ColorDepthChoice) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         let colored = match color {
-            ColorChoice::None => false,
-            ColorChoice::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
-            ColorChoice::TrueColor | ColorChoice::Indexed256 | ColorChoice::Ansi16 => true,
+            ColorDepthChoice::None => false,
+            ColorDepthChoice::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb,
+            ColorDepthChoice::TrueColor | ColorDepthChoice::Indexed256 | ColorDepthChoice::Ansi16 => true,
         };
         let style = if colored { ReportStyle::Ansi } else { ReportStyle::Plain };
         Self { style, is_terminal: is_terminal && !is_dumb, stdout_error: Rc::default() }
@@ -48,14 +48,14 @@ impl Console {
     }
 
     /// Prints a line to stderr. Makes line breaks within the text visible.
-    pub(super) fn print_message(&self, text: &str) {
+    pub(super) fn print_line_to_stderr(&self, text: &str) {
         let line = format!("{}\n", escape_invisible_chars(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
     /// Prints lines to stderr.
     pub(super) fn print_message_lines(&self, text: &str) {
-        text.trim_end().lines().for_each(|line| self.print_message(line));
+        text.trim_end().lines().for_each(|line| self.print_line_to_stderr(line));
     }
 
     /// Prints a line to stdout.
@@ -97,7 +97,7 @@ impl Console {
 
     /// Prints `error: …` to stderr and returns `exit`.
     pub(super) fn print_error(&self, exit: Exit, message: &str) -> Exit {
-        self.print_message(&format!("error: {message}"));
+        self.print_line_to_stderr(&format!("error: {message}"));
         exit
     }
 
@@ -115,7 +115,7 @@ fn stderr_columns() -> usize {
 }
 
 /// Text width on stdout in columns: the terminal's width, or 80.
-pub(super) fn stdout_columns() -> usize {
+pub(super) fn stdout_columns_or_default() -> usize {
     terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
 }
 

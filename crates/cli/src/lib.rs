@@ -111,21 +111,21 @@ Run `glimt -h` for all commands and options.";
 
 /// Handles an invocation without arguments.
 fn print_getting_started() -> Exit {
-    Console::new(crate::tui::ColorChoice::Auto).print_message_lines(GETTING_STARTED);
+    Console::new(crate::tui::ColorDepthChoice::Auto).print_message_lines(GETTING_STARTED);
     Exit::WRONG
 }
 
 /// Prints the help, the version or an error.
 fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
-    let console = Console::new(crate::tui::ColorChoice::Auto);
+    let console = Console::new(crate::tui::ColorDepthChoice::Auto);
     if !error.use_stderr() {
         console.record_stdout_error(error.print().and_then(|()| io::stdout().flush()));
         return console.final_exit_code(Exit::DONE);
     }
-    if let Some(message) = extra_argument(error).and_then(|_| unknown_command_error(arguments)) {
+    if let Some(message) = find_extra_argument(error).and_then(|_| unknown_command_error(arguments)) {
         return console.print_error(Exit::WRONG, &message);
     }
-    if let Some(second) = extra_argument(error) {
+    if let Some(second) = find_extra_argument(error) {
         let message = format!("glimt takes one scene; got a second: {second:?}");
         return console.print_error(Exit::WRONG, &message);
     }
@@ -164,7 +164,7 @@ fn mistyped_command_error(word: &Path) -> Option<String> {
 }
 
 /// Returns an extra argument after the scene that is neither an option nor a command.
-fn extra_argument(error: &clap::Error) -> Option<&str> {
+fn find_extra_argument(error: &clap::Error) -> Option<&str> {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {
         Some(ContextValue::String(word)) if error.kind() == ErrorKind::ArgumentConflict => word,

@@ -14,7 +14,7 @@ use crate::pipeline::protocol::{
     CheckpointUpdate, Command, Event, Failure, SavedSceneImageState, Stage, Status,
 };
 use crate::pipeline::start;
-use crate::pipeline::watch::{ExternalChange, FileHashCache, FileRead, Watcher, missing_folder};
+use crate::pipeline::watch::{ExternalChange, FileHashCache, FileRead, Watcher, find_missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
@@ -33,7 +33,7 @@ const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
 pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
     // Restore a scene whose replacement was interrupted.
     held::recover_backup(&order.scene);
-    if let Some(absent) = missing_scene_error(&order.scene) {
+    if let Some(absent) = scene_not_found_error(&order.scene) {
         console.print_diagnostics(&[absent]);
         return Exit::WRONG;
     }
@@ -70,7 +70,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
-                Command::Write => asked.record_write_command(),
+                Command::Write => asked.clear_for_write_command(),
                 Command::Quit => asked.record_ui_exit(),
                 Command::Render(_)
                 | Command::Preview(_)
@@ -93,7 +93,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
     let has_ended = if worker.stop_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
         worker.stop_or_abandon(Duration::ZERO)
     } else {
-        console.print_message("waiting for the image to be written; press ctrl-c to quit without it");
+        console.print_line_to_stderr("waiting for the image to be written; press ctrl-c to quit without it");
         worker.stop_or_abandon(Duration::MAX)
     };
     if has_ended {
@@ -103,9 +103,9 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.list_external_changes(&contents);
         let is_older = ended.is_current && writes.is_image_older_than_inputs(&contents);
-        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &quoted_own_command_line()))
+        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &shell_quoted_command_line()))
             .iter()
-            .for_each(|line| console.print_message(line));
+            .for_each(|line| console.print_line_to_stderr(line));
     }
     let exit = |ended: TuiOutcome| match ended.status {
         ExitStatus::QUIT if ended.is_unwritten => Exit::FAILED,
@@ -127,7 +127,8 @@ fn exit_summary_lines(
     (has_ended, is_older, lost, call): (bool, bool, &[(PathBuf, ExternalChange)], &str),
 ) -> Vec<String> {
     let mut lines = writes.unreported_lines(ended, has_ended);
-    let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
+    let has_earlier_files =
+        ended.is_write_unanswered && ended.has_written && !writes.has_written_since_command();
     let has_quit = ended.status == ExitStatus::QUIT;
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
     if has_summary {
@@ -136,7 +137,7 @@ fn exit_summary_lines(
         lines.push(ended.summary.clone() + older + &lost.collect::<String>());
     }
     // After SIGHUP the terminal is gone.
-    match writes.exit_checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
+    match writes.exit_checkpoint_result().filter(|_| ended.status != ExitStatus::HANGUP) {
         Some(Ok(_)) if has_summary => {
             lines.iter_mut().rev().take(1).for_each(|line| *line = format!("{line}; {call} continues"));
         }
@@ -151,7 +152,7 @@ fn exit_summary_lines(
 }
 
 /// Returns this command line, quoted for a shell.
-fn quoted_own_command_line() -> String {
+fn shell_quoted_command_line() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
         Err(_) => word.clone(),
@@ -161,7 +162,7 @@ fn quoted_own_command_line() -> String {
 
 /// Returns an error if the scene does not exist at startup. If the scene disappears later, glimt waits for
 /// it.
-fn missing_scene_error(scene: &Path) -> Option<Diagnostic> {
+fn scene_not_found_error(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
@@ -198,7 +199,7 @@ impl SharedWriteLog {
     }
 
     /// Records a write command from the user.
-    fn record_write_command(&self) {
+    fn clear_for_write_command(&self) {
         let mut log = self.lock_log();
         log.lines.clear();
         log.has_written = false;
@@ -209,7 +210,7 @@ impl SharedWriteLog {
         self.lock_log().has_left = true;
     }
 
-    fn has_written(&self) -> bool {
+    fn has_written_since_command(&self) -> bool {
         self.lock_log().has_written
     }
 
@@ -290,7 +291,7 @@ impl SharedWriteLog {
     }
 
     /// Returns the checkpoint written after the UI exited, or an error message.
-    fn exit_checkpoint(&self) -> Option<Result<PathBuf, String>> {
+    fn exit_checkpoint_result(&self) -> Option<Result<PathBuf, String>> {
         self.lock_log().checkpoint.clone()
     }
 
@@ -343,7 +344,7 @@ fn add_waiting_help(problem: &mut Diagnostic) {
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
         let file = file.map_or(String::new(), |help| format!("; {help}"));
-        problem.help = Some(match missing_folder(&problem.path) {
+        problem.help = Some(match find_missing_folder(&problem.path) {
             Some(folder) => format!(
                 "waiting for the folder {} and the scene to appear{file}",
                 escape_invisible_chars(&folder.to_string_lossy())
@@ -376,7 +377,7 @@ mod tests {
         };
         let writes = SharedWriteLog::default();
         writes.record_event(&written(1));
-        writes.record_write_command();
+        writes.clear_for_write_command();
         writes.record_ui_exit();
         let message = "the latest image is not written".to_owned();
         writes.record_event(&Event::WriteFailed { generation: 2, path: None, message });

@@ -9,7 +9,7 @@ use crate::output::Format;
 use crate::output::write::STDOUT;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::turntable;
-use crate::tui::{ColorChoice, PreviewChoice};
+use crate::tui::{ColorDepthChoice, PreviewChoice};
 
 /// The file name for standard output.
 pub(super) const STDOUT_NAME: &str = "-";
@@ -25,7 +25,7 @@ pub(super) struct RenderRequest {
     pub(super) is_once: bool,
     pub(super) progress: ProgressMode,
     pub(super) preview: PreviewChoice,
-    pub(super) color: ColorChoice,
+    pub(super) color: ColorDepthChoice,
     pub(super) poll: bool,
     pub(super) notify_after: f64,
     /// Niceness of the whole process if `is_once`, otherwise of the render threads only.
@@ -110,7 +110,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
             Format::from_path(path)
                 .map_err(|error| format!("{error}; a turntable also accepts .gif and .apng"))?;
         }
-        turntable::check_frame_pattern(path)?;
+        turntable::check_turntable_output(path)?;
         reject_duplicate_path(path, &mut known)?;
     }
     if let Some(twin) = turntable::first_repeated_file(&args.outputs, args.turntable.unwrap_or(1)) {
@@ -119,7 +119,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
     match &args.report {
         Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_frame_placeholder(path) => {
-            let name = turntable::with_placeholder(path);
+            let name = turntable::add_frame_placeholder(path);
             Err(format!("a turntable has one report per frame: use --report {}", name.display()))
         }
         Some(_) | None => Ok(()),
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
         assert_eq!((order.nice, order.notify_after), (3, 7.0));
-        assert_eq!((order.progress, order.color), (ProgressMode::Json, ColorChoice::Indexed256));
+        assert_eq!((order.progress, order.color), (ProgressMode::Json, ColorDepthChoice::Indexed256));
     }
 
     #[test]

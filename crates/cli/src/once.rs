@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
-    CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteMode,
+    CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteRequirement,
     WriteWarning,
 };
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
@@ -51,7 +51,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
     let mut deadline = ExitDeadline::default();
-    let mut written = ImagesWrittenSoFar::default();
+    let mut written = CompletedWrites::default();
     let has_checkpoints = order.overrides.checkpoints.seconds > 0.0;
     let mut is_over = |is_writing: bool| {
         let now = Instant::now();
@@ -69,14 +69,14 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     for overrides in overrides_per_turntable_frame(&order.overrides) {
         let turn = overrides.turn;
         if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
-            console.print_message(&format!("frame {} of {of}", number + 1));
+            console.print_line_to_stderr(&format!("frame {} of {of}", number + 1));
         }
         worker.send(Command::Render(Box::new(Request {
             generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
             scene: order.scene.clone(),
             overrides,
             preview: None,
-            write: WriteMode::Must,
+            write: WriteRequirement::Must,
             own: None,
             saves: 0,
             force: false,
@@ -95,7 +95,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     if !reporter.reports_diagnostics()
         && let Some(signal) = ended.signal_number().and_then(signals::signal_name)
     {
-        console.print_message(&format!(
+        console.print_line_to_stderr(&format!(
             "terminated by {signal}: {}",
             describe_images_so_far(is_whole, &written)
         ));
@@ -114,7 +114,7 @@ fn overrides_per_turntable_frame(overrides: &Overrides) -> impl Iterator<Item = 
 }
 
 /// Describes the images written before a signal. `is_whole` means that all images were written.
-fn describe_images_so_far(is_whole: bool, written: &ImagesWrittenSoFar) -> String {
+fn describe_images_so_far(is_whole: bool, written: &CompletedWrites) -> String {
     let names: Vec<_> = written.images.iter().map(|path| path.display().to_string()).collect();
     let kept = written
         .checkpoint
@@ -132,7 +132,7 @@ fn describe_images_so_far(is_whole: bool, written: &ImagesWrittenSoFar) -> Strin
 
 /// The files written so far.
 #[derive(Debug, Default)]
-struct ImagesWrittenSoFar {
+struct CompletedWrites {
     images: Vec<PathBuf>,
     /// The last checkpoint.
     checkpoint: Option<PathBuf>,
@@ -177,7 +177,7 @@ fn handle_events(
     (order, turn): (&RenderRequest, Option<TurntableFrame>),
     console: &Console,
     reporter: &mut dyn Reporter,
-    written: &mut ImagesWrittenSoFar,
+    written: &mut CompletedWrites,
     mut is_over: impl FnMut(bool) -> bool,
 ) -> Exit {
     let mut is_writing = false;
@@ -209,7 +209,7 @@ fn handle_events(
             let what = "the scene or one of its files changed during the turntable";
             return console.print_error(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
-            report_checkpoint(news, &mut call_warnings, reporter, console);
+            report_checkpoint_update(news, &mut call_warnings, reporter, console);
         } else if let Event::WriteWarning { warning, .. } = &event {
             call_warnings.push(written_file_warning(warning));
         } else if let Event::Done { warnings, .. } = &mut event {
@@ -246,7 +246,9 @@ fn handle_events(
                 if reporter.reports_diagnostics() {
                     return exit_code_for_failure(&failure);
                 }
-                unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
+                unwritten
+                    .iter()
+                    .for_each(|message| console.print_line_to_stderr(&format!("error: {message}")));
                 return report_failure(&failure, console);
             }
             Event::Cancelled { .. } => return Exit::FAILED,
@@ -279,7 +281,7 @@ fn has_stage_reread_changed_file(stage: &StageReport) -> bool {
 }
 
 /// Reports checkpoint news and warnings immediately, while the user can still react.
-fn report_checkpoint(
+fn report_checkpoint_update(
     news: &CheckpointUpdate,
     call_warnings: &mut Vec<Diagnostic>,
     reporter: &dyn Reporter,
@@ -287,14 +289,14 @@ fn report_checkpoint(
 ) {
     let say = |text: String| {
         if reporter.allows_text_results() {
-            console.print_message(&text);
+            console.print_line_to_stderr(&text);
         }
     };
     let mut warn = |message: &str, help: &str| {
         if reporter.reports_diagnostics() {
-            call_warnings.push(create_argument_warning(message, help));
+            call_warnings.push(argument_warning(message, help));
         } else {
-            console.print_diagnostics(&[create_argument_warning(message, help)]);
+            console.print_diagnostics(&[argument_warning(message, help)]);
         }
     };
     match news {
@@ -328,16 +330,16 @@ fn report_checkpoint(
 fn written_file_warning(problem: &WriteWarning) -> Diagnostic {
     match problem {
         WriteWarning::AttributesLost { .. } => {
-            create_argument_warning(&problem.to_string(), "use -o FILE to keep the old file")
+            argument_warning(&problem.to_string(), "use -o FILE to keep the old file")
         }
         WriteWarning::NotSynchronized { .. } => {
-            create_argument_warning(&problem.to_string(), "check the disk, then run `sync`")
+            argument_warning(&problem.to_string(), "check the disk, then run `sync`")
         }
     }
 }
 
 /// Creates a warning about the arguments.
-fn create_argument_warning(message: &str, help: &str) -> Diagnostic {
+fn argument_warning(message: &str, help: &str) -> Diagnostic {
     Diagnostic {
         severity: Severity::Warning,
         message: message.to_owned(),
@@ -352,11 +354,11 @@ fn create_argument_warning(message: &str, help: &str) -> Diagnostic {
 fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` in [camera], for example to 0.1";
-        create_argument_warning("--dof on has no effect: the camera's aperture is 0", help)
+        argument_warning("--dof on has no effect: the camera's aperture is 0", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
         let help = "use `--integrator whitted`";
-        create_argument_warning("--photons on has no effect: photons work with whitted only", help)
+        argument_warning("--photons on has no effect: photons work with whitted only", help)
     });
     dof.into_iter().chain(photons).collect()
 }
@@ -369,16 +371,18 @@ fn report_done(
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.allows_text_results() {
-        written.iter().for_each(|path| console.print_message(&describe_written_image(path, report, turn)));
+        written
+            .iter()
+            .for_each(|path| console.print_line_to_stderr(&describe_written_image(path, report, turn)));
     }
     if let Some(turn) = turn.filter(|turn| turn.is_last()) {
         written
             .iter()
             .filter_map(|path| leftover_frames_warning(path, turn))
-            .for_each(|message| console.print_message(&message));
+            .for_each(|message| console.print_line_to_stderr(&message));
     }
     if !reporter.reports_diagnostics() {
-        unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
+        unwritten.iter().for_each(|message| console.print_line_to_stderr(&format!("error: {message}")));
     }
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
@@ -395,7 +399,7 @@ fn leftover_frames_warning(last: &Path, turn: TurntableFrame) -> Option<String> 
 fn report_failure(failure: &Failure, console: &Console) -> Exit {
     match failure {
         Failure::Scene(diagnostics) => console.print_diagnostics(diagnostics),
-        Failure::Work(message) => console.print_message(&format!("error: {message}")),
+        Failure::Work(message) => console.print_line_to_stderr(&format!("error: {message}")),
     }
     exit_code_for_failure(failure)
 }

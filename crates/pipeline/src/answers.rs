@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::film::Rect;
-use crate::scene::description::Viewpoint;
+use crate::scene::description::ResolvedCamera;
 
 /// Position in an image, as fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,14 +59,14 @@ impl NormalizedRect {
     }
 
     /// Maps a position in the section to a position in the image.
-    pub fn to_image_position(self, position: ImagePosition) -> ImagePosition {
+    pub fn section_to_image(self, position: ImagePosition) -> ImagePosition {
         ImagePosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
 }
 
 /// Object and color at an image position.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PickResult {
+pub struct PickedPixel {
     /// Column and row of the pixel.
     pub pixel: [u32; 2],
     /// The visible object. `None` if the ray hits nothing.
@@ -104,9 +104,9 @@ pub struct PickedObject {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovedCamera {
     /// The camera after the move.
-    pub camera: Viewpoint,
+    pub camera: ResolvedCamera,
     /// The scene's camera before the move.
-    pub own: Viewpoint,
+    pub own: ResolvedCamera,
 }
 
 /// Result of saving the camera to the scene file.
@@ -121,12 +121,12 @@ pub struct CameraSaveResult {
     /// Whether a new scene file was created next to the model, which remains open.
     pub of_model: bool,
     /// The edit that the `u` key undoes. `None` if nothing was written or the file is new.
-    pub edit: Option<SceneFileEdit>,
+    pub edit: Option<SavedCameraEdit>,
 }
 
 /// An edit that saved a camera to a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SceneFileEdit {
+pub struct SavedCameraEdit {
     /// The scene file.
     pub path: PathBuf,
     /// Text before the edit.

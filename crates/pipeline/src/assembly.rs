@@ -10,7 +10,7 @@ use super::turntable::TurntableFrame;
 use crate::assets::GkitOrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
-use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
+use crate::scene::description::{Camera, CameraOverrides, ResolvedCamera, Scene};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
@@ -26,7 +26,7 @@ pub(super) struct RequestCamera {
 }
 
 impl RequestCamera {
-    pub(super) fn new(scene: &Scene, orbiter: Option<GkitOrbiterCamera>, change: &CameraChange) -> Self {
+    pub(super) fn new(scene: &Scene, orbiter: Option<GkitOrbiterCamera>, change: &CameraOverrides) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.has_changes() {
             Self { camera: own.viewpoint().with_change(change).into(), orbiter: None }
@@ -42,18 +42,19 @@ impl RequestCamera {
             None | Some(TurntableFrame { number: 0, .. }) => self,
             Some(turn) => {
                 let view = self.viewpoint();
-                let change = CameraChange { pose: Some(turn.pose(&view.pose)), ..CameraChange::default() };
+                let change =
+                    CameraOverrides { pose: Some(turn.pose(&view.pose)), ..CameraOverrides::default() };
                 Self { camera: view.with_change(&change).into(), orbiter: None }
             }
         }
     }
 
-    pub(super) fn viewpoint(&self) -> Viewpoint {
-        world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
+    pub(super) fn viewpoint(&self) -> ResolvedCamera {
+        world::Camera::look_at_from_description(&self.camera, self.orbiter.as_ref())
     }
 
     /// Returns the coordinate origin that maximizes precision near the camera.
-    pub(super) fn coordinate_origin(&self) -> DVec3 {
+    pub(super) fn origin_near_camera(&self) -> DVec3 {
         world::choose_origin_near_camera_target(&self.camera, self.orbiter.as_ref())
     }
 }

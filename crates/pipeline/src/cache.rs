@@ -73,7 +73,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
     }
 
     /// Returns the value with this name, regardless of its key.
-    pub(super) fn latest(&self, name: &N) -> Option<&Arc<T>> {
+    pub(super) fn get_by_name(&self, name: &N) -> Option<&Arc<T>> {
         self.entries.get(name).map(|entry| &entry.value)
     }
 
@@ -84,7 +84,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
 
     /// Ends a request. If it failed, the values used by the last successful request stay protected, so that
     /// fixing a typo does not reload anything.
-    pub(super) fn end_request(&mut self, success: bool, request: u64) {
+    pub(super) fn record_request_usage(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };
             entry.proven = if success { entry.used } else { entry.proven };
@@ -144,7 +144,7 @@ mod tests {
 
     /// Ends a request and evicts unused values until the remaining ones fit into `most_bytes`.
     fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
-        pool.end_request(success, request);
+        pool.record_request_usage(success, request);
         pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), most_bytes));
     }
 

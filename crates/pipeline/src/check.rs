@@ -59,7 +59,7 @@ pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failur
     let IncrementalSceneChecker(mut engine) = IncrementalSceneChecker::default();
     let token = CancelToken::new();
     let (parsed, meshes, textures, _) =
-        engine.load_all_assets(path, &overrides.sets, &silent_sink(), &token)?;
+        engine.load_scene_and_all_assets(path, &overrides.sets, &silent_sink(), &token)?;
     let plan =
         resolve_plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
     Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
@@ -83,7 +83,7 @@ impl IncrementalSceneChecker {
         token: &CancelToken,
     ) -> Result<SceneSummary, Failure> {
         let (parsed, meshes, textures, warnings) =
-            self.0.load_all_assets(path, sets, &silent_sink(), token)?;
+            self.0.load_scene_and_all_assets(path, sets, &silent_sink(), token)?;
         Ok(summarize(&parsed, &meshes, &textures, warnings))
     }
 }

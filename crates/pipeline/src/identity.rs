@@ -12,15 +12,15 @@ use super::stages::parse::ParsedScene;
 use super::watch::content::{FileContentId, FileRead};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
-use crate::output::part::Dependency;
-use crate::scene::description::{CameraChange, Scene};
+use crate::output::part::RenderInput;
+use crate::scene::description::{CameraOverrides, Scene};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Everything that affects an image.
 pub(super) struct ImageDependencies<'a> {
     pub(super) parsed: &'a ParsedScene,
     pub(super) plan: &'a RenderPlan,
-    pub(super) camera: &'a CameraChange,
+    pub(super) camera: &'a CameraOverrides,
     /// Files that were read, including the scene file.
     pub(super) files: &'a [FileRead],
     /// The whole image's sample count if the image is rendered in parts. All parts must use the same sample
@@ -30,22 +30,22 @@ pub(super) struct ImageDependencies<'a> {
 
 impl ImageDependencies<'_> {
     /// Returns the names and values of everything that affects the image.
-    pub(super) fn names_and_values(&self) -> Vec<Dependency> {
-        let mut traits = vec![Dependency::from_setting("glimt", BUILD)];
+    pub(super) fn names_and_values(&self) -> Vec<RenderInput> {
+        let mut traits = vec![RenderInput::from_name_and_value("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
-        traits.extend(
-            others.map(|file| Dependency::file(&relative_path(&file.path, scene_path), hash_or_reason(file))),
-        );
-        traits.push(Dependency::from_combined_hash(self.fingerprint().to_string()));
+        traits.extend(others.map(|file| {
+            RenderInput::file(&path_relative_to_scene(&file.path, scene_path), hash_or_reason(file))
+        }));
+        traits.push(RenderInput::from_combined_hash(self.fingerprint().to_string()));
         traits
     }
 
-    fn add_settings(&self, traits: &mut Vec<Dependency>) {
+    fn add_settings(&self, traits: &mut Vec<RenderInput>) {
         let RenderSettings { render, dof, view, photons, layers } =
             self.plan.settings.without_ineffective_settings();
-        let mut add = |name: &str, value: String| traits.push(Dependency::from_setting(name, value));
+        let mut add = |name: &str, value: String| traits.push(RenderInput::from_name_and_value(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
         add("error", render.error.to_string());
@@ -137,7 +137,7 @@ fn file_content_and_part_key(content: &str, part: Option<u32>) -> Fingerprint {
 }
 
 /// Returns the path relative to the scene's folder, or only the file name if the path is outside that folder.
-pub(super) fn relative_path(path: &Path, scene: &Path) -> String {
+pub(super) fn path_relative_to_scene(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
     let name = || path.file_name().map(PathBuf::from).unwrap_or_default();

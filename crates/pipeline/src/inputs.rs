@@ -5,12 +5,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::identity::relative_path;
+use super::identity::path_relative_to_scene;
 use super::stages::meshes::Meshes;
 use super::stages::parse::ParsedScene;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
-use crate::output::{FileFingerprint, FileIdentity};
+use crate::output::{FallbackFileIdentity, FileIdentity};
 use crate::scene::description::Camera;
 use crate::scene::{LoadedScene, is_model};
 
@@ -63,7 +63,7 @@ impl ProtectedInputs {
     }
 
     /// Adds the material libraries and images used by mesh files, and the files referenced by glTF files.
-    pub(super) fn add_meshes(&mut self, loaded: &Arc<LoadedScene>, meshes: &Meshes) {
+    pub(super) fn add_mesh_dependencies(&mut self, loaded: &Arc<LoadedScene>, meshes: &Meshes) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
             let mut add = |path: &PathBuf, role: String| {
@@ -98,32 +98,34 @@ impl ProtectedInputs {
     /// Returns the sorted paths of all files except the scene, relative to the scene's folder.
     pub(super) fn relative_paths(&self, scene: &Path) -> Vec<String> {
         let others = self.0.iter().filter(|input| input.path != scene);
-        let paths: BTreeSet<_> = others.map(|input| relative_path(&input.path, scene)).collect();
+        let paths: BTreeSet<_> = others.map(|input| path_relative_to_scene(&input.path, scene)).collect();
         paths.into_iter().collect()
     }
 
     /// Indexes the files according to their current state on disk.
-    pub(super) fn index_by_identity(&self) -> InputIndex<'_> {
+    pub(super) fn build_identity_index(&self) -> InputIndex<'_> {
         let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
             if let Some(identity) = FileIdentity::from_path(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
             }
-            on_disk.alike.extend(FileFingerprint::from_path(&input.path).map(|likeness| (likeness, input)));
+            on_disk
+                .alike
+                .extend(FallbackFileIdentity::from_path(&input.path).map(|likeness| (likeness, input)));
         }
         on_disk
     }
 
     /// Whether a path currently refers to one of the files.
     pub(super) fn contain(&self, path: &Path) -> bool {
-        FileIdentity::from_path(path).is_some_and(|_| self.index_by_identity().find(path).is_some())
+        FileIdentity::from_path(path).is_some_and(|_| self.build_identity_index().find(path).is_some())
     }
 }
 
 /// Inputs indexed by file identity, with fingerprints for finding similar files.
 pub(super) struct InputIndex<'a> {
     by_identity: HashMap<FileIdentity, &'a ProtectedInput>,
-    alike: Vec<(FileFingerprint, &'a ProtectedInput)>,
+    alike: Vec<(FallbackFileIdentity, &'a ProtectedInput)>,
 }
 
 impl<'a> InputIndex<'a> {
@@ -132,7 +134,7 @@ impl<'a> InputIndex<'a> {
         if let Some(input) = self.by_identity.get(&FileIdentity::from_path(path)?) {
             return Some(input);
         }
-        let own = FileFingerprint::from_path(path)?;
+        let own = FallbackFileIdentity::from_path(path)?;
         self.alike.iter().find(|(likeness, _)| own.may_equal(likeness)).map(|(_, input)| *input)
     }
 }

@@ -19,7 +19,7 @@ pub(crate) fn fingerprint_context<'a>(
 
 /// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
 /// the entire mesh emissive.
-pub(crate) fn separated_emitter_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
+pub(crate) fn lifted_emitter_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
     FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn geometry_key(
     distinct: impl Iterator<Item = Option<Fingerprint>>,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("lifted");
-    key.add_fingerprint(&with_origin(&shapes_key(scene, of), origin));
+    key.add_fingerprint(&key_with_coordinate_origin(&shapes_key(scene, of), origin));
     for lift in lifts {
         key.add_dvec3(*lift);
     }
@@ -70,7 +70,7 @@ pub(crate) fn coplanar_lights_key(scene: &Scene, of: &FingerprintContext<'_>) ->
 }
 
 /// Combines a key with a coordinate origin.
-pub(crate) fn with_origin(of: &Fingerprint, origin: DVec3) -> Fingerprint {
+pub(crate) fn key_with_coordinate_origin(of: &Fingerprint, origin: DVec3) -> Fingerprint {
     FingerprintHasher::new("from").add_fingerprint(of).add_dvec3(origin).finish()
 }
 
@@ -110,7 +110,8 @@ pub(crate) fn lights_key(
     (sky, patterns): (Option<&Fingerprint>, &[&Fingerprint]),
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("lights");
-    key.add_fingerprint(&with_origin(&light_descriptions_key(scene, of), origin)).add_bool(sky.is_some());
+    key.add_fingerprint(&key_with_coordinate_origin(&light_descriptions_key(scene, of), origin))
+        .add_bool(sky.is_some());
     for lift in lifts {
         key.add_dvec3(*lift);
     }
@@ -165,7 +166,7 @@ pub(crate) fn photons_key(
 ) -> Fingerprint {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = FingerprintHasher::new("photons");
-    key.add_fingerprint(&with_origin(surfaces, origin))
+    key.add_fingerprint(&key_with_coordinate_origin(surfaces, origin))
         .add_u64(count.into())
         .add_f32(radius)
         .add_u64(bounces.into());
@@ -406,7 +407,7 @@ mod tests {
     #[test]
     fn trees_of_meshes_with_distinct_lights_differ() {
         let mesh = FingerprintHasher::new("mesh").finish();
-        let distinct = [false, true].map(|is_emissive| Some(separated_emitter_mesh_key(&mesh, is_emissive)));
+        let distinct = [false, true].map(|is_emissive| Some(lifted_emitter_mesh_key(&mesh, is_emissive)));
         let trees =
             [None, distinct[0], distinct[1]].map(|distinct| mesh_accel_key(&mesh, Accel::Bvh, distinct));
         assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);

@@ -6,7 +6,7 @@
 
 use super::plan::RenderPlan;
 use super::render::share::Shard;
-use super::stages::StopReason;
+use super::stages::AbortReason;
 use super::stages::meshes::Meshes;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
@@ -120,7 +120,7 @@ impl MemoryEstimate {
     ///
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
-    pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, StopReason> {
+    pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, AbortReason> {
         self.bytes_left_within_given_limit(plan, memory_limit)
     }
 
@@ -129,15 +129,15 @@ impl MemoryEstimate {
         &self,
         plan: &RenderPlan,
         limit: impl FnOnce() -> Option<MemoryLimit>,
-    ) -> Result<u64, StopReason> {
+    ) -> Result<u64, AbortReason> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
-            return Err(StopReason::work_failure(format!(
+            return Err(AbortReason::work_failure(format!(
                 "the frames need {} of memory until the animation is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
                 format_bytes(*bytes),
-                format_memory_option(all)
+                format_memory_arg(all)
             )));
         }
         // A command-line limit replaces the system limit, because the estimate is conservative.
@@ -168,9 +168,8 @@ impl MemoryEstimate {
             true => MISSING_UNIT,
             false => remedy,
         };
-        let try_anyway =
-            format!(", raise the limit, or try anyway with --memory {}", format_memory_option(all));
-        Err(StopReason::work_failure(format!(
+        let try_anyway = format!(", raise the limit, or try anyway with --memory {}", format_memory_arg(all));
+        Err(AbortReason::work_failure(format!(
             "the render needs about {} of memory ({}), more than the {} allowed by {setting}; {remedy}{}",
             format_bytes(all),
             items.join(", "),
@@ -192,7 +191,7 @@ fn sample_sum_order(plan: &RenderPlan) -> SumOrder {
 }
 
 /// Formats a byte count as a `--memory` value, rounded up.
-fn format_memory_option(bytes: u64) -> String {
+fn format_memory_arg(bytes: u64) -> String {
     format!("{}GiB", bytes.div_ceil(1 << 30))
 }
 
@@ -241,7 +240,7 @@ mod tests {
             ..Overrides::default()
         };
         let said = match MemoryEstimate::for_image(&planned(&large)).check(&planned(&large)) {
-            Err(StopReason::Failed(Failure::Work(said))) => said,
+            Err(AbortReason::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
         // 64 million pixels at 40 bytes (film) and 15 bytes (image).
@@ -251,7 +250,7 @@ mod tests {
         let said = |memory: u64| {
             let small = Overrides { memory: Some(memory), ..Overrides::default() };
             match MemoryEstimate::for_image(&planned(&small)).check(&planned(&small)) {
-                Err(StopReason::Failed(Failure::Work(said))) => said,
+                Err(AbortReason::Failed(Failure::Work(said))) => said,
                 other => panic!("{other:?}"),
             }
         };
@@ -272,7 +271,7 @@ mod tests {
             MemoryEstimate::for_image(&plan).bytes_left_within_given_limit(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
-            Err(StopReason::Failed(Failure::Work(said))) => said,
+            Err(AbortReason::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
         for fact in [" 41 MiB ", " 8 MiB allowed by the control group (x); ", "--memory 1GiB"] {

@@ -18,7 +18,7 @@ use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, PhotonOptions, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::system::threads::core_count;
+use crate::system::threads::logical_cpu_count;
 
 /// Resolved settings of a request, merged from the scene, the command line and the keyboard.
 #[derive(Clone, Debug)]
@@ -103,17 +103,18 @@ pub(super) fn resolve_plan(
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);
     let is_usual = named_by == OutputNameSource::Default && overrides.turn.is_some();
     let default_names = outputs.first().filter(|_| is_usual).cloned();
-    let OutputFiles { outputs, moving, later_outputs } = OutputFiles::group_by_kind(outputs, overrides.turn);
+    let OutputFiles { outputs, moving, later_outputs } =
+        OutputFiles::group_turntable_outputs(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
         // Part files do not use an image format.
-        Some(_) => check_shard(&settings, overrides)?,
+        Some(_) => check_shardable(&settings, overrides)?,
         None => {
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
             outputs.iter().try_for_each(check)?;
             check_layers(&outputs, &moving, settings.view, overrides)?;
             moving.iter().try_for_each(|path| {
-                check_animation_format(path, (render.width, render.height), bit_depth)
+                check_animation_size_and_depth(path, (render.width, render.height), bit_depth)
             })?;
         }
     }
@@ -188,14 +189,14 @@ fn output_paths(
         return match overrides.turn {
             None => (vec![of_scene.clone()], OutputNameSource::Scene),
             // The scene specifies only one file, so the turntable uses default names.
-            Some(_) => (vec![turntable::with_placeholder(of_scene)], OutputNameSource::Default),
+            Some(_) => (vec![turntable::add_frame_placeholder(of_scene)], OutputNameSource::Default),
         };
     }
     let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
     name.push(".png");
     let name = PathBuf::from(name);
     (
-        vec![if overrides.turn.is_some() { turntable::with_placeholder(&name) } else { name }],
+        vec![if overrides.turn.is_some() { turntable::add_frame_placeholder(&name) } else { name }],
         OutputNameSource::Default,
     )
 }
@@ -215,7 +216,7 @@ struct OutputFiles {
 }
 
 impl OutputFiles {
-    fn group_by_kind(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
+    fn group_turntable_outputs(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
         let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
         let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
@@ -262,7 +263,11 @@ fn check_layers(
 }
 
 /// Checks that an animation format supports the image size and bit depth.
-fn check_animation_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+fn check_animation_size_and_depth(
+    path: &Path,
+    size: (u32, u32),
+    bit_depth: u8,
+) -> Result<(), Box<Diagnostic>> {
     let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
         Err(error) => error.to_string(),
@@ -296,7 +301,7 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
 
 /// Checks that an image with these settings can be rendered in parts and that exactly one output file is
 /// specified.
-fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
+fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
     let refused = |message: &str, help: &str| {
         let (message, help) = (message.to_owned(), Some(help.to_owned()));
         Err(Box::new(Diagnostic {
@@ -366,7 +371,7 @@ fn tone_mapping(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
 
 /// Returns the number of render threads: the requested number, or one per core.
 pub(super) fn thread_count(overrides: &Overrides) -> usize {
-    overrides.threads.filter(|count| *count > 0).unwrap_or_else(core_count)
+    overrides.threads.filter(|count| *count > 0).unwrap_or_else(logical_cpu_count)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub(crate) enum OverwriteProtection {
 
 /// A file that an image must not replace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ProtectedFile {
+pub(crate) enum OverwriteConflict {
     /// The image of another scene.
     OtherScene,
     /// A file that is not an image written by glimt.
@@ -26,19 +26,21 @@ pub(crate) enum ProtectedFile {
 
 impl OverwriteProtection {
     /// Returns why an image must not replace the file at a path, or `None` if it may.
-    pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<ProtectedFile> {
+    pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<OverwriteConflict> {
         match self {
             Self::OtherImages(_) if may_replace_image(at).reason_to_keep().is_some() => {
-                Some(ProtectedFile::Foreign)
+                Some(OverwriteConflict::Foreign)
             }
-            Self::OtherImages(scene) => mismatched_source_scene(scene, at).map(|_| ProtectedFile::OtherScene),
-            Self::Parts => part::is_part(at).then_some(ProtectedFile::Foreign),
+            Self::OtherImages(scene) => {
+                source_scene_if_different(scene, at).map(|_| OverwriteConflict::OtherScene)
+            }
+            Self::Parts => part::is_part(at).then_some(OverwriteConflict::Foreign),
             Self::Nothing => None,
         }
     }
 }
 
 /// Returns the scene recorded in an image written by glimt, unless it is this scene.
-pub(crate) fn mismatched_source_scene(scene: &Path, at: &Path) -> Option<String> {
-    scene_name_in_png(at).filter(|named| !scene_path::refers_to_scene(named, scene, at))
+pub(crate) fn source_scene_if_different(scene: &Path, at: &Path) -> Option<String> {
+    scene_name_in_png(at).filter(|named| !scene_path::metadata_path_refers_to_scene(named, scene, at))
 }

@@ -14,16 +14,16 @@ use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{
-    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickResult, PickedObject, SceneFileEdit,
+    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickedObject, PickedPixel, SavedCameraEdit,
 };
 pub use super::report::{
-    ImageReport, LightsReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
+    ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
-use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
+use super::settings::{EffectiveSettings, KeyboardSettings, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Srgb8Image;
 pub use crate::output::WriteWarning;
-pub use crate::scene::description::Viewpoint;
+pub use crate::scene::description::ResolvedCamera;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 
@@ -35,12 +35,12 @@ pub enum Command {
     /// Write the current image to its files as soon as every pixel has a sample.
     Write,
     /// Change the preview size and show the current image again. Rendering continues.
-    Preview(Option<PreviewSize>),
+    Preview(Option<MaxPreviewSize>),
     /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
     KeepCamera(MovedCamera),
     /// Undo this edit of the scene file unless the file has changed since. [`Event::CameraUndone`] reports the result.
     /// Rendering continues.
-    UndoCamera(SceneFileEdit),
+    UndoCamera(SavedCameraEdit),
     /// Identify the object at an image position. [`Event::Picked`] reports the result. Rendering continues.
     Pick(ImagePosition),
     /// Stop the current render.
@@ -64,9 +64,9 @@ pub struct Request {
     /// Overrides from the command line and the keyboard.
     pub overrides: Overrides,
     /// Maximum size of previews, which keep the image's aspect ratio. `None` disables previews.
-    pub preview: Option<PreviewSize>,
+    pub preview: Option<MaxPreviewSize>,
     /// Whether to write the finished image.
-    pub write: WriteMode,
+    pub write: WriteRequirement,
     /// Overrides for the scene's own image if this request shows another one. The film and checkpoint of the
     /// scene's own image are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
@@ -81,7 +81,7 @@ pub struct Request {
 
 /// Whether to write the finished image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WriteMode {
+pub enum WriteRequirement {
     /// Do not write the image.
     No,
     /// Try to write the image. It is rendered and shown even if writing fails. [`Event::WriteFailed`] and
@@ -93,7 +93,7 @@ pub enum WriteMode {
 
 /// Maximum preview size on a display with square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreviewSize {
+pub struct MaxPreviewSize {
     /// Maximum width in pixels.
     pub width: u32,
     /// Maximum height in pixels.
@@ -152,11 +152,11 @@ pub enum Event {
         /// Effective settings of the request.
         settings: Box<EffectiveSettings>,
         /// The scene's camera.
-        camera: Viewpoint,
+        camera: ResolvedCamera,
         /// The scene's exposure in stops.
         exposure: f32,
         /// The scene's values for the other settings that keys can change.
-        own: AdjustableSettings,
+        own: KeyboardSettings,
     },
     /// The scene file was read.
     Text {
@@ -260,7 +260,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The object and the color.
-        picked: Box<PickResult>,
+        picked: Box<PickedPixel>,
     },
     /// The request is finished.
     Done {
@@ -417,12 +417,12 @@ pub struct RenderProgress {
     /// Whether every pixel will have `total_samples` samples, because there is no noise target or time limit.
     pub is_total_fixed: bool,
     /// Current noise. `None` during the first half second and the first 16 samples.
-    pub noise: Option<NoiseProgress>,
+    pub noise: Option<NoisePrediction>,
 }
 
 /// Current and predicted noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoiseProgress {
+pub struct NoisePrediction {
     /// Most recently measured [`Film::relative_error`](crate::film::Film::relative_error).
     pub now: f64,
     /// Seconds from the start of the render stage to the measurement.
@@ -433,11 +433,11 @@ pub struct NoiseProgress {
 }
 
 /// Slot for the latest preview.
-pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
+pub type PreviewSlot = Arc<std::sync::Mutex<Option<PreviewUpdate>>>;
 
 /// A preview and the image it shows.
 #[derive(Clone, Debug)]
-pub struct LatestPreview {
+pub struct PreviewUpdate {
     /// Request number.
     pub generation: u64,
     /// The preview image, no larger than the requested size.

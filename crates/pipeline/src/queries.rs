@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use super::inputs::ProtectedInputs;
 use super::protocol::{
-    CameraSaveResult, Event, ImagePosition, MovedCamera, PickResult, PickedObject, SceneFileEdit, Viewpoint,
+    CameraSaveResult, Event, ImagePosition, MovedCamera, PickedObject, PickedPixel, ResolvedCamera,
+    SavedCameraEdit,
 };
 use super::render::film_state::FilmState;
 use super::sink::EventSink;
@@ -27,7 +28,7 @@ use crate::world::World;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum QueryOrEdit {
     KeepCamera(MovedCamera),
-    UndoCamera(SceneFileEdit),
+    UndoCamera(SavedCameraEdit),
     Pick(ImagePosition),
 }
 
@@ -56,7 +57,7 @@ pub(super) struct QueryContext {
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
     /// The scene's camera.
-    pub(super) own: Viewpoint,
+    pub(super) own: ResolvedCamera,
 }
 
 impl QueryContext {
@@ -82,14 +83,14 @@ impl QueryContext {
     }
 
     /// Finds the first object hit by the ray through a pixel's center.
-    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> PickResult {
+    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> PickedPixel {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = state.and_then(|state| state.film.pixel(Quantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let thing = self.object_at(self.settings.pixel_to_camera(middle));
-        PickResult { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
+        let thing = self.object_at(self.settings.pixel_to_image_plane(middle));
+        PickedPixel { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
     }
 
     fn object_at(&self, place: DVec2) -> Option<PickedObject> {
@@ -112,7 +113,7 @@ impl QueryContext {
             path: loaded.path.clone(),
             line: loaded.line_number(&object.span),
             material,
-            position: (surface.point.as_dvec3() + world.geometry.origin()).to_array(),
+            position: (surface.point.as_dvec3() + world.geometry.coordinate_origin()).to_array(),
             normal: surface.shading_normal.to_array(),
             is_front,
             distance: f64::from(hit.shape.t),
@@ -130,17 +131,17 @@ impl QueryContext {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
         if is_model(&path) {
-            return write_model_scene(loaded, camera);
+            return save_model_scene_with_camera(loaded, camera);
         }
         if has_mesh_extension(&path) && path.symlink_metadata().is_err() {
             return Err(format!("{} {MODEL_MISSING}", path.display()));
         }
         let read = loaded.source.file_text();
         let changed = SCENE_FILE_CHANGED;
-        if is_gone(&path) {
+        if is_file_missing(&path) {
             return Err(SCENE_FILE_MISSING.to_owned());
         }
-        if !has_text(&path, read) {
+        if !file_text_equals(&path, read) {
             return Err(changed.to_owned());
         }
         // Values that were not changed with keys come from the old camera, so writing them would overwrite
@@ -152,42 +153,42 @@ impl QueryContext {
         let edit = if text == read {
             None
         } else {
-            replace_scene_text(&path, (read, &text), inputs, (changed, "camera not saved"))?;
-            Some(SceneFileEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
+            replace_scene_text_if_unchanged(&path, (read, &text), inputs, (changed, "camera not saved"))?;
+            Some(SavedCameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
-        let is_own =
-            LoadedScene::parse_camera(&text, &self.sets).is_some_and(|own| own.matches_viewpoint(camera));
+        let is_own = LoadedScene::parse_camera_from_text(&text, &self.sets)
+            .is_some_and(|own| own.matches_viewpoint(camera));
         Ok(CameraSaveResult { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
 
 /// Undoes a camera edit by restoring the previous text. Fails if the file has changed since the edit.
-fn undo_camera_edit(edit: &SceneFileEdit, inputs: &ProtectedInputs) -> Result<PathBuf, String> {
-    let SceneFileEdit { path, before, after } = edit;
+fn undo_camera_edit(edit: &SavedCameraEdit, inputs: &ProtectedInputs) -> Result<PathBuf, String> {
+    let SavedCameraEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
-    if is_gone(path) {
+    if is_file_missing(path) {
         return Err(format!("{} does not exist: nothing to undo", path.display()));
     }
-    if !has_text(path, after) {
+    if !file_text_equals(path, after) {
         return Err(changed);
     }
-    replace_scene_text(path, (after, before), inputs, (&changed, "not undone"))?;
+    replace_scene_text_if_unchanged(path, (after, before), inputs, (&changed, "not undone"))?;
     Ok(path.clone())
 }
 
 /// Whether a file does not exist.
-fn is_gone(path: &Path) -> bool {
+fn is_file_missing(path: &Path) -> bool {
     path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
 /// Whether a file's text is exactly `text`.
-fn has_text(path: &Path, text: &str) -> bool {
+fn file_text_equals(path: &Path, text: &str) -> bool {
     read_current_text(path).is_ok_and(|now| *now == *text)
 }
 
 /// Replaces the text of a scene file. If the file's text is not `old`, fails with the message `changed`. If
 /// file metadata would be lost, fails with a message that ends with `outcome`.
-fn replace_scene_text(
+fn replace_scene_text_if_unchanged(
     path: &Path,
     (old, new): (&str, &str),
     inputs: &ProtectedInputs,
@@ -199,7 +200,7 @@ fn replace_scene_text(
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
     let refused = || OutputError::Refused { reason: changed.to_owned() };
-    let may_replace = |_: &Path| has_text(path, old).then_some(()).ok_or_else(refused);
+    let may_replace = |_: &Path| file_text_equals(path, old).then_some(()).ok_or_else(refused);
     let guard = write::WritePolicy {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
@@ -212,7 +213,10 @@ fn replace_scene_text(
 
 /// Writes the scene generated for a model, but with this camera, to a file next to the model. Never replaces
 /// a file.
-fn write_model_scene(loaded: &LoadedScene, camera: &Viewpoint) -> Result<CameraSaveResult, String> {
+fn save_model_scene_with_camera(
+    loaded: &LoadedScene,
+    camera: &ResolvedCamera,
+) -> Result<CameraSaveResult, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
@@ -235,8 +239,8 @@ mod tests {
     fn unwritable_model_scene_is_reported() {
         let loaded = LoadedScene { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
         let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
-        let camera = Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
-        let said = write_model_scene(&loaded, &camera).expect_err("no folder");
+        let camera = ResolvedCamera { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
+        let said = save_model_scene_with_camera(&loaded, &camera).expect_err("no folder");
         assert_eq!(said, "cannot write gone/a.toml: no such file or directory");
     }
 }

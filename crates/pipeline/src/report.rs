@@ -20,7 +20,7 @@ pub struct Report {
     /// Effective settings.
     pub settings: EffectiveSettings,
     /// The lights and how they are sampled.
-    pub lights: LightsReport,
+    pub lights: LightSamplingReport,
     /// Photon statistics. `None` if the image does not use photons.
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
@@ -78,7 +78,7 @@ impl From<SampleCountStats> for SampleCounts {
 
 /// The lights in a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct LightsReport {
+pub struct LightSamplingReport {
     /// Number of lights. A mesh counts once per emissive material.
     pub count: u64,
     /// Which lights are sampled at each vertex.

@@ -6,25 +6,25 @@ use std::sync::mpsc;
 
 use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 pub use super::engine::{RenderFailure, RenderedImage};
-use super::protocol::{PreviewSize, PreviewSlot, Request, WriteMode};
+use super::protocol::{MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::settings::Overrides;
 use super::sink::EventSink;
 use crate::control::CancelToken;
 
 /// Renders images in memory and keeps caches between renders.
-pub struct Session {
+pub struct HeadlessSession {
     engine: Engine,
     generation: u64,
 }
 
-impl Default for Session {
+impl Default for HeadlessSession {
     fn default() -> Self {
         Self { engine: Engine::new(EngineConfig::default(), Arc::default()), generation: 0 }
     }
 }
 
-impl Session {
+impl HeadlessSession {
     /// Renders an image, starting with an empty film. Does not write any files.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl Session {
             overrides: overrides.clone(),
             preview: None,
             first: None,
-            write: WriteMode::No,
+            write: WriteRequirement::No,
             own: None,
             saves: 0,
             force: true,
@@ -72,7 +72,7 @@ impl PendingCommands for NoPendingCommands {
         false
     }
 
-    fn take_preview_resize(&self) -> Option<Option<PreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>> {
         None
     }
 
@@ -98,7 +98,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
-        let mut session = Session::default();
+        let mut session = HeadlessSession::default();
         let mut render = |seed, samples| {
             let overrides = Overrides { seed: Some(seed), samples: Some(samples), ..Overrides::default() };
             session.render(&scene, &overrides, &CancelToken::new()).expect("an image")
@@ -116,13 +116,14 @@ mod tests {
     #[test]
     fn failed_or_cancelled_render_returns_no_image() {
         let token = CancelToken::new();
-        let missing = Session::default().render(Path::new("none.toml"), &Overrides::default(), &token);
+        let missing =
+            HeadlessSession::default().render(Path::new("none.toml"), &Overrides::default(), &token);
         assert!(matches!(missing, Err(RenderFailure::Failed(Failure::Scene(_)))));
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
         token.cancel();
-        let cancelled = Session::default().render(&scene, &Overrides::default(), &token);
+        let cancelled = HeadlessSession::default().render(&scene, &Overrides::default(), &token);
         assert!(matches!(cancelled, Err(RenderFailure::Cancelled)));
     }
 }

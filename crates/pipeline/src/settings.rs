@@ -7,7 +7,7 @@ use crate::choice;
 use crate::film::Rect;
 pub use crate::integrators::ViewMode;
 use crate::integrators::{LayerSet, RenderSettings, SampleLayer};
-pub use crate::scene::description::CameraChange;
+pub use crate::scene::description::CameraOverrides;
 use crate::scene::description::{Accel, Integrator, RenderOptions, ShadowMode, render_keys};
 
 macro_rules! overrides {
@@ -187,7 +187,7 @@ pub enum ResumeMode {
 
 /// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AdjustableSettings {
+pub struct KeyboardSettings {
     /// Integrator.
     pub integrator: Integrator,
     /// Shadow type.

@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, LatestPreview, NormalizedRect, PreviewImageState, PreviewSlot,
+    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewImageState, PreviewSlot, PreviewUpdate,
     RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
 };
 use super::watch::content::FileRead;
@@ -84,7 +84,7 @@ impl EventSink {
         source: PreviewImageState,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
-        self.replace_preview_and_notify(LatestPreview {
+        self.replace_preview_and_notify(PreviewUpdate {
             generation,
             picture,
             range,
@@ -98,7 +98,7 @@ impl EventSink {
     pub(super) fn send_preview_without_photons(&self, picture: Srgb8Image) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
-        self.replace_preview_and_notify(LatestPreview {
+        self.replace_preview_and_notify(PreviewUpdate {
             generation,
             picture,
             range,
@@ -108,7 +108,7 @@ impl EventSink {
         });
     }
 
-    fn replace_preview_and_notify(&self, latest: LatestPreview) {
+    fn replace_preview_and_notify(&self, latest: PreviewUpdate) {
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
         self.send(Event::Preview { generation: self.generation });
     }

@@ -30,13 +30,13 @@ impl PausableClock {
 
 /// Measures the seconds since the start, excluding pauses.
 #[derive(Debug)]
-pub(super) struct PauseExcludingStopwatch<'a> {
+pub(super) struct PausableStopwatch<'a> {
     begin: Instant,
     token: &'a CancelToken,
     held: Duration,
 }
 
-impl<'a> PauseExcludingStopwatch<'a> {
+impl<'a> PausableStopwatch<'a> {
     pub(super) fn start(token: &'a CancelToken) -> Self {
         Self { begin: Instant::now(), token, held: token.paused_time() }
     }
@@ -55,7 +55,7 @@ mod tests {
     fn stopwatch_stops_while_work_is_paused() {
         const HOLD: Duration = Duration::from_millis(300);
         let (token, begin) = (CancelToken::new(), Instant::now());
-        let watch = PauseExcludingStopwatch::start(&token);
+        let watch = PausableStopwatch::start(&token);
         token.set_paused(true);
         std::thread::sleep(HOLD);
         // The pause must not be included, no matter how slow the machine is.

@@ -2,8 +2,8 @@
 
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::EventSink;
-use super::stages::{StageResult, StopReason};
-use super::stopwatch::PauseExcludingStopwatch;
+use super::stages::{AbortReason, StageResult};
+use super::stopwatch::PausableStopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
@@ -25,9 +25,9 @@ impl StageRunner<'_> {
     pub(super) fn run<T>(
         &mut self,
         name: Stage,
-        work: impl FnOnce() -> Result<StageResult<T>, StopReason>,
-    ) -> Result<T, StopReason> {
-        let watch = PauseExcludingStopwatch::start(self.token);
+        work: impl FnOnce() -> Result<StageResult<T>, AbortReason>,
+    ) -> Result<T, AbortReason> {
+        let watch = PausableStopwatch::start(self.token);
         let before = process_cpu_seconds();
         let report = |status, why| {
             let processor_seconds = process_cpu_seconds() - before;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
 use super::plan::{OutputNameSource, RenderPlan};
-use super::protected::{OverwriteProtection, mismatched_source_scene};
+use super::protected::{OverwriteProtection, source_scene_if_different};
 use super::render::checkpointer::checkpoint_path;
 use super::report::ReportRecognitionFields;
 use super::sink::EventSink;
@@ -54,8 +54,8 @@ pub(super) fn overwrite_protection(plan: &RenderPlan) -> OverwriteProtection {
 
 /// Returns one diagnostic for each of the plan's files that must not be written. Later calls may return other
 /// diagnostics, because symbolic links and files can change.
-pub(super) fn conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> Vec<Diagnostic> {
-    let inputs = inputs.index_by_identity();
+pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> Vec<Diagnostic> {
+    let inputs = inputs.build_identity_index();
     // Later frames have distinct files, because each name contains the frame number.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
@@ -100,7 +100,7 @@ pub(super) fn write_guarded<'a, T>(
     write: impl FnOnce(&WritePolicy<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
-        let inputs = inputs.index_by_identity();
+        let inputs = inputs.build_identity_index();
         // Targets were compared with each other when the write stage started. Since then, only symbolic links
         // can have changed.
         let twin = |target: OutputTarget<'_>, at: &FileIdentity| {
@@ -111,7 +111,7 @@ pub(super) fn write_guarded<'a, T>(
             others.find(|other| FileIdentity::from_path(other.path).as_ref() == Some(at))
         };
         match find_conflict(plan, target, real, &inputs, twin) {
-            Some(conflict) => Err(OutputError::Refused { reason: format_one_line(&conflict) }),
+            Some(conflict) => Err(OutputError::Refused { reason: format_conflict_line(&conflict) }),
             None => Ok(()),
         }
     };
@@ -124,7 +124,7 @@ pub(super) fn write_guarded<'a, T>(
 }
 
 /// Formats a conflict as a single line.
-fn format_one_line(conflict: &Diagnostic) -> String {
+fn format_conflict_line(conflict: &Diagnostic) -> String {
     let help = conflict.help.as_ref().map_or(String::new(), |help| format!("; {help}"));
     format!("{}{help}", conflict.message)
 }
@@ -204,7 +204,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
             let replaced = may_replace_image(at);
-            if let (ReplaceCheck::Own, Some(other)) = (&replaced, mismatched_source_scene(&plan.path, at)) {
+            if let (ReplaceCheck::Own, Some(other)) = (&replaced, source_scene_if_different(&plan.path, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(command_line_error(message, Some(help)));
             }
@@ -229,11 +229,11 @@ fn other_part_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> O
     }
     let head = PartFile::read_header(at).ok();
     let what = match head.as_ref().map(|head| (head.kind, head.share.index, head.share.count)) {
-        Some((part::PartKind::Part, index, count)) => match plan.shard {
+        Some((part::PartOrCheckpoint::Part, index, count)) => match plan.shard {
             Some((own, of)) if of != count || own == index => return None,
             Some(_) | None => format!("part {index}/{count} of a render"),
         },
-        Some((part::PartKind::Checkpoint, ..)) => "a checkpoint".to_owned(),
+        Some((part::PartOrCheckpoint::Checkpoint, ..)) => "a checkpoint".to_owned(),
         None => "a part or checkpoint from another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());

@@ -57,12 +57,12 @@ impl TurntableFrame {
 ///
 /// # Errors
 /// Returns a message with a suggestion.
-pub fn check_frame_pattern(path: &Path) -> Result<(), String> {
+pub fn check_turntable_output(path: &Path) -> Result<(), String> {
     if AnimationFormat::from_path(path).is_some() || split_placeholder(path).is_some() {
         return Ok(());
     }
     let name = path.display();
-    let example = with_placeholder(path);
+    let example = add_frame_placeholder(path);
     let example = example.display();
     Err(format!(
         "{name} can store only one frame of the turntable; use {example} for numbered files, or a .gif or .apng file"
@@ -75,7 +75,7 @@ pub fn has_frame_placeholder(path: &Path) -> bool {
 }
 
 /// Adds a frame number placeholder to a still image's file name: `a.png` becomes `a_####.png`.
-pub fn with_placeholder(path: &Path) -> PathBuf {
+pub fn add_frame_placeholder(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("_####");
     if let Some(ending) = path.extension() {
@@ -189,8 +189,8 @@ mod tests {
         let raw = |bytes: &[u8]| PathBuf::from(OsString::from_vec(bytes.to_vec()));
         let of_raw = frame_path(&raw(b"\xff_##\xfe.png"), TurntableFrame { number: 6, of: 9 });
         assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "non-UTF-8 names should be supported");
-        assert_eq!(check_frame_pattern(&raw(b"\xff_##\xfe.png")), Ok(()));
-        assert_eq!(with_placeholder(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
+        assert_eq!(check_turntable_output(&raw(b"\xff_##\xfe.png")), Ok(()));
+        assert_eq!(add_frame_placeholder(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
     }
 
     #[test]
@@ -205,10 +205,10 @@ mod tests {
 
     #[test]
     fn still_image_file_is_rejected_with_suggestion() {
-        let message = check_frame_pattern(Path::new("x/a.png")).expect_err("one file");
+        let message = check_turntable_output(Path::new("x/a.png")).expect_err("one file");
         assert!(message.contains("x/a_####.png"), "{message}");
         for right in ["a_####.png", "a.gif", "a.APNG", "a#.exr"] {
-            assert_eq!(check_frame_pattern(Path::new(right)), Ok(()), "{right}");
+            assert_eq!(check_turntable_output(Path::new(right)), Ok(()), "{right}");
         }
     }
 }

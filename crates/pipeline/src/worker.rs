@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
-use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, WriteMode};
+use super::protocol::{Command, Event, Failure, MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::settings::Overrides;
 use super::sink::EventSink;
@@ -122,7 +122,7 @@ struct Mailbox {
     /// The current request's settings that the user can change with keys.
     shown: Overrides,
     /// Pending preview size change.
-    preview: Option<Option<PreviewSize>>,
+    preview: Option<Option<MaxPreviewSize>>,
     queries: VecDeque<QueryOrEdit>,
     /// Whether the newest request is paused.
     paused: bool,
@@ -139,7 +139,7 @@ struct Mailbox {
 }
 
 /// Returns a request's settings that the user can change with keys.
-fn adjustable_overrides(request: &Request) -> Overrides {
+fn keyboard_overrides(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
@@ -149,7 +149,7 @@ enum Task {
     /// A request, with the tokens for the render and the write stage.
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
-    Preview(Option<PreviewSize>, CancelToken),
+    Preview(Option<MaxPreviewSize>, CancelToken),
     Query(QueryOrEdit),
     Quit,
 }
@@ -204,7 +204,7 @@ impl CommandSender {
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
-        if request.write != WriteMode::No {
+        if request.write != WriteRequirement::No {
             mailbox.writing.cancel();
         }
         (mailbox.paused, mailbox.preview) = (false, None);
@@ -232,12 +232,12 @@ impl CommandSender {
         let postponed = mailbox
             .request
             .as_ref()
-            .is_some_and(|request| is_meant || !can_write && adjustable_overrides(request) == mailbox.shown);
+            .is_some_and(|request| is_meant || !can_write && keyboard_overrides(request) == mailbox.shown);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
 
-    fn wait_for_task(&self) -> Task {
+    fn wait_for_next_task(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
             // Carry out a write order that came before quitting.
@@ -255,7 +255,7 @@ impl CommandSender {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.shown = adjustable_overrides(&request);
+                mailbox.shown = keyboard_overrides(&request);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -281,7 +281,7 @@ impl PendingCommands for CommandSender {
         is_taken
     }
 
-    fn take_preview_resize(&self) -> Option<Option<PreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>> {
         self.lock().preview.take()
     }
 
@@ -313,7 +313,7 @@ impl Worker {
         let mut sink =
             EventSink { generation: 0, events: self.remote.events.clone(), previews: self.previews.clone() };
         loop {
-            let outcome = match self.remote.wait_for_task() {
+            let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
                     engine.checkpoint_saved_scene_image(&sink, self.remote.interruption());
                     break;
@@ -373,7 +373,7 @@ mod tests {
             scene: "a.toml".into(),
             overrides: Default::default(),
             preview: None,
-            write: WriteMode::No,
+            write: WriteRequirement::No,
             own: None,
             saves: 0,
             force: false,
@@ -382,7 +382,9 @@ mod tests {
     }
 
     fn token(remote: &CommandSender) -> CancelToken {
-        let Task::Render(_, token, _) = remote.wait_for_task() else { panic!("expected a pending request") };
+        let Task::Render(_, token, _) = remote.wait_for_next_task() else {
+            panic!("expected a pending request")
+        };
         token
     }
 
@@ -427,9 +429,9 @@ mod tests {
         remote.send(Command::Write);
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
-        assert!(matches!(remote.wait_for_task(), Task::Write));
+        assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(!remote.postpone_write_to_pending(false), "no request should be pending");
-        assert!(matches!(remote.wait_for_task(), Task::Quit));
+        assert!(matches!(remote.wait_for_next_task(), Task::Quit));
     }
 
     #[test]
@@ -437,7 +439,7 @@ mod tests {
         let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
-            let Task::Render(_, token, writing) = remote.wait_for_task() else {
+            let Task::Render(_, token, writing) = remote.wait_for_next_task() else {
                 panic!("expected a pending request")
             };
             (token, writing)
@@ -451,7 +453,7 @@ mod tests {
             "a request without output should not cancel writing"
         );
         let Command::Render(request) = render(3) else { panic!("a request") };
-        remote.send(Command::Render(Box::new(Request { write: WriteMode::Try, ..*request })));
+        remote.send(Command::Render(Box::new(Request { write: WriteRequirement::Try, ..*request })));
         assert!(writing.is_cancelled());
         let (token, writing) = begin(4);
         remote.send(Command::Quit);
@@ -467,7 +469,7 @@ mod tests {
         let Command::Render(view) = render(2) else { panic!("a request") };
         let overrides = Overrides { view: Some(ViewMode::Normal), ..view.overrides.clone() };
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
-        assert!(matches!(remote.wait_for_task(), Task::Write));
+        assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(
             !remote.postpone_write_to_pending(false),
             "the order should not be postponed, so that an error is reported"
@@ -476,7 +478,7 @@ mod tests {
         // complete.
         remote.send(Command::Write);
         assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
-        assert!(matches!(remote.wait_for_task(), Task::Write));
+        assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(remote.postpone_write_to_pending(true));
     }
 
@@ -487,17 +489,17 @@ mod tests {
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
         assert!(
-            matches!(remote.wait_for_task(), Task::Write),
+            matches!(remote.wait_for_next_task(), Task::Write),
             "the order should apply to the shown image first"
         );
         assert!(
             remote.postpone_write_to_pending(false),
             "the order should be postponed for an incomplete image"
         );
-        assert!(matches!(remote.wait_for_task(), Task::Render(..)));
+        assert!(matches!(remote.wait_for_next_task(), Task::Render(..)));
         assert!(remote.take_write(), "the request should take the order");
         assert!(!remote.take_write());
-        assert!(matches!(remote.wait_for_task(), Task::Preview(None, _)));
+        assert!(matches!(remote.wait_for_next_task(), Task::Preview(None, _)));
         assert!(!remote.postpone_write_to_pending(false), "no request should be pending");
     }
 }

@@ -3,7 +3,7 @@
 
 mod keys;
 
-use super::sanitize::shortened;
+use super::sanitize::escape_and_truncate;
 
 /// Maximum size of scenes to compare, in bytes. Larger scenes are not edited by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
@@ -19,13 +19,13 @@ pub fn list_changes(before: &str, after: &str) -> Vec<String> {
         return Vec::new();
     }
     match keys::key_changes(before, after) {
-        keys if keys.is_empty() => line_changes(before, after).into_iter().collect(),
+        keys if keys.is_empty() => summarize_line_changes(before, after).into_iter().collect(),
         keys => keys,
     }
 }
 
 /// Summarizes the changed lines. Returns `None` if all lines are equal.
-fn line_changes(before: &str, after: &str) -> Option<String> {
+fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
     let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
     // Strip the common prefix and suffix.
     let same = |a: &[&str], b: &[&str]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
@@ -39,8 +39,8 @@ fn line_changes(before: &str, after: &str) -> Option<String> {
     match (before, after) {
         ([], []) => None,
         ([old], [new]) => Some(format!("line {line}: {}", describe_line_change(old, new))),
-        ([], [new]) => Some(format!("line {line}: + {}", shortened(new.trim(), MAX_LINE_CHARS))),
-        ([old], []) => Some(format!("line {line}: − {}", shortened(old.trim(), MAX_LINE_CHARS))),
+        ([], [new]) => Some(format!("line {line}: + {}", escape_and_truncate(new.trim(), MAX_LINE_CHARS))),
+        ([old], []) => Some(format!("line {line}: − {}", escape_and_truncate(old.trim(), MAX_LINE_CHARS))),
         ([], new) => Some(format!("{} added at line {line}", lines(new.len()))),
         (old, []) => Some(format!("{} removed at line {line}", lines(old.len()))),
         (_, new) => Some(format!("lines {line} to {}", start + new.len())),
@@ -54,13 +54,13 @@ fn describe_line_change(old: &str, new: &str) -> String {
     };
     match (parts(old), parts(new)) {
         (Some((key, old)), Some((same, new))) if key == same => {
-            let of = |value: &str| shortened(value, MAX_LINE_CHARS / 2);
-            format!("{} {} → {}", shortened(&key, MAX_LINE_CHARS / 2), of(&old), of(&new))
+            let of = |value: &str| escape_and_truncate(value, MAX_LINE_CHARS / 2);
+            format!("{} {} → {}", escape_and_truncate(&key, MAX_LINE_CHARS / 2), of(&old), of(&new))
         }
         _ => format!(
             "{} → {}",
-            shortened(old.trim(), MAX_LINE_CHARS / 2),
-            shortened(new.trim(), MAX_LINE_CHARS / 2)
+            escape_and_truncate(old.trim(), MAX_LINE_CHARS / 2),
+            escape_and_truncate(new.trim(), MAX_LINE_CHARS / 2)
         ),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::description::{Pose, Viewpoint, is_same_distance};
+use super::description::{Pose, ResolvedCamera, is_same_distance};
 use super::document::{FOV_DEGREES, parse_camera};
 use super::source::SceneText;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
@@ -12,7 +12,7 @@ use crate::math::DVec3;
 ///
 /// # Errors
 /// Returns the reason why the `[camera]` table cannot be edited.
-pub(super) fn replace_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
+pub(super) fn replace_camera(text: &str, wanted: &ResolvedCamera) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
     let Some(TomlValue::Table(table)) = found.map(|found| found.value.decode()) else {
@@ -36,8 +36,8 @@ struct CameraEdits<'t> {
 }
 
 impl CameraEdits<'_> {
-    fn set_camera(&mut self, wanted: &Viewpoint) {
-        let Viewpoint { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
+    fn set_camera(&mut self, wanted: &ResolvedCamera) {
+        let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
         match self.table.get("orbiter") {
             Some(orbiter) => {
                 let place = [("position", position), ("look_at", look_at)];
@@ -70,7 +70,7 @@ impl CameraEdits<'_> {
 
     fn set_vector(&mut self, name: &str, wanted: DVec3, default: Option<DVec3>) {
         match self.table.get(name) {
-            Some(found) => match found.value.array() {
+            Some(found) => match found.value.as_array() {
                 Some(elements) if elements.len() == 3 => {
                     for (element, wanted) in elements.iter().zip(wanted.to_array()) {
                         self.replace_number(&element, wanted);
@@ -184,12 +184,12 @@ fn format_number(number: f64) -> String {
 mod tests {
     use super::*;
 
-    fn view(position: [f64; 3]) -> Viewpoint {
+    fn view(position: [f64; 3]) -> ResolvedCamera {
         let pose = Pose { position: DVec3::from_array(position), look_at: DVec3::Y, up: DVec3::Y };
-        Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: pose.distance() }
+        ResolvedCamera { pose, fov: 40.0, aperture: 0.0, focus: pose.distance() }
     }
 
-    fn written(text: &str, wanted: &Viewpoint) -> String {
+    fn written(text: &str, wanted: &ResolvedCamera) -> String {
         replace_camera(text, wanted).unwrap_or_else(|why| panic!("{why}\n{text}"))
     }
 
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn missing_keys_are_added_after_the_last_key() {
-        let wanted = Viewpoint { fov: 35.5, focus: 2.5, ..view([0.0, 1.0, 4.0]) };
+        let wanted = ResolvedCamera { fov: 35.5, focus: 2.5, ..view([0.0, 1.0, 4.0]) };
         let camera = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
         for (text, expected) in [
             (
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn added_keys_use_the_same_line_ending() {
-        let wanted = Viewpoint { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
+        let wanted = ResolvedCamera { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
         // The first line ends differently from the lines of the camera table.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
@@ -254,12 +254,12 @@ mod tests {
 
     #[test]
     fn orbiter_is_replaced_by_vectors() {
-        let wanted = Viewpoint { aperture: 0.1, focus: 3.0, ..view([0.0, 1.0, 4.0]) };
+        let wanted = ResolvedCamera { aperture: 0.1, focus: 3.0, ..view([0.0, 1.0, 4.0]) };
         let text = "[camera]\n  aperture = 0.1\n  orbiter = \"a.txt\" # from gKit\n  focus = 3.0\n";
         let expected = text.replace("orbiter = \"a.txt\"", "position = [0, 1, 4]\n  look_at = [0, 1, 0]");
         assert_eq!(written(text, &wanted), expected);
         let inline = "camera = { orbiter = \"a.txt\" }\n";
-        let upright = Viewpoint { fov: 45.0, ..view([0.0, 1.0, 4.0]) };
+        let upright = ResolvedCamera { fov: 45.0, ..view([0.0, 1.0, 4.0]) };
         assert_eq!(
             written(inline, &upright),
             "camera = { position = [0, 1, 4], look_at = [0, 1, 0], fov = 45 }\n"
@@ -290,7 +290,7 @@ mod tests {
         assert!(paths.len() > 15);
         for path in paths.iter().filter(|path| path.extension().is_some_and(|ending| ending == "toml")) {
             let text = std::fs::read_to_string(path).expect("a scene");
-            let wanted = Viewpoint { fov: 33.3, focus: 2.25, ..view([0.125, -2.0, 3.5]) };
+            let wanted = ResolvedCamera { fov: 33.3, focus: 2.25, ..view([0.125, -2.0, 3.5]) };
             let new = written(&text, &wanted);
             assert_eq!(comments(&new), comments(&text), "{}", path.display());
             let is_camera = |line: &str| {

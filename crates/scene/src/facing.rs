@@ -52,7 +52,9 @@ pub(super) fn lights_facing_away(
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
         let (ahead, behind) = (reach(front), reach(-front));
-        behind > 0.0 && ahead <= MIN_FRONT_RATIO * behind && !is_camera_in_front(&scene.camera, corner, front)
+        behind > 0.0
+            && ahead <= MIN_FRONT_RATIO * behind
+            && !is_camera_in_front_of_light(&scene.camera, corner, front)
     };
     let away = lights.into_iter().filter(|(number, (corner, front))| is_away(*number, *corner, *front));
     away.map(|(number, _)| scene.objects[number].span.clone()).collect()
@@ -60,7 +62,7 @@ pub(super) fn lights_facing_away(
 
 /// Whether the camera is in front of a light. Always true for orbiter cameras, because their files are not
 /// read here.
-fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
+fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
         Camera::Orbiter { .. } => true,
@@ -69,7 +71,7 @@ fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 
 /// Returns an upper bound on the projection of a shape's points onto a unit direction.
 fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
-    shape.max_projection_onto(direction).unwrap_or_else(|| {
+    shape.upper_bound_along(direction).unwrap_or_else(|| {
         let of = |mesh: &MeshReference| {
             Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))
         };

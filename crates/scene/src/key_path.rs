@@ -2,7 +2,7 @@
 
 use unicode_width::UnicodeWidthStr;
 
-use super::sanitize::{escape_invisible_chars, shortened};
+use super::sanitize::{escape_and_truncate, escape_invisible_chars};
 use super::source::quote_toml_string;
 
 /// Formats one part of a dotted key. Quotes the part if it is not a bare key.
@@ -42,7 +42,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     let tails =
         (1..=last).filter(|skipped| !begins_with_number(skipped)).map(|skipped| parts[skipped..].join("."));
     let fitting = tails.map(|tail| format!("…{tail}")).find(|tail| tail.width() <= columns);
-    fitting.unwrap_or_else(|| shortened(parts[last], columns))
+    fitting.unwrap_or_else(|| escape_and_truncate(parts[last], columns))
 }
 
 /// Returns the byte index of the first `end` outside quotes.

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use changes::{MOST_COMPARED_BYTES, list_changes};
-use description::{Camera, Scene, Viewpoint};
+use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
@@ -103,19 +103,22 @@ impl LoadedScene {
     ///
     /// # Errors
     /// Returns the reason why the `[camera]` table cannot be edited.
-    pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
+    pub fn text_with_camera(&self, camera: &ResolvedCamera) -> Result<String, String> {
         edit::replace_camera(self.source.file_text(), camera)
     }
 
     /// Reads the camera from a scene's text, with `--set` values applied. `None` if the text or a value has
     /// errors.
-    pub fn parse_camera(text: &str, sets: &[String]) -> Option<Camera> {
+    pub fn parse_camera_from_text(text: &str, sets: &[String]) -> Option<Camera> {
         document::parse_camera(&SceneText::with_set_args(text.into(), sets).ok()?)
     }
 
     /// In scenes with mesh files, returns warnings about lights that shine away from everything. Only calls
     /// `bounds` if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
-    pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBoundingBox>) -> Vec<Diagnostic> {
+    pub fn lights_facing_away_warnings(
+        &self,
+        bounds: impl FnOnce() -> Vec<MeshBoundingBox>,
+    ) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
         }
@@ -174,7 +177,7 @@ pub struct ParseOutcome {
 /// [`MAX_FILE_BYTES`] bytes, without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
-    load_source(SceneText::with_set_args(text, sets)?, path, sets)
+    load_from_scene_text(SceneText::with_set_args(text, sets)?, path, sets)
 }
 
 /// Like [`load`], for a scene generated for the model at `path`. Diagnostics have no line numbers because the
@@ -183,10 +186,14 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
 /// # Errors
 /// Returns the same errors as [`load`].
 pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
-    load_source(SceneText::with_set_args(text, sets)?.mark_generated(), path, sets)
+    load_from_scene_text(SceneText::with_set_args(text, sets)?.mark_generated(), path, sets)
 }
 
-fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
+fn load_from_scene_text(
+    source: SceneText,
+    path: &Path,
+    sets: &[String],
+) -> Result<LoadedScene, Vec<Diagnostic>> {
     let ParseOutcome { scene, diagnostics, settings } = document::parse_and_lower(&source, path);
     match scene {
         Some(scene) => {

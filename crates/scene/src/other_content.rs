@@ -94,7 +94,7 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
         _ if known.is_some() => known,
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("WebP"),
         // If `=` follows, this is not a PPM file: `P6` is a TOML key.
-        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !begins_with(rest, b'=') => {
+        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !trimmed_starts_with(rest, b'=') => {
             Some("PPM")
         }
         // The reserved bytes of a BMP header are 0, which does not occur in text.
@@ -104,7 +104,7 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// Whether the first byte after leading whitespace is `byte`.
-fn begins_with(bytes: &[u8], byte: u8) -> bool {
+fn trimmed_starts_with(bytes: &[u8], byte: u8) -> bool {
     bytes.trim_ascii_start().first() == Some(&byte)
 }
 

@@ -75,7 +75,8 @@ fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) 
                 .collect()
         }
         TableSyntax::List => {
-            let elements = found.value.array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
+            let elements =
+                found.value.as_array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
             elements
                 .enumerate()
                 .filter_map(|(index, value)| {
@@ -97,9 +98,9 @@ fn outline_table(
 ) -> OutlineTable {
     let kind = all.get("type").map(|kind| spanned_string_value(kind.value));
     let kind = match &kind {
-        Some(Some(kind)) => info.find_type(Some(&kind.text)),
+        Some(Some(kind)) => info.find_type_or_default(Some(&kind.text)),
         Some(None) => None,
-        None => info.find_type(None),
+        None => info.find_type_or_default(None),
     };
     OutlineTable { info, kind, name, number, span: value.span(), keys: outline_keys(all) }
 }

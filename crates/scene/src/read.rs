@@ -70,13 +70,13 @@ fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
-        format_mesh_file_key(&escape_invisible_chars(&name))
+        format_mesh_file_entry(&escape_invisible_chars(&name))
     );
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
 /// Formats the key `file` in `[[mesh]]` for help texts.
-fn format_mesh_file_key(name: &str) -> String {
+fn format_mesh_file_entry(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
 
@@ -322,7 +322,7 @@ mod tests {
             std::fs::write(&path, content).expect("written");
             let Diagnostic { message, help, .. } = message(&path);
             assert_eq!(message, MESH_NOT_SCENE);
-            assert!(help.expect("a help text").contains(&format_mesh_file_key(name)));
+            assert!(help.expect("a help text").contains(&format_mesh_file_entry(name)));
         }
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");

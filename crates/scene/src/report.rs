@@ -16,7 +16,7 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 use super::diagnostic::{Diagnostic, Severity};
 use super::sanitize::escape_invisible_chars;
 
-pub use lines::{ReportLine, SpanRole, StyledSpan, report_lines};
+pub use lines::{ReportLine, ReportTextRole, StyledSpan, report_lines};
 
 /// Report style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,11 +56,11 @@ pub struct LineColumnLocator(Option<(Arc<str>, LineIndex)>);
 impl LineColumnLocator {
     /// Like [`line_and_column`], but fast for repeated calls with the same text.
     pub fn locate(&mut self, source: &Arc<str>, offset: usize) -> (usize, usize) {
-        let (source, lines) = self.line_index(source);
+        let (source, lines) = self.line_index_for_source(source);
         lines.locate(source, offset)
     }
 
-    fn line_index(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
+    fn line_index_for_source(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
         self.0 = self.0.take().filter(|(known, _)| Arc::ptr_eq(known, source));
         self.0.get_or_insert_with(|| (Arc::clone(source), LineIndex::new(source)))
     }
@@ -107,7 +107,7 @@ fn render_diagnostic(
     let mut snippet = None;
     let mut note = None;
     if let Some(place) = &diagnostic.place {
-        let (source, lines) = index.line_index(&place.source);
+        let (source, lines) = index.line_index_for_source(&place.source);
         let (line, column) = lines.locate(source, place.span.start);
         origin = origin.line(line).char_column(column);
         let whole = lines.line_span(line - 1, source).unwrap_or_default();
@@ -121,7 +121,7 @@ fn render_diagnostic(
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
     let title =
-        level.primary_title(sanitize_and_wrap(&diagnostic.message, width.saturating_sub("warning: ".len())));
+        level.primary_title(escape_and_wrap(&diagnostic.message, width.saturating_sub("warning: ".len())));
     // Errors in command-line arguments have no file.
     let has_origin = !path.is_empty();
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
@@ -129,10 +129,10 @@ fn render_diagnostic(
         group = group.element(snippet);
     }
     if let Some(note) = note {
-        group = group.element(Level::NOTE.message(sanitize_and_wrap(note, width.saturating_sub(14))));
+        group = group.element(Level::NOTE.message(escape_and_wrap(note, width.saturating_sub(14))));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(sanitize_and_wrap(help, width.saturating_sub(14))));
+        group = group.element(Level::HELP.message(escape_and_wrap(help, width.saturating_sub(14))));
     }
     let rendered = remove_repeated_origin(&renderer.render(&[group]));
     if has_origin { rendered } else { remove_lines_equal_to(&rendered, "|") }
@@ -238,7 +238,7 @@ impl LineIndex {
     }
 
     /// The number of characters before a byte offset.
-    fn characters_before(&self, source: &str, offset: usize) -> usize {
+    fn source_characters_before(&self, source: &str, offset: usize) -> usize {
         let step = offset / STEP;
         self.characters[step] + count_characters(&source.as_bytes()[step * STEP..offset])
     }
@@ -253,7 +253,8 @@ impl LineIndex {
         let offset = floor_char_boundary(source, offset);
         let line = self.line_number(offset);
         let start = self.starts[line - 1];
-        let before = self.characters_before(source, offset) - self.characters_before(source, start);
+        let before =
+            self.source_characters_before(source, offset) - self.source_characters_before(source, start);
         let has_mark = source[start..offset].starts_with('\u{feff}');
         (line, before + 1 - usize::from(has_mark))
     }
@@ -269,7 +270,7 @@ impl LineIndex {
 }
 
 /// Makes text safe to display and wraps it at word boundaries after at most `width` characters.
-fn sanitize_and_wrap(text: &str, width: usize) -> Cow<'static, str> {
+fn escape_and_wrap(text: &str, width: usize) -> Cow<'static, str> {
     let text = escape_invisible_chars(text);
     let mut lines = String::with_capacity(text.len());
     let mut column = 0;

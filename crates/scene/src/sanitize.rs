@@ -27,7 +27,7 @@ pub fn escape_invisible_chars(text: &str) -> Cow<'_, str> {
 
 /// Makes text safe to display with [`escape_invisible_chars`] and truncates it to `limit` characters. Truncated text ends
 /// with `…`.
-pub fn shortened(text: &str, limit: usize) -> String {
+pub fn escape_and_truncate(text: &str, limit: usize) -> String {
     let shown = escape_invisible_chars(text);
     if shown.chars().count() <= limit {
         return shown.into_owned();
@@ -57,8 +57,8 @@ mod tests {
 
     #[test]
     fn limit_counts_visible_characters() {
-        assert_eq!(shortened("äöü", 3), "äöü");
-        assert_eq!(shortened("äöüß", 3), "äö…");
-        assert_eq!(shortened("a\tbc", 4), "a  …");
+        assert_eq!(escape_and_truncate("äöü", 3), "äöü");
+        assert_eq!(escape_and_truncate("äöüß", 3), "äö…");
+        assert_eq!(escape_and_truncate("a\tbc", 4), "a  …");
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Severity, SourceSpan};
-use super::toml::is_key_value;
+use super::toml::is_dotted_key_value;
 
 /// File name shown in diagnostics about `--set` values.
 const SET_OPTION: &str = "--set";
@@ -78,7 +78,7 @@ impl SceneText {
     }
 
     /// Returns the byte offsets of the `--set` values.
-    pub(super) fn set_arg_offsets(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn override_arg_offsets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }
 
@@ -120,14 +120,14 @@ fn set_arg_to_toml(set: &str) -> Option<String> {
     const MAX_EQUALS_SIGNS: usize = 8;
     set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
-        let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_key_value(text));
+        let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_dotted_key_value(text));
         with("0")?;
-        with(value).or_else(|| with(&normalize_decimal(value)?)).or_else(|| with(&quote_toml_string(value)))
+        with(value).or_else(|| with(&decimal_to_toml(value)?)).or_else(|| with(&quote_toml_string(value)))
     })
 }
 
 /// Completes numbers such as `.5` and `5.`, which are invalid in TOML.
-fn normalize_decimal(text: &str) -> Option<String> {
+fn decimal_to_toml(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
 }

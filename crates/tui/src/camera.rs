@@ -2,8 +2,8 @@
 //! camera can be written to a scene file exactly.
 
 use crate::math::DVec3;
-use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
-use crate::pipeline::protocol::Viewpoint;
+use crate::math::decimal::{decimal_step_at_distance, round_to_step};
+use crate::pipeline::protocol::ResolvedCamera;
 use crate::scene::description::Pose;
 
 /// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
@@ -26,7 +26,7 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let (sine, cosine) = libm::sincos(right.to_radians());
     let level = level * cosine + axis.cross(level) * sine;
     let (sine, cosine) = libm::sincos(lifted.to_radians());
-    with_eye_offset(pose, (level * sine + axis * cosine) * distance)
+    with_target_to_eye_vector(pose, (level * sine + axis * cosine) * distance)
 }
 
 /// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
@@ -35,18 +35,18 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
     let wanted = (distance * factor).clamp((own / REACH).min(distance), (own * REACH).max(distance));
-    if wanted == distance { *pose } else { with_eye_offset(pose, arm * (wanted / distance)) }
+    if wanted == distance { *pose } else { with_target_to_eye_vector(pose, arm * (wanted / distance)) }
 }
 
 /// Multiplies the field of view by `factor`, within limits.
-pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
+pub(super) fn zoomed_fov(view: &ResolvedCamera, factor: f64) -> f64 {
     let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
     round_to_step((view.fov * factor).clamp(least, most), 0.01)
 }
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
-fn with_eye_offset(pose: &Pose, arm: DVec3) -> Pose {
-    let step = coordinate_step_at_distance(arm.length());
+fn with_target_to_eye_vector(pose: &Pose, arm: DVec3) -> Pose {
+    let step = decimal_step_at_distance(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| round_to_step(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
 }
@@ -97,11 +97,11 @@ mod tests {
         }
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
         assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts beyond the limit should stay there");
-        let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
+        let view = ResolvedCamera { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed_fov(&view, 1.1), 44.0);
         assert_eq!(zoomed_fov(&view, 100.0), 160.0);
         assert_eq!(
-            zoomed_fov(&Viewpoint { fov: 170.0, ..view }, 1.1),
+            zoomed_fov(&ResolvedCamera { fov: 170.0, ..view }, 1.1),
             170.0,
             "zooming should not narrow a wider field of view"
         );

@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 use super::color::ColorDepth;
 use super::connection::{QueryKind, TerminalConnection};
 use super::event::PreviewSendReport;
-use super::graphics::{TerminalImage, TerminalImages};
+use super::graphics::{PlacedImage, TerminalImages};
 use super::paint::{Fidelity, LinksAndDelayedText, Painter};
 use super::preview_kind::PreviewKind;
 use super::terminal;
@@ -127,7 +127,7 @@ impl Display {
     }
 
     /// Switches to drawing the preview as pixels if `kind` requires it.
-    pub(super) fn set_preview_kind(&mut self, kind: PreviewKind) {
+    pub(super) fn enable_pixel_preview_if_required(&mut self, kind: PreviewKind) {
         if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
             terminal::mark_images_used();
             self.images = Some(TerminalImages::new(protocol, self.link.is_in_tmux));
@@ -140,7 +140,7 @@ impl Display {
     }
 
     /// Places a preview drawn as pixels. `None` if the preview is drawn as cells.
-    pub(super) fn place_pixels(&mut self, wanted: Option<TerminalImage>, is_still: bool) {
+    pub(super) fn place_pixels(&mut self, wanted: Option<PlacedImage>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -157,7 +157,7 @@ impl Display {
         if !extras.links.is_empty() {
             terminal::mark_links_used();
         }
-        self.painter.set_target_with(wanted, picture, fidelity, extras);
+        self.painter.set_target_with_extras(wanted, picture, fidelity, extras);
         self.is_complete = false;
         self.is_picture_due |= is_new;
     }
@@ -178,12 +178,12 @@ impl Display {
     }
 
     /// Whether anything is queued to be sent after the preview.
-    fn has_queued_bytes(&self) -> bool {
+    fn has_bytes_queued_after_preview(&self) -> bool {
         !self.asides.is_empty() || self.window_titles[0] != self.window_titles[1]
     }
 
     /// Sends everything queued to be sent after the preview.
-    fn send_queued(&mut self, now: Instant) {
+    fn flush_after_preview_queue(&mut self, now: Instant) {
         let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
@@ -202,13 +202,13 @@ impl Display {
 
     /// Sends one slice, ending it early if `is_late` returns true. Returns true if anything was sent.
     pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
-        let is_idle = self.is_complete && !self.has_queued_bytes();
+        let is_idle = self.is_complete && !self.has_bytes_queued_after_preview();
         let room = if is_idle { 0 } else { self.connection.max_sendable_bytes(now) };
         if room == 0 {
             return false;
         }
         if self.is_complete {
-            self.send_queued(now);
+            self.flush_after_preview_queue(now);
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
@@ -223,7 +223,7 @@ impl Display {
         let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {
             Some(pixels) => self.send_slice(pixels, now),
-            None => self.finish_target(),
+            None => self.mark_target_complete(),
         }
         !self.is_complete
     }
@@ -237,7 +237,7 @@ impl Display {
         cells
     }
 
-    fn finish_target(&mut self) {
+    fn mark_target_complete(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
             self.report = Some(PreviewSendReport {
@@ -306,7 +306,7 @@ impl Display {
     /// Earliest time at which more can be sent if no reply arrives.
     pub(super) fn next_send_time(&mut self, now: Instant) -> Option<Instant> {
         match () {
-            () if self.is_complete && !self.has_queued_bytes() => None,
+            () if self.is_complete && !self.has_bytes_queued_after_preview() => None,
             () if self.connection.max_sendable_bytes(now) > 0 => Some(now),
             () => self.connection.next_send_time(now),
         }

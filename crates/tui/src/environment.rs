@@ -1,11 +1,11 @@
 //! Detects the terminal and its connection from environment variables.
 
-use super::color::{ColorChoice, ColorDepth};
+use super::color::{ColorDepth, ColorDepthChoice};
 use super::display::TerminalEnvironment;
 use super::graphics::ImageProtocol;
 use super::options::PreviewChoice;
 use super::paint::can_repeat;
-use super::pixel_request::ImageProtocolRequest;
+use super::pixel_request::UnconfirmedImageProtocol;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 
@@ -33,7 +33,7 @@ pub(super) fn may_print_unknown_escapes(variable: impl Fn(&str) -> Option<String
 }
 
 /// Returns the image protocol for the user's preview choice.
-fn requested_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
+fn protocol_for_choice(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
         PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
         PreviewChoice::Sixel => Some(ImageProtocol::Sixel),
@@ -52,7 +52,7 @@ fn requested_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
 /// or not at all, and to plain terminals, which may print queries as text.
 pub(super) fn terminal_queries(
     preview: PreviewChoice,
-    color: ColorChoice,
+    color: ColorDepthChoice,
     depth: ColorDepth,
     variable: impl Fn(&str) -> Option<String>,
 ) -> TerminalQueries {
@@ -65,11 +65,11 @@ pub(super) fn terminal_queries(
     TerminalQueries {
         blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
         name: is_outermost && !is_plain && !term.is_empty(),
-        true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
+        true_color: color == ColorDepthChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: requested_protocol(preview)
-            .map(|protocol| ImageProtocolRequest::new(protocol, &variable, is_plain)),
+        pixels: protocol_for_choice(preview)
+            .map(|protocol| UnconfirmedImageProtocol::new(protocol, &variable, is_plain)),
     }
 }
 
@@ -102,16 +102,16 @@ mod tests {
         };
         let (auto, xterm) = (PreviewChoice::Auto, ("TERM", "xterm-256color"));
         let none = TerminalQueries::default();
-        let found = ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm]);
+        let found = ask(auto, ColorDepthChoice::Auto, ColorDepth::Indexed256, &[xterm]);
         assert_eq!(found, TerminalQueries { blocks: true, name: true, true_color: true, ..none });
-        let found = ask(auto, ColorChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
+        let found = ask(auto, ColorDepthChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
         assert_eq!(found, TerminalQueries { blocks: true, name: true, palette: true, ..none });
         let tmux = ("TMUX", "/tmp/tmux-0/default,1,0");
-        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
-        let found = ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]);
+        assert_eq!(ask(auto, ColorDepthChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
+        let found = ask(PreviewChoice::HalfBlock, ColorDepthChoice::Auto, ColorDepth::TrueColor, &[xterm]);
         assert_eq!(found, TerminalQueries { name: true, ..none });
-        let found = ask(auto, ColorChoice::None, ColorDepth::None, &[xterm]);
+        let found = ask(auto, ColorDepthChoice::None, ColorDepth::None, &[xterm]);
         assert_eq!(found, TerminalQueries { name: true, background: true, ..none });
-        assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
+        assert_eq!(ask(auto, ColorDepthChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
     }
 }

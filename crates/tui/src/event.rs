@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::options::{ContentChange, OutputChange, WatchEvent};
+use super::options::{ContentChangeTime, OutputChange, WatchEvent};
 use super::terminal_replies::TerminalReply;
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{self, NormalizedRect, PreviewImageState};
@@ -44,7 +44,7 @@ pub(super) enum Event {
         source: Option<PreviewImageState>,
     },
     /// A file that the scene depends on was written.
-    Changed(ContentChange),
+    Changed(ContentChangeTime),
     /// The changed files have been fully written.
     Settled,
     /// An output file was modified or restored by another program.
@@ -62,7 +62,7 @@ pub(super) enum Event {
     /// The reason why the editor could not be run.
     NoEditor(String),
     /// A source of events has ended.
-    Lost(EventSource),
+    Lost(RequiredEventSource),
 }
 
 impl Event {
@@ -153,7 +153,7 @@ pub(super) enum Signal {
 
 /// Event sources that must not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum EventSource {
+pub(super) enum RequiredEventSource {
     Worker,
     Watcher,
     Keys,

@@ -3,10 +3,10 @@
 use super::event::WriteFailure;
 use super::messages;
 use super::state::{KeyOverrides, SceneImageProgress, State, WorkerActivity, WrittenFile};
-use super::view::text::format_count;
+use super::view::text::format_count_with_noun;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
-use crate::pipeline::settings::{CameraChange, ViewMode};
+use crate::pipeline::settings::{CameraOverrides, ViewMode};
 use crate::pipeline::words::format_seconds;
 use crate::scene::sanitize::escape_invisible_chars;
 
@@ -20,7 +20,7 @@ pub(super) fn summary_text(state: &State) -> String {
 }
 
 /// Whether the summary claims that the scene's own image is up to date.
-pub(super) fn is_image_current(state: &State) -> bool {
+pub(super) fn is_saved_scene_image_current(state: &State) -> bool {
     let is_written = state.saving.own.state == SavedSceneImageState::Written;
     is_written && state.saving.write_failed.is_none() && !is_scene_broken(state)
 }
@@ -32,7 +32,7 @@ pub(super) fn unsaved_changes_as_options(state: &State) -> Option<String> {
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
     let is_in_scene =
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
-    let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
+    let camera = if is_in_scene { CameraOverrides::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
     let options = KeyOverrides { camera, ..shown }
         .as_command_line_options(state.request.viewpoint().filter(|_| has_orbiter));
@@ -74,10 +74,10 @@ fn describe_events_since_writing(state: &State) -> String {
     if state.saving.own.state == SavedSceneImageState::Written {
         return String::new();
     }
-    if !state.request.has_no_key_overrides() {
+    if !state.request.has_no_keyboard_overrides() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            SceneImageProgress { .. } if state.saving.is_older_than_edit() => {
+            SceneImageProgress { .. } if state.saving.are_images_outdated() => {
                 messages::OLDER_THAN_EDIT.to_owned()
             }
             SceneImageProgress { .. } if is_by_hand => String::new(),
@@ -111,12 +111,12 @@ fn describe_files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
-            let names: Vec<_> = files.iter().map(WrittenFile::display_path).collect();
+            let names: Vec<_> = files.iter().map(WrittenFile::escaped_path).collect();
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
             let changes = KeyOverrides { view: None, ..shows }
-                .describe_differences(&KeyOverrides::default(), false)
+                .describe_changes_since(&KeyOverrides::default(), false)
                 .join(", ");
             let with = if changes.is_empty() { String::new() } else { format!(", with {changes}") };
             format!("wrote {}{colon}{made}{with}", names.join(", "))
@@ -135,7 +135,7 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
             (true, true) => "; before that, wrote ",
             (false, _) => "; wrote an earlier image to ",
         };
-        words += &written.display_path();
+        words += &written.escaped_path();
     }
     words
 }
@@ -155,7 +155,7 @@ pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) 
 
 /// `64 samples`, or `16 to 32 samples`.
 fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> String {
-    let most = format_count(max as usize, "sample");
+    let most = format_count_with_noun(max as usize, "sample");
     if min == max { most } else { format!("{min} to {most}") }
 }
 
@@ -172,7 +172,7 @@ pub(super) fn view_name_unless_beauty(view: ViewMode) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ContentChange;
+    use crate::ContentChangeTime;
     use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::description::Camera;
@@ -265,7 +265,7 @@ mod tests {
             ui.finish_render([200, 30, 30]);
             let before = summary_text(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
             ui.finish_render([30, 30, 200]);
             let after = summary_text(&ui.state);
             assert_eq!(after, format!("{made}{}", messages::OLDER_THAN_EDIT), "{key}");
@@ -274,7 +274,7 @@ mod tests {
                 key == 'l'
             );
             // Saving the file without changing the image does not make the image newer.
-            ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             ui.worker_event(done_event(generation, Vec::new(), true));
@@ -404,7 +404,7 @@ mod tests {
         let words = unsaved_changes_as_options(&ui.state).expect("moved");
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();
-        let camera = crate::scene::LoadedScene::parse_camera(text, &sets);
+        let camera = crate::scene::LoadedScene::parse_camera_from_text(text, &sets);
         let Some(Camera::LookAt { position, look_at, fov, focus, .. }) = camera else { panic!("{words}") };
         assert_eq!((position, look_at), (moved.pose.position, moved.pose.look_at));
         assert_eq!((fov, focus), (moved.fov, moved.focus));
@@ -472,7 +472,7 @@ mod tests {
         ui.press_character('s');
         own(&mut ui, SavedSceneImageState::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.handle_event(crate::event::Event::Changed(ContentChange { noticed: ui.now }));
+        ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
         assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

@@ -9,20 +9,20 @@ use ratatui::layout::Rect;
 
 use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, WindowSize};
-use super::options::ContentChange;
+use super::options::ContentChangeTime;
 use super::preview_kind::PreviewKind;
 use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
-use super::terminals::Capabilities;
+use super::terminals::DesktopCapabilities;
 use super::update::{request_first_render, update};
 use super::view;
 use crate::film::Srgb8Image;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{
-    self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, SampleCounts, Stage,
-    StageReport, Status, Viewpoint, WorkCounters,
+    self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, ResolvedCamera,
+    SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
-use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -52,7 +52,7 @@ pub(super) fn state_with(
         is_light: false,
         ansi: XTERM,
         ask: TerminalQueries::default(),
-        capabilities: Capabilities::default(),
+        capabilities: DesktopCapabilities::default(),
         notify_after: Some(Duration::from_secs(30)),
     };
     State::new(setup, Instant::now())
@@ -100,7 +100,7 @@ impl TestUi {
 
     /// Saves a scene with this text and lets the worker load it.
     pub(super) fn save_scene(&mut self, text: &str) {
-        self.handle_event(Event::Changed(ContentChange { noticed: self.now }));
+        self.handle_event(Event::Changed(ContentChangeTime { noticed: self.now }));
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Text { generation, text: text.into() });
     }
@@ -202,14 +202,14 @@ pub(super) fn effective_settings() -> EffectiveSettings {
 }
 
 /// Settings from the scene file, before any overrides.
-pub(super) fn scene_settings() -> AdjustableSettings {
-    AdjustableSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
+pub(super) fn scene_settings() -> KeyboardSettings {
+    KeyboardSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
-pub(super) fn camera() -> Viewpoint {
+pub(super) fn camera() -> ResolvedCamera {
     let pose = Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::Y, up: DVec3::Y };
-    Viewpoint { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
+    ResolvedCamera { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
 }
 
 pub(super) fn stage_report(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
@@ -253,7 +253,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
         scene: "scenes/cornell.toml".to_owned(),
         image,
         settings: effective_settings(),
-        lights: protocol::LightsReport {
+        lights: protocol::LightSamplingReport {
             count: 1,
             sampled: protocol::SampledLightSet::All,
             picks: 0,

@@ -86,7 +86,7 @@ impl RenderHistory {
     }
 
     /// Records that the scene turned out to be invalid. New entries still show its previous version.
-    pub(super) fn record_invalid_scene(&mut self) {
+    pub(super) fn discard_invalid_edits(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
@@ -108,7 +108,7 @@ impl RenderHistory {
             Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
             Some(changes) => changes.join("; "),
         };
-        past.prefix_if_stopped(words)
+        past.with_stopped_prefix(words)
     }
 
     /// Records that a camera that has been moved with keys since request `since` was written to the scene.
@@ -130,7 +130,7 @@ impl RenderHistory {
 
     /// Adds an image. It replaces any earlier image from the same request, or the last entry's image if it
     /// looks the same.
-    pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageProvenance) {
+    pub(super) fn record_shown_image(&mut self, shown: ShownImage, time: Instant, origin: ImageProvenance) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
         let is_last =
@@ -242,7 +242,7 @@ impl RenderHistory {
     }
 
     /// Number of the render that finished an entry. `None` if the entry is unfinished.
-    pub(super) fn render_number(&self, at: usize) -> Option<u64> {
+    pub(super) fn render_number_at(&self, at: usize) -> Option<u64> {
         self.past.get(at)?.run
     }
 
@@ -261,7 +261,7 @@ impl RenderHistory {
         let edits = past.origin.describe_file_changes(&before.origin);
         // If `c` wrote the camera to the scene, list the change as an edit, not as a camera movement.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
-        let keys = past.origin.toggles.describe_differences(&before.origin.toggles, is_written);
+        let keys = past.origin.toggles.describe_changes_since(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
             past.changes = Some([edits, keys]);
         }
@@ -390,7 +390,7 @@ impl HistoryEntry {
     }
 
     /// Prefixes `words` with a label if the render was stopped.
-    fn prefix_if_stopped(&self, words: String) -> String {
+    fn with_stopped_prefix(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
@@ -419,7 +419,7 @@ pub(super) fn age_in_words(time: Duration) -> String {
 mod tests {
     use super::*;
     use crate::fixtures::uniform_picture;
-    use crate::pipeline::settings::{CameraChange, ViewMode};
+    use crate::pipeline::settings::{CameraOverrides, ViewMode};
     use crate::pipeline::{FileContentId, FileRead};
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::state::KeyOverrides;
@@ -440,14 +440,14 @@ mod tests {
         let mut history = RenderHistory::default();
         for generation in 0..10 {
             let picture = uniform_picture(1000, 1000, [generation as u8, 0, 0]);
-            history.record(
+            history.record_shown_image(
                 ShownImage { picture, ..shown_image(generation, 1) },
                 Instant::now(),
                 ImageProvenance::default(),
             );
         }
         assert_eq!(history.past.len(), 5, "each image takes 3 MB");
-        history.record(shown_image(10, 10_000), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(10, 10_000), Instant::now(), ImageProvenance::default());
         assert_eq!(history.past.len(), 1, "the last image is always kept");
     }
 
@@ -458,7 +458,11 @@ mod tests {
         let mut record = |generation: u64, text: Arc<str>| {
             let picture = uniform_picture(1, 1, [generation as u8, 0, 0]);
             let origin = ImageProvenance { text: Some(text), ..ImageProvenance::default() };
-            history.record(ShownImage { picture, ..shown_image(generation, 1) }, Instant::now(), origin);
+            history.record_shown_image(
+                ShownImage { picture, ..shown_image(generation, 1) },
+                Instant::now(),
+                origin,
+            );
             history.past.len()
         };
         assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
@@ -472,7 +476,11 @@ mod tests {
         let mut history = RenderHistory::default();
         for generation in 0..3 {
             history.record_scene_edit();
-            history.record(shown_image(generation, 10), Instant::now(), ImageProvenance::default());
+            history.record_shown_image(
+                shown_image(generation, 10),
+                Instant::now(),
+                ImageProvenance::default(),
+            );
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -482,36 +490,36 @@ mod tests {
     fn unfinished_image_is_a_separate_entry() {
         let unfinished = ImageProvenance { is_unfinished: true, ..ImageProvenance::default() };
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
-        history.record(shown_image(2, 10), Instant::now(), unfinished.clone());
+        history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(2, 10), Instant::now(), unfinished.clone());
         let generations = |history: &RenderHistory| -> Vec<u64> {
             history.past.iter().map(|past| past.shown.generation).collect()
         };
         assert_eq!(generations(&history), [1, 2]);
         let better = ShownImage { picture: uniform_picture(10, 10, [1, 2, 4]), ..shown_image(2, 10) };
-        history.record(better, Instant::now(), unfinished);
+        history.record_shown_image(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
         // The finished image may be identical.
-        history.record(shown_image(2, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(2, 10), Instant::now(), ImageProvenance::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
     fn edits_without_visible_effect_are_skipped() {
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         edit(&mut history);
-        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         // Break the scene, then fix it.
         edit(&mut history);
-        history.record_invalid_scene();
+        history.discard_invalid_edits();
         edit(&mut history);
-        history.record(shown_image(4, 20), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(4, 20), Instant::now(), ImageProvenance::default());
         let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
         // Images rendered after a key press include the last edit.
         history.return_to_newest();
-        history.record(shown_image(5, 30), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(5, 30), Instant::now(), ImageProvenance::default());
         let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
         assert_eq!(before.generation, 1);
     }
@@ -519,12 +527,12 @@ mod tests {
     #[test]
     fn before_edit_ignores_broken_edits() {
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         edit(&mut history);
-        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         history.record_scene_edit();
-        history.record_invalid_scene();
-        history.record(shown_image(3, 30), Instant::now(), ImageProvenance::default());
+        history.discard_invalid_edits();
+        history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
@@ -542,7 +550,7 @@ mod tests {
         let mut history = RenderHistory::default();
         let record = |history: &mut RenderHistory, generation, name, is_finished| {
             let (shown, origin) = of_image(generation, name, is_finished);
-            history.record(shown, Instant::now(), origin);
+            history.record_shown_image(shown, Instant::now(), origin);
             history.len()
         };
         assert_eq!(record(&mut history, 1, "first", true), 1);
@@ -569,17 +577,17 @@ mod tests {
         let mut history = RenderHistory::default();
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
-            history.record(shown, Instant::now(), origin);
+            history.record_shown_image(shown, Instant::now(), origin);
             assert!(history.is_newest_from_request(generation) && history.is_newest_unfinished());
             run.into_iter().for_each(|run| history.finish_newest(run));
         }
-        assert_eq!([0, 1, 2].map(|at| history.render_number(at)), [Some(1), None, Some(2)]);
+        assert_eq!([0, 1, 2].map(|at| history.render_number_at(at)), [Some(1), None, Some(2)]);
         // A later request produces the same image.
         let (shown, origin) = of_image(4, "3", true);
-        history.record(shown, Instant::now(), origin);
+        history.record_shown_image(shown, Instant::now(), origin);
         assert!(!history.is_newest_unfinished());
         history.finish_newest(5);
-        assert_eq!((history.len(), history.render_number(2)), (3, Some(5)));
+        assert_eq!((history.len(), history.render_number_at(2)), (3, Some(5)));
     }
 
     fn edit(history: &mut RenderHistory) {
@@ -590,9 +598,9 @@ mod tests {
     #[test]
     fn saving_the_camera_counts_as_an_edit() {
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
-        history.record(shown_image(2, 20), Instant::now(), ImageProvenance::default());
-        history.record(shown_image(3, 30), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         history.record_saved_camera(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "expected the image before the camera moved");
@@ -601,8 +609,8 @@ mod tests {
     #[test]
     fn each_request_has_one_entry() {
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 10), Instant::now(), ImageProvenance::default());
-        history.record(shown_image(1, 20), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 20), Instant::now(), ImageProvenance::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
@@ -621,15 +629,19 @@ mod tests {
         let mut history = RenderHistory::default();
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
-        history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
+        history.record_shown_image(shown_image(1, 10), Instant::now(), origin(wide, None));
         // Save twice. Only the second version can be read.
         history.record_scene_edit();
         history.record_scene_edit();
-        history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
-        history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(ViewMode::Normal)));
+        history.record_shown_image(shown_image(2, 20), Instant::now(), origin(narrow, None));
+        history.record_shown_image(
+            shown_image(3, 30),
+            Instant::now(),
+            origin(narrow, Some(ViewMode::Normal)),
+        );
         history.record_scene_edit();
-        history.record(shown_image(4, 40), Instant::now(), origin(seed, None));
-        history.record(shown_image(5, 50), Instant::now(), origin(seed, None));
+        history.record_shown_image(shown_image(4, 40), Instant::now(), origin(seed, None));
+        history.record_shown_image(shown_image(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
             [
@@ -646,14 +658,14 @@ mod tests {
     #[test]
     fn saved_camera_is_listed_once() {
         let mut history = RenderHistory::default();
-        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
         let moved = KeyOverrides { camera, ..KeyOverrides::default() };
-        history.record(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
+        history.record_shown_image(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
         let before = ImageProvenance { toggles: moved, ..origin("camera.fov = 40", None) };
-        history.record(shown_image(2, 20), Instant::now(), before.clone());
-        history.record(shown_image(3, 30), Instant::now(), origin("camera.fov = 30", None));
-        history.record(shown_image(4, 40), Instant::now(), before);
-        history.record(shown_image(5, 50), Instant::now(), origin("camera.fov = 40", None));
+        history.record_shown_image(shown_image(2, 20), Instant::now(), before.clone());
+        history.record_shown_image(shown_image(3, 30), Instant::now(), origin("camera.fov = 30", None));
+        history.record_shown_image(shown_image(4, 40), Instant::now(), before);
+        history.record_shown_image(shown_image(5, 50), Instant::now(), origin("camera.fov = 40", None));
         let words = [
             messages::OPENED,
             "camera moved",
@@ -670,7 +682,7 @@ mod tests {
         let record = |history: &mut RenderHistory, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
             let toggles = KeyOverrides { photons, ..KeyOverrides::default() };
-            history.record(
+            history.record_shown_image(
                 shown,
                 Instant::now(),
                 ImageProvenance { toggles, text: Some(text.into()), ..origin },
@@ -694,12 +706,12 @@ mod tests {
         record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
         assert_eq!(changes(&history)[3], "render.samples 64 → 8; + radius = 1");
         // If `c` wrote the camera to the scene, the change is listed as an edit, not as a camera movement.
-        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
         let (shown, origin) = of_image(7, "fov", true);
         let moved = KeyOverrides { camera, photons: Some(true), ..KeyOverrides::default() };
         let before = "render.samples = 8\nradius = 1";
-        history.record(
+        history.record_shown_image(
             shown,
             Instant::now(),
             ImageProvenance { toggles: moved, text: Some(before.into()), ..origin },
@@ -718,7 +730,7 @@ mod tests {
             // Record the image in progress, when it is finished, and once more.
             for _ in 0..3 {
                 let (shown, origin) = of_image(generation, name, true);
-                history.record(
+                history.record_shown_image(
                     shown,
                     Instant::now(),
                     ImageProvenance { toggles, text: Some(text.into()), ..origin },
@@ -737,7 +749,7 @@ mod tests {
         assert_eq!(record(&mut history, "wide", keys, &named), words);
         // A camera moved with keys is listed as such unless it has been saved to the scene.
         let mut history = RenderHistory::default();
-        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
         let moved = KeyOverrides { camera, ..KeyOverrides::default() };
         record(&mut history, "own", keys, "camera.fov = 44");
         for (toggles, text, words) in [
@@ -759,7 +771,7 @@ mod tests {
         let mut history = RenderHistory::default();
         for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
             let origin = ImageProvenance { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
-            history.record(shown_image(number, 10 * number as u32), Instant::now(), origin);
+            history.record_shown_image(shown_image(number, 10 * number as u32), Instant::now(), origin);
         }
         let words =
             [messages::OPENED, "bricks.png changed", messages::AGAIN, "bricks.png changed; knot.obj changed"];
@@ -769,11 +781,11 @@ mod tests {
     #[test]
     fn thumbnail_is_updated_with_its_image() {
         let mut history = RenderHistory::default();
-        history.record(shown_image(1, 1000), Instant::now(), ImageProvenance::default());
+        history.record_shown_image(shown_image(1, 1000), Instant::now(), ImageProvenance::default());
         let size = |history: &RenderHistory| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((32, [1, 2, 3])));
         let picture = uniform_picture(10, 10, [9, 8, 7]);
-        history.record(
+        history.record_shown_image(
             ShownImage { picture, ..shown_image(1, 1) },
             Instant::now(),
             ImageProvenance::default(),

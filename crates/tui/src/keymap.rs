@@ -19,7 +19,7 @@ pub(super) struct KeyBinding<A = Action> {
     pub hint: &'static str,
 }
 
-const fn binding<A: Copy>(
+const fn define_binding<A: Copy>(
     keys: &'static [KeyPress],
     label: &'static str,
     action: A,
@@ -36,93 +36,141 @@ const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
 /// All key bindings, in the order in which the help lists them.
 pub(super) const KEYMAP: &[KeyBinding] = &[
-    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
-    binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
-    binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
-    binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", ""),
-    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
-    binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", ""),
-    binding(
+    define_binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
+    define_binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
+    define_binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
+    define_binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", ""),
+    define_binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
+    define_binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", ""),
+    define_binding(
         &[KeyPress::plain('v')],
         "v",
         Action::NextView,
         "next view, with a list (1-9); V: previous view",
         "",
     ),
-    binding(&[KeyPress::special(KeyCode::Tab)], "tab", Action::ShowImageOnly, "show only the image", "image"),
-    binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
-    binding(
+    define_binding(
+        &[KeyPress::special(KeyCode::Tab)],
+        "tab",
+        Action::ShowImageOnly,
+        "show only the image",
+        "image",
+    ),
+    define_binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
+    define_binding(
         &[KeyPress::plain('x')],
         "x",
         Action::ActualPixels,
         "actual pixels (1:1) around the crosshair",
         "",
     ),
-    binding(
+    define_binding(
         &[KeyPress::plain('z')],
         "z",
         Action::RenderRegionFirst,
         "render a region first (drag; z: at the crosshair)",
         "",
     ),
-    binding(
+    define_binding(
         &[LEFT, KeyPress::plain('h')],
         "arrows hjkl",
         Action::OrbitLeft,
         "orbit the camera (or drag)",
         "",
     ),
-    binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
-    binding(&[UP, KeyPress::plain('k')], "", Action::OrbitUp, "", ""),
-    binding(&[RIGHT, KeyPress::plain('l')], "", Action::OrbitRight, "", ""),
-    binding(
+    define_binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
+    define_binding(&[UP, KeyPress::plain('k')], "", Action::OrbitUp, "", ""),
+    define_binding(&[RIGHT, KeyPress::plain('l')], "", Action::OrbitRight, "", ""),
+    define_binding(
         &[KeyPress::plain('+'), KeyPress::plain('=')],
         "+ -",
         Action::DollyIn,
         "move closer / farther (or wheel)",
         "",
     ),
-    binding(&[KeyPress::plain('-')], "", Action::DollyOut, "", ""),
-    binding(&[KeyPress::plain('<')], "< >", Action::NarrowField, "narrower / wider field of view", ""),
-    binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
-    binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "darker / brighter exposure", ""),
-    binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
-    binding(&[KeyPress::plain('f')], "f", Action::Focus, "focus where you click; f again: at crosshair", ""),
-    binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
-    binding(&[KeyPress::plain('u')], "u", Action::UndoCamera, "undo the last c", ""),
-    binding(
+    define_binding(&[KeyPress::plain('-')], "", Action::DollyOut, "", ""),
+    define_binding(&[KeyPress::plain('<')], "< >", Action::NarrowField, "narrower / wider field of view", ""),
+    define_binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
+    define_binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "darker / brighter exposure", ""),
+    define_binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
+    define_binding(
+        &[KeyPress::plain('f')],
+        "f",
+        Action::Focus,
+        "focus where you click; f again: at crosshair",
+        "",
+    ),
+    define_binding(
+        &[KeyPress::plain('c')],
+        "c",
+        Action::KeepCamera,
+        "write the camera into the scene file",
+        "",
+    ),
+    define_binding(&[KeyPress::plain('u')], "u", Action::UndoCamera, "undo the last c", ""),
+    define_binding(
         &[KeyPress::special(KeyCode::Enter)],
         "Enter, click",
         Action::Inspect,
         "inspect the object at the crosshair or mouse",
         "",
     ),
-    binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy the inspected values", ""),
-    binding(&[KeyPress::plain('o')], "o", Action::Edit, "open the editor at the error or clicked object", ""),
-    binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on or off (off to select text)", ""),
-    binding(
+    define_binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy the inspected values", ""),
+    define_binding(
+        &[KeyPress::plain('o')],
+        "o",
+        Action::Edit,
+        "open the editor at the error or clicked object",
+        "",
+    ),
+    define_binding(
+        &[KeyPress::plain('m')],
+        "m",
+        Action::ToggleMouse,
+        "mouse on or off (off to select text)",
+        "",
+    ),
+    define_binding(
         &[KeyPress::plain('b')],
         "b",
         Action::CompareLastEdit,
         "switch between before and after the last edit",
         "",
     ),
-    binding(
+    define_binding(
         &[KeyPress::plain('n')],
         "n N",
         Action::OlderRender,
         "older / newer render (or click in the history)",
         "",
     ),
-    binding(&[KeyPress::plain('N')], "N", Action::NewerRender, "", ""),
-    binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause or resume the render", "pause"),
-    binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
-    binding(&[KeyPress::plain('w')], "w", Action::WriteImage, "write the newest image now", "write"),
-    binding(&[KeyPress::plain('0')], "0", Action::ResetSettings, "reset to the scene's settings", "reset"),
-    binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
-    binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "redraw the screen", ""),
-    binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "suspend to the shell", ""),
-    binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
+    define_binding(&[KeyPress::plain('N')], "N", Action::NewerRender, "", ""),
+    define_binding(
+        &[KeyPress::plain(' ')],
+        "space",
+        Action::TogglePause,
+        "pause or resume the render",
+        "pause",
+    ),
+    define_binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
+    define_binding(&[KeyPress::plain('w')], "w", Action::WriteImage, "write the newest image now", "write"),
+    define_binding(
+        &[KeyPress::plain('0')],
+        "0",
+        Action::ResetSettings,
+        "reset to the scene's settings",
+        "reset",
+    ),
+    define_binding(
+        &[KeyPress::plain('e')],
+        "e",
+        Action::ToggleDiagnostics,
+        "show or hide errors and warnings",
+        "",
+    ),
+    define_binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "redraw the screen", ""),
+    define_binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "suspend to the shell", ""),
+    define_binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
 
 /// Key actions available while the help, the diagnostics or the view list is open. They take precedence over
@@ -142,33 +190,39 @@ pub(super) enum OverlayAction {
 
 /// Key bindings for overlays.
 pub(super) const OVERLAY: &[KeyBinding<OverlayAction>] = &[
-    binding(
+    define_binding(
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
         "j k",
         OverlayAction::LineDown,
         "or down, up: scroll help, errors; choose a view",
         "scroll",
     ),
-    binding(&[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)], "", OverlayAction::LineUp, "", ""),
-    binding(
+    define_binding(
+        &[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)],
+        "",
+        OverlayAction::LineUp,
+        "",
+        "",
+    ),
+    define_binding(
         &[KeyPress::special(KeyCode::PageDown)],
         "PgDn PgUp",
         OverlayAction::PageDown,
         "scroll by a page",
         "page",
     ),
-    binding(&[KeyPress::special(KeyCode::PageUp)], "", OverlayAction::PageUp, "", ""),
-    binding(&[LEFT, KeyPress::plain('h')], "", OverlayAction::ColumnLeft, "", ""),
-    binding(&[RIGHT, KeyPress::plain('l')], "", OverlayAction::ColumnRight, "", ""),
-    binding(
+    define_binding(&[KeyPress::special(KeyCode::PageUp)], "", OverlayAction::PageUp, "", ""),
+    define_binding(&[LEFT, KeyPress::plain('h')], "", OverlayAction::ColumnLeft, "", ""),
+    define_binding(&[RIGHT, KeyPress::plain('l')], "", OverlayAction::ColumnRight, "", ""),
+    define_binding(
         &[KeyPress::special(KeyCode::Enter)],
         "Enter /",
         OverlayAction::Take,
         "in the view list: Enter close, / search",
         "",
     ),
-    binding(&[KeyPress::plain('/')], "", OverlayAction::Find, "", ""),
-    binding(
+    define_binding(&[KeyPress::plain('/')], "", OverlayAction::Find, "", ""),
+    define_binding(
         &[KeyPress::special(KeyCode::Esc)],
         "esc",
         OverlayAction::Close,
@@ -194,7 +248,7 @@ pub(super) fn action_for(key: KeyPress) -> Option<Action> {
 }
 
 /// The table row for an action. Every action has one.
-pub(super) fn binding_for(action: Action) -> Option<&'static KeyBinding> {
+pub(super) fn binding_for_action(action: Action) -> Option<&'static KeyBinding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }
 

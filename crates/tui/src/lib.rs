@@ -53,12 +53,12 @@ use glimt_base::{choice, film, math, system};
 use glimt_pipeline as pipeline;
 use glimt_scene as scene;
 
-pub use color::{ColorChoice, ColorDepth, xterm_rgb};
+pub use color::{ColorDepth, ColorDepthChoice, xterm_rgb};
 pub use editor::editor_and_variable;
 pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
-pub use options::{ContentChange, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
-pub use probe::{ProbeReplies, TerminalProbe, probe_terminal};
+pub use options::{ContentChangeTime, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
+pub use probe::{ProbeReplies, TerminalProbeResult, probe_terminal};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};
 pub use view::preview::draw_for_dark_xterm;

@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 use super::fixtures::{
     asset_progress, camera, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
-use super::{ColorChoice, ContentChange, Options, PreviewChoice, WatchEvent, run};
+use super::{ColorDepthChoice, ContentChangeTime, Options, PreviewChoice, WatchEvent, run};
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{
-    Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
+    Command, Event, Failure, PreviewSlot, PreviewUpdate, RenderProgress, Request, Stage, Status,
 };
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
@@ -34,7 +34,7 @@ fn interactive_session() {
     let outcome = run(Options {
         scene,
         overrides: Overrides::default(),
-        color: ColorChoice::Auto,
+        color: ColorDepthChoice::Auto,
         preview: PreviewChoice::Auto,
         cell_aspect: None,
         notify_after: None,
@@ -62,7 +62,7 @@ fn forward_scene_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
         let now = std::fs::read(scene).ok();
         if now != last {
             last = now;
-            let changed = WatchEvent::Changed(ContentChange { noticed: Instant::now() });
+            let changed = WatchEvent::Changed(ContentChangeTime { noticed: Instant::now() });
             if [changed, WatchEvent::Settled].into_iter().any(|said| news.send(said).is_err()) {
                 return;
             }
@@ -73,7 +73,7 @@ fn forward_scene_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
 fn run_simulated_worker(
     orders: &Receiver<Command>,
     events: &Sender<Event>,
-    slot: &Mutex<Option<LatestPreview>>,
+    slot: &Mutex<Option<PreviewUpdate>>,
 ) {
     let mut next = None;
     loop {
@@ -90,7 +90,7 @@ fn simulate_render(
     request: &Request,
     orders: &Receiver<Command>,
     events: &Sender<Event>,
-    slot: &Mutex<Option<LatestPreview>>,
+    slot: &Mutex<Option<PreviewUpdate>>,
 ) -> Option<Command> {
     let generation = request.generation;
     let say = |event| events.send(event).unwrap_or_default();
@@ -117,7 +117,7 @@ fn simulate_render(
         if let Some(size) = request.preview {
             let height = (size.width * 3 / 4).min(size.height).max(1);
             let picture = Arc::new(draw_test_picture(height * 4 / 3, height, step + text.len() as u32 * 20));
-            *slot.lock().expect("a slot") = Some(LatestPreview {
+            *slot.lock().expect("a slot") = Some(PreviewUpdate {
                 generation,
                 picture,
                 range: None,

@@ -287,7 +287,7 @@ pub fn renders_on_changes(file: &str) -> String {
 }
 
 /// Describes the bytes and round-trip time for sending the last preview.
-pub fn preview_transfer_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
+pub fn preview_bytes_and_round_trip(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
     let round_trip = round_trip_ms.map_or(String::new(), |time| format!(" · {time} ms round trip"));
     format!("{kilobytes} kB sent{round_trip}")
 }
@@ -296,7 +296,7 @@ pub fn preview_transfer_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> S
 pub const NOISE_OVER_TIME: &str = "Noise over time";
 
 /// Label for the target line in the noise curve.
-pub fn noise_target(share: &str) -> String {
+pub fn noise_target_line_label(share: &str) -> String {
     format!("── target: {share} per tile")
 }
 

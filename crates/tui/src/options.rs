@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use super::color::ColorChoice;
+use super::color::ColorDepthChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{ContentChange, ExternalChange, OutputChange, WatchEvent};
+pub use crate::pipeline::watch::{ContentChangeTime, ExternalChange, OutputChange, WatchEvent};
 use crate::system::describe_error;
 
 choice! {
@@ -44,7 +44,7 @@ pub struct Options {
     /// Overrides from the command line. Keys can make further changes.
     pub overrides: Overrides,
     /// Which colors to use.
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
     /// How to draw the preview.
     pub preview: PreviewChoice,
     /// Height of a cell divided by its width. `None` to query the terminal, with 2 as the default.

@@ -28,14 +28,14 @@ pub(super) enum MultiplexerPassthrough {
 
 /// A request to draw pixels that the terminal has not confirmed yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ImageProtocolRequest {
+pub(super) struct UnconfirmedImageProtocol {
     pub(super) protocol: ImageProtocol,
     pub(super) route: MultiplexerPassthrough,
     /// Whether environment variables identify a terminal that supports the protocol.
     pub(super) is_known: bool,
 }
 
-impl ImageProtocolRequest {
+impl UnconfirmedImageProtocol {
     pub(super) fn new(
         protocol: ImageProtocol,
         variable: impl Fn(&str) -> Option<String>,
@@ -72,7 +72,7 @@ impl ImageProtocolRequest {
 
     /// Whether the device attributes arrive after all other replies. This is not the case inside tmux, which
     /// answers that query itself before passing on others.
-    pub(super) fn is_decided_by_attributes(self) -> bool {
+    pub(super) fn is_attributes_reply_last(self) -> bool {
         match (self.protocol, self.route) {
             (ImageProtocol::Sixel, _) | (_, MultiplexerPassthrough::Direct) => true,
             (
@@ -106,10 +106,10 @@ impl ImageProtocolRequest {
 mod tests {
     use super::*;
 
-    fn request(protocol: ImageProtocol, pairs: &[(&str, &str)], is_plain: bool) -> ImageProtocolRequest {
+    fn request(protocol: ImageProtocol, pairs: &[(&str, &str)], is_plain: bool) -> UnconfirmedImageProtocol {
         let variable =
             |name: &str| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
-        ImageProtocolRequest::new(protocol, variable, is_plain)
+        UnconfirmedImageProtocol::new(protocol, variable, is_plain)
     }
 
     #[test]
@@ -135,16 +135,16 @@ mod tests {
     fn tmux_answers_attribute_queries_itself() {
         for protocol in [ImageProtocol::Kitty, ImageProtocol::Iterm] {
             let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
-            assert!(!tmux.is_decided_by_attributes());
+            assert!(!tmux.is_attributes_reply_last());
             assert!(
                 tmux.unsupported_message().contains("allow-passthrough"),
                 "{}",
                 tmux.unsupported_message()
             );
-            assert!(request(protocol, &[], false).is_decided_by_attributes());
+            assert!(request(protocol, &[], false).is_attributes_reply_last());
         }
         assert!(
-            request(ImageProtocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).is_decided_by_attributes()
+            request(ImageProtocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).is_attributes_reply_last()
         );
     }
 }

@@ -12,14 +12,14 @@ use ratatui::layout::Rect;
 use super::display::Display;
 use super::event::Event;
 use super::file_urls::FileUrlBuilder;
-use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, advise};
+use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, advise_on_preview};
 use super::state::State;
 use super::view;
 use super::view::FileLinksAndDelayedText;
 use super::view::layout::Layout;
 use super::window_title::TitleAndProgress;
 use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
+use crate::pipeline::protocol::{PreviewSlot, PreviewUpdate};
 
 /// Frame interval. Output is limited to 20 frames per second, except in response to keys.
 const FRAME: Duration = Duration::from_millis(50);
@@ -97,7 +97,7 @@ impl Presenter {
 
     /// Whether to draw a newer preview of the same request.
     fn pacing_advice(&self, state: &State, now: Instant) -> PacingAdvice {
-        advise(&self.pacing_inputs(state, now))
+        advise_on_preview(&self.pacing_inputs(state, now))
     }
 
     fn pacing_inputs(&self, state: &State, now: Instant) -> PacingInputs {
@@ -134,7 +134,7 @@ impl Presenter {
     fn take_preview(&mut self) -> Option<Event> {
         self.drawn.is_old = false;
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take()?;
-        let LatestPreview { generation, picture, range, section, lacks_photons, source } = latest;
+        let PreviewUpdate { generation, picture, range, section, lacks_photons, source } = latest;
         Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
@@ -154,14 +154,14 @@ impl Presenter {
         self.drawn.is_refined |= is_refined;
         self.postpone_next_frame(state, now);
         state.dirty = false;
-        self.display.set_preview_kind(state.display.kind);
+        self.display.enable_pixel_preview_if_required(state.display.kind);
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
         if let Some(title) = TitleAndProgress::for_state(state, self.display.bytes_per_second().is_some()) {
             self.display.set_title_and_progress(title);
         }
-        let is_new = self.record_preview(state, now);
+        let is_new = self.record_drawn_preview(state, now);
         // A preview counts as the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::for_state(state).preview;
@@ -185,7 +185,7 @@ impl Presenter {
     }
 
     /// Records the preview being drawn. Returns true if it is new.
-    fn record_preview(&mut self, state: &State, now: Instant) -> bool {
+    fn record_drawn_preview(&mut self, state: &State, now: Instant) -> bool {
         let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
             return false;
@@ -252,7 +252,7 @@ fn samples_per_pixel(state: &State) -> f64 {
 /// Whether the newest preview is final.
 fn is_final_preview(state: &State) -> bool {
     state.work.paused
-        || !state.work.is_request_running() && view::status_line::last_good_progress(state).is_none()
+        || !state.work.is_request_running() && view::status_line::last_valid_scene_progress(state).is_none()
 }
 
 /// Time at which the state next needs a frame or a tick.

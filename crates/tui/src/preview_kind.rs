@@ -4,7 +4,7 @@ use super::color::ColorDepth;
 use super::graphics::ImageProtocol;
 use super::mosaic::CellGrid;
 use super::options::PreviewChoice;
-use super::pixel_request::ImageProtocolRequest;
+use super::pixel_request::UnconfirmedImageProtocol;
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl PreviewKind {
     pub(super) fn initial(
         choice: PreviewChoice,
         depth: ColorDepth,
-        pixels: Option<ImageProtocolRequest>,
+        pixels: Option<UnconfirmedImageProtocol>,
     ) -> Self {
         match (Self::from_choice(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
-use super::color::{self, ColorChoice, ColorDepth};
+use super::color::{self, ColorDepth, ColorDepthChoice};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
 use super::environment::{detect_terminal_environment, may_print_unknown_escapes};
 use super::input::{DecodedInput, Decoder};
@@ -18,7 +18,7 @@ use super::terminals::{TerminalBrand, TerminalId};
 
 /// Terminal properties determined from replies and environment variables.
 #[derive(Clone, Debug)]
-pub struct TerminalProbe {
+pub struct TerminalProbeResult {
     /// Number of columns and rows.
     pub cells: (u16, u16),
     /// Cell size in pixels, if the terminal reports it.
@@ -54,7 +54,7 @@ pub struct ProbeReplies {
     pub background: Option<[u8; 3]>,
 }
 
-impl TerminalProbe {
+impl TerminalProbeResult {
     /// Name of the character set that `--preview auto` uses.
     pub fn auto_preview_name(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
@@ -75,7 +75,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 ///
 /// Multiplexers and consoles are queried only for device attributes because they may print other queries as
 /// text.
-pub fn probe_terminal() -> Option<TerminalProbe> {
+pub fn probe_terminal() -> Option<TerminalProbeResult> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;
     }
@@ -97,10 +97,10 @@ pub fn probe_terminal() -> Option<TerminalProbe> {
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };
     let brand = variable("TERM_PROGRAM").and_then(|program| TerminalBrand::from_program(&program));
-    Some(TerminalProbe {
+    Some(TerminalProbeResult {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
-        depth: color::resolve_depth(ColorChoice::Auto, variable),
+        depth: color::resolve_depth(ColorDepthChoice::Auto, variable),
         is_multiplexed: link.is_multiplexed,
         is_remote: link.is_remote,
         has_iterm: brand.is_some_and(TerminalBrand::has_iterm_images),
@@ -125,12 +125,12 @@ fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
 fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
-    if !read_replies(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {
+    if !read_replies_until(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
-    read_replies(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
+    read_replies_until(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
     Ok(Some(ProbeReplies { round_trip, ..heard.summarize() }))
 }
 
@@ -141,7 +141,7 @@ fn send(bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Reads replies until `is_all` returns true. Returns false on timeout.
-fn read_replies(
+fn read_replies_until(
     heard: &mut ReceivedReplies,
     begin: Instant,
     is_all: impl Fn(&ReceivedReplies) -> bool,

@@ -10,7 +10,7 @@ use super::display::{Display, TerminalEnvironment};
 use super::editor;
 use super::environment::{detect_terminal_environment, terminal_queries};
 use super::event::FilePosition;
-use super::event::{Effect, Event, EventSource};
+use super::event::{Effect, Event, RequiredEventSource};
 use super::exit_summary;
 use super::input;
 use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
@@ -64,8 +64,8 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         capabilities,
         notify_after: options.notify_after,
     };
-    forward_channel("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
-    forward_channel("news", options.news, &sender, Event::from_watcher, EventSource::Watcher)?;
+    forward_channel("worker-events", options.events, &sender, Event::Worker, RequiredEventSource::Worker)?;
+    forward_channel("news", options.news, &sender, Event::from_watcher, RequiredEventSource::Watcher)?;
     input::start_reader(&sender).map_err(terminal_error_for("read keys from"))?;
     writer::start_writer(&sender).map_err(terminal_error_for("write to"))?;
 
@@ -95,7 +95,7 @@ fn forward_channel<T: Send + 'static>(
     from: Receiver<T>,
     events: &Sender<Event>,
     wrap: impl Fn(T) -> Event + Send + 'static,
-    source: EventSource,
+    source: RequiredEventSource,
 ) -> Result<(), TuiError> {
     let events = events.clone();
     let pass = move || {
@@ -159,7 +159,7 @@ impl EventLoop {
             status,
             is_write_unanswered: saving.is_write_requested,
             summary: exit_summary::summary_text(&self.state),
-            is_current: exit_summary::is_image_current(&self.state),
+            is_current: exit_summary::is_saved_scene_image_current(&self.state),
             write_results: saving.write_results,
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),

@@ -138,7 +138,7 @@ pub(super) fn set_foreground_child(id: Option<Pid>) {
 
 /// Forwards the first terminating signal to the child. Ignores later ones, because this process also receives
 /// the signals that it sends to its own job.
-fn forward_termination(number: Number) {
+fn forward_termination_to_child(number: Number) {
     let mut child = lock_child();
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
@@ -156,15 +156,15 @@ fn forward_to_child(id: Pid, number: Number) {
 }
 
 /// Lets the child handle keyboard signals until the returned guard is dropped.
-pub(super) fn leave_signals_to_child() -> ChildSignalGuard {
+pub(super) fn leave_signals_to_child() -> IgnoredKeyboardSignalsGuard {
     CHILD_HANDLES_SIGNALS.store(true, Ordering::Release);
-    ChildSignalGuard(())
+    IgnoredKeyboardSignalsGuard(())
 }
 
 /// Guard returned by [`leave_signals_to_child`].
-pub(super) struct ChildSignalGuard(());
+pub(super) struct IgnoredKeyboardSignalsGuard(());
 
-impl Drop for ChildSignalGuard {
+impl Drop for IgnoredKeyboardSignalsGuard {
     fn drop(&mut self) {
         // If a key press ended the child, this process received the same signal but may not have handled it
         // yet.
@@ -191,7 +191,7 @@ impl SignalThread {
                     return;
                 }
                 if !terminal::terminal_exists() {
-                    return self.notify(Signal::Hangup);
+                    return self.deliver_signal(Signal::Hangup);
                 }
             }
             // signal-hook does not support signals that exist only on Linux.
@@ -214,26 +214,26 @@ impl SignalThread {
             SIGCONT => Signal::Continue,
             other => Signal::Other(other),
         };
-        self.notify(signal);
+        self.deliver_signal(signal);
     }
 
     fn watch_terminal(&self) {
         while !self.over.load(Ordering::Acquire) {
             thread::sleep(WATCH);
             if !terminal::terminal_exists() {
-                self.notify(Signal::Hangup);
+                self.deliver_signal(Signal::Hangup);
                 return;
             }
         }
     }
 
-    fn notify(&self, signal: Signal) {
+    fn deliver_signal(&self, signal: Signal) {
         if signal == Signal::Hangup {
             HUNG_UP.store(true, Ordering::Release);
         }
         if let Some(status) = exit_status_for(signal) {
             if let Ok(number) = Number::try_from(signal_number(signal)) {
-                forward_termination(number);
+                forward_termination_to_child(number);
             }
             let over = Arc::clone(&self.over);
             thread::spawn(move || exit_after_grace_period(signal, status, &over));

@@ -4,10 +4,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
-use super::color::{self, ColorChoice, ColorDepth, ColorMapper};
+use super::color::{self, ColorDepth, ColorDepthChoice, ColorMapper};
 use super::event::WindowSize;
 use super::options::PreviewChoice;
-use super::paint::as_text_lines;
+use super::paint::buffer_to_text_lines;
 use super::terminal;
 use super::view::preview::{PreviewColors, draw_image, size_in_cells};
 use super::view::text::{text_columns, truncated_text};
@@ -36,7 +36,7 @@ pub struct NamedImage {
 /// Draws images as lines of text, side by side, or stacked if the terminal is narrow. Uses the terminal's
 /// colors, or ASCII characters without color support. Returns an empty string if the terminal has fewer than
 /// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
-pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
+pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_depth(color, variable);
     let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
@@ -44,7 +44,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     let (size, aspect) =
         if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
     let buffers = lay_out_images(pictures, inks, size, aspect);
-    buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
+    buffers.iter().map(|buffer| buffer_to_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
 /// Returns the window size and cell aspect ratio, with defaults for terminals that report a size of 0.
@@ -67,14 +67,19 @@ fn lay_out_images(
     if across < MIN_COLUMNS {
         Vec::new()
     } else if beside >= MIN_BESIDE {
-        vec![draw_image_row(pictures, inks, (beside, rows), aspect)]
+        vec![draw_images_side_by_side(pictures, inks, (beside, rows), aspect)]
     } else {
-        pictures.chunks(1).map(|one| draw_image_row(one, inks, (across, rows), aspect)).collect()
+        pictures.chunks(1).map(|one| draw_images_side_by_side(one, inks, (across, rows), aspect)).collect()
     }
 }
 
 /// Draws images side by side below their captions, each scaled to fit into `room`.
-fn draw_image_row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
+fn draw_images_side_by_side(
+    pictures: &[NamedImage],
+    inks: PreviewColors<'_>,
+    room: (u16, u16),
+    aspect: f32,
+) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
     let names = pictures.iter().map(|one| text_columns(&one.name).min(room.0)).max().unwrap_or(0);
@@ -104,7 +109,7 @@ mod tests {
             size,
             2.0,
         );
-        let text: String = buffers.iter().map(|buffer| as_text_lines(buffer, false)).collect();
+        let text: String = buffers.iter().map(|buffer| buffer_to_text_lines(buffer, false)).collect();
         text.lines().map(str::to_owned).collect()
     }
 

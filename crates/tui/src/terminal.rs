@@ -162,7 +162,7 @@ pub(super) fn restore_modes() {
 /// The terminal, opened during setup, so that restoring it does not need another file descriptor.
 static OUTPUT: Mutex<Option<File>> = Mutex::new(None);
 
-fn take_output() -> Option<File> {
+fn take_output_file() -> Option<File> {
     OUTPUT.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
@@ -199,8 +199,8 @@ fn leave_screen() {
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
-        .and_then(|()| take_output().map_or_else(writer::open_output, Ok))
-        .and_then(|mut out| writer::write_until_given_up(&mut out, &bytes, is_late));
+        .and_then(|()| take_output_file().map_or_else(writer::open_output, Ok))
+        .and_then(|mut out| writer::write_all_unless_canceled(&mut out, &bytes, is_late));
 }
 
 /// Restores the terminal from another thread, since the thread that owns it may be blocked. Does not block:
@@ -213,7 +213,7 @@ pub(super) fn restore_from_other_thread() {
         writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
             let tty = File::options().write(true).open("/dev/tty");
-            tty.or_else(|error| take_output().ok_or(error)).and_then(|mut tty| write_restore(&mut tty))
+            tty.or_else(|error| take_output_file().ok_or(error)).and_then(|mut tty| write_restore(&mut tty))
         });
     }
 }
@@ -398,7 +398,7 @@ pub(super) fn query_window(cell_aspect: Option<f32>) -> WindowSize {
             rows: size.rows,
             cell_aspect: cell_aspect
                 .unwrap_or_else(|| cell_aspect_ratio((size.columns, size.rows), (size.width, size.height))),
-            cell_pixels: cell_pixels((size.columns, size.rows), (size.width, size.height)),
+            cell_pixels: cell_size_from_window((size.columns, size.rows), (size.width, size.height)),
         }),
         Err(_) => {
             let (columns, rows) = terminal::size().unwrap_or((80, 24));
@@ -437,7 +437,7 @@ fn cell_aspect_ratio(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
 }
 
 /// Cell size in pixels, if plausible.
-fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
+fn cell_size_from_window(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
     let side = |pixels: u16, cells: u16| pixels.checked_div(cells).filter(|side| (2..=100).contains(side));
     side(pixels.0, cells.0).zip(side(pixels.1, cells.1)).unwrap_or(DEFAULT_CELL_PIXELS)
 }
@@ -533,9 +533,9 @@ mod tests {
 
     #[test]
     fn implausible_cell_sizes_are_ignored() {
-        assert_eq!(cell_pixels((80, 24), (80 * 9, 24 * 18 + 3)), (9, 18));
-        assert_eq!(cell_pixels((80, 24), (0, 0)), DEFAULT_CELL_PIXELS);
-        assert_eq!(cell_pixels((0, 0), (640, 480)), DEFAULT_CELL_PIXELS);
+        assert_eq!(cell_size_from_window((80, 24), (80 * 9, 24 * 18 + 3)), (9, 18));
+        assert_eq!(cell_size_from_window((80, 24), (0, 0)), DEFAULT_CELL_PIXELS);
+        assert_eq!(cell_size_from_window((0, 0), (640, 480)), DEFAULT_CELL_PIXELS);
     }
 
     #[test]

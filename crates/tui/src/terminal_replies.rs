@@ -1,7 +1,7 @@
 //! Terminal queries and replies.
 
 use super::graphics::ImageProtocol;
-use super::pixel_request::ImageProtocolRequest;
+use super::pixel_request::UnconfirmedImageProtocol;
 use super::terminals::{TerminalBrand, TerminalId};
 
 /// The finest block characters that a terminal draws without using a font.
@@ -79,7 +79,7 @@ pub(super) struct TerminalQueries {
     /// Query the 16 ANSI colors.
     pub(super) palette: bool,
     /// Query support for images.
-    pub(super) pixels: Option<ImageProtocolRequest>,
+    pub(super) pixels: Option<UnconfirmedImageProtocol>,
 }
 
 impl TerminalQueries {
@@ -91,7 +91,7 @@ impl TerminalQueries {
                 queries.extend_from_slice(bytes);
             }
         };
-        let pixels = self.pixels.map(ImageProtocolRequest::query).unwrap_or_default();
+        let pixels = self.pixels.map(UnconfirmedImageProtocol::query).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
         // The capability names `RGB` and `Tc` are hex-encoded.

@@ -44,7 +44,7 @@ pub(super) enum NotificationProtocol {
 
 /// Terminal capabilities beyond text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Capabilities {
+pub(super) struct DesktopCapabilities {
     /// Window titles (OSC 2).
     pub(super) title: bool,
     /// A progress bar in the window frame or taskbar (OSC 9;4).
@@ -174,9 +174,9 @@ impl TerminalId {
     }
 
     /// Capabilities according to the terminal's documentation.
-    pub(super) fn capabilities(self) -> Capabilities {
+    pub(super) fn capabilities(self) -> DesktopCapabilities {
         let Self { brand, version } = self;
-        let all = Capabilities {
+        let all = DesktopCapabilities {
             title: true,
             progress: false,
             notice: Some(NotificationProtocol::Bell),
@@ -186,35 +186,46 @@ impl TerminalId {
         };
         let since = |least: [u32; 2]| version >= least;
         match brand {
-            TerminalBrand::Kitty => Capabilities { notice: Some(NotificationProtocol::Osc99), ..all },
+            TerminalBrand::Kitty => DesktopCapabilities { notice: Some(NotificationProtocol::Osc99), ..all },
             TerminalBrand::Foot | TerminalBrand::Contour => {
-                Capabilities { notice: Some(NotificationProtocol::Osc777), ..all }
+                DesktopCapabilities { notice: Some(NotificationProtocol::Osc777), ..all }
             }
-            TerminalBrand::Ghostty => {
-                Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
-            }
+            TerminalBrand::Ghostty => DesktopCapabilities {
+                notice: Some(NotificationProtocol::Osc777),
+                progress: since([1, 2]),
+                ..all
+            },
             // Older versions display the progress sequence as a notification.
-            TerminalBrand::WezTerm => Capabilities {
+            TerminalBrand::WezTerm => DesktopCapabilities {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
                 ..all
             },
-            TerminalBrand::Iterm2 => {
-                Capabilities { notice: Some(NotificationProtocol::Osc9), progress: since([3, 7]), ..all }
-            }
-            TerminalBrand::WindowsTerminal => Capabilities { progress: true, ..all },
-            TerminalBrand::VsCode => Capabilities { progress: since([1, 97]), ..all },
-            TerminalBrand::Mintty => Capabilities { progress: since([3, 5]), ..all },
+            TerminalBrand::Iterm2 => DesktopCapabilities {
+                notice: Some(NotificationProtocol::Osc9),
+                progress: since([3, 7]),
+                ..all
+            },
+            TerminalBrand::WindowsTerminal => DesktopCapabilities { progress: true, ..all },
+            TerminalBrand::VsCode => DesktopCapabilities { progress: since([1, 97]), ..all },
+            TerminalBrand::Mintty => DesktopCapabilities { progress: since([3, 5]), ..all },
             TerminalBrand::Alacritty => all,
-            TerminalBrand::Konsole => Capabilities { progress: since([25, 4]), clipboard: false, ..all },
-            TerminalBrand::Vte => {
-                Capabilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
+            TerminalBrand::Konsole => {
+                DesktopCapabilities { progress: since([25, 4]), clipboard: false, ..all }
             }
+            TerminalBrand::Vte => DesktopCapabilities {
+                progress: since([8000, 0]),
+                links: since([5000, 0]),
+                clipboard: false,
+                ..all
+            },
             // xterm denies clipboard access by default.
-            TerminalBrand::Xterm => Capabilities { links: false, clipboard: false, ..all },
-            TerminalBrand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
+            TerminalBrand::Xterm => DesktopCapabilities { links: false, clipboard: false, ..all },
+            TerminalBrand::ConEmu => {
+                DesktopCapabilities { title: true, progress: true, ..DesktopCapabilities::default() }
+            }
             TerminalBrand::AppleTerminal => {
-                Capabilities { links: false, clipboard: false, focus: false, notice: None, ..all }
+                DesktopCapabilities { links: false, clipboard: false, focus: false, notice: None, ..all }
             }
         }
     }

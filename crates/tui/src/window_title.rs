@@ -68,7 +68,7 @@ impl TitleAndProgress {
         let percent = progress.map(|progress| view::text::floor_percent(progress.fraction) / step * step);
         Some(Self {
             title: capabilities.title.then(|| title_text(state, percent)),
-            bar: capabilities.progress.then(|| progress_bar(state, percent)),
+            bar: capabilities.progress.then(|| progress_bar_state(state, percent)),
         })
     }
 
@@ -98,7 +98,7 @@ fn scene_file_name(state: &State) -> String {
     escape_invisible_chars(&name.to_string_lossy()).into_owned()
 }
 
-fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
+fn progress_bar_state(state: &State, percent: Option<u32>) -> ProgressBar {
     match state.work.activity {
         WorkerActivity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
         WorkerActivity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
@@ -125,7 +125,7 @@ pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, ti
 
 /// Escape sequence that copies text to the clipboard.
 pub(super) fn clipboard_bytes(text: &str) -> Vec<u8> {
-    [b"\x1b]52;c;", &*base64::encoded(text.as_bytes()), b"\x1b\\"].concat()
+    [b"\x1b]52;c;", &*base64::encode_base64(text.as_bytes()), b"\x1b\\"].concat()
 }
 
 #[cfg(test)]
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{TestUi, render_progress};
     use crate::pipeline::protocol::Event;
-    use crate::terminals::{Capabilities, TerminalBrand, TerminalId};
+    use crate::terminals::{DesktopCapabilities, TerminalBrand, TerminalId};
 
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn unsupported_terminals_get_no_title() {
         let (mut ui, mut shown_title) = (TestUi::new(), TitleAndProgress::default());
-        assert_eq!(ui.state.display.capabilities, Capabilities::default());
+        assert_eq!(ui.state.display.capabilities, DesktopCapabilities::default());
         ui.finish_render([200, 30, 30]);
         assert_eq!(sent(&mut shown_title, &ui, false), "");
     }

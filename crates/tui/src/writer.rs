@@ -40,7 +40,7 @@ impl WriteQueue {
     }
 
     /// Waits for the next slice and returns it.
-    fn wait_for_slice(&self) -> Vec<u8> {
+    fn wait_and_pop_slice(&self) -> Vec<u8> {
         let mut waiting = self.lock();
         loop {
             if let Some(slice) = waiting.slices.pop_front() {
@@ -66,8 +66,8 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
     let mut out = open_output()?;
     let write = move || {
         loop {
-            let slice = QUEUE.wait_for_slice();
-            let outcome = write_until_given_up(&mut out, &slice, || QUEUE.lock().is_given_up);
+            let slice = QUEUE.wait_and_pop_slice();
+            let outcome = write_all_unless_canceled(&mut out, &slice, || QUEUE.lock().is_given_up);
             QUEUE.finish_slice();
             let event = match &outcome {
                 Ok(()) => Event::Written { bytes: slice.len() },
@@ -125,7 +125,7 @@ pub(super) fn discard_queued_and_wait(patience: Duration) -> bool {
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes all bytes, but stops if `is_given_up` returns true.
-pub(super) fn write_until_given_up(
+pub(super) fn write_all_unless_canceled(
     out: &mut File,
     mut bytes: &[u8],
     is_given_up: impl Fn() -> bool,

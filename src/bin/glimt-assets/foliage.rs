@@ -4,7 +4,7 @@ use std::f64::consts::SQRT_2;
 
 use super::noise::{lattice_random, value_noise};
 use super::surface::Surface;
-use super::vector::{Vector, add, cross, dot, mix, scale, sin_cos_turns, smooth_step, subtract, unit};
+use super::vector::{Vector, add, cross, dot, mix, scale, sin_cos_turns, smoothstep, subtract, unit};
 
 /// Width and height of the leaf texture.
 const SIDE: u32 = 256;
@@ -18,7 +18,7 @@ pub(crate) fn leaf_png() -> Vec<u8> {
     for row in 0..SIDE {
         for column in 0..SIDE {
             let at = |index: u32| (f64::from(index) + 0.5) / f64::from(SIDE);
-            let [red, green, blue] = leaf_color(at(column), 1.0 - at(row));
+            let [red, green, blue] = leaf_texture_color(at(column), 1.0 - at(row));
             let alpha = leaf_coverage(at(column), 1.0 - at(row));
             pixels.extend([red, green, blue, alpha].map(|part| (part * 255.0 + 0.5) as u8));
         }
@@ -42,18 +42,17 @@ fn leaf_half_width(v: f64) -> f64 {
 /// Coverage of a point by the leaf or its stalk, with a soft border about a pixel wide.
 fn leaf_coverage(u: f64, v: f64) -> f64 {
     let (side, teeth) = ((u - 0.5).abs(), 0.012 * ((v * 26.0).fract() - 0.5));
-    let blade = smooth_step(-0.004, 0.004, leaf_half_width(v - 0.01) + teeth - side);
-    let stalk = if v < 0.3 { smooth_step(-0.004, 0.004, 0.012 - side) } else { 0.0 };
+    let blade = smoothstep(-0.004, 0.004, leaf_half_width(v - 0.01) + teeth - side);
+    let stalk = if v < 0.3 { smoothstep(-0.004, 0.004, 0.012 - side) } else { 0.0 };
     let is_inside = (0.1..0.98).contains(&v);
     stalk.max(if is_inside { blade } else { 0.0 })
 }
 
 /// Green with light veins. The color extends past the border so that no other color bleeds in.
-fn leaf_color(u: f64, v: f64) -> Vector {
+fn leaf_texture_color(u: f64, v: f64) -> Vector {
     let side = (u - 0.5).abs();
     let along = (v * 9.0 - side * 7.0).rem_euclid(1.0);
-    let vein =
-        (1.0 - smooth_step(0.0, 0.10, along.min(1.0 - along))).max(1.0 - smooth_step(0.006, 0.02, side));
+    let vein = (1.0 - smoothstep(0.0, 0.10, along.min(1.0 - along))).max(1.0 - smoothstep(0.006, 0.02, side));
     let cloud = (value_noise([u * 12.0, v * 12.0, 0.5], 12, 71) * 12.0).round() / 12.0;
     let green = mix([0.20, 0.42, 0.13], [0.34, 0.56, 0.20], cloud);
     mix(green, [0.60, 0.72, 0.38], 0.6 * vein)

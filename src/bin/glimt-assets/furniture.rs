@@ -27,7 +27,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
         ("furniture/pot.ply", flower_pot()),
         ("furniture/leaf.ply", leaf()),
         ("furniture/curtain.ply", curtain()),
-        ("furniture/window.ply", window()),
+        ("furniture/window.ply", window_frame()),
         ("furniture/frame.ply", picture_frame()),
         ("furniture/door.ply", door()),
         ("furniture/jamb.ply", jamb()),
@@ -276,7 +276,7 @@ fn curtain() -> Surface {
 }
 
 /// A 1.8 by 1.6 window frame with two bars, centered on its sill.
-fn window() -> Surface {
+fn window_frame() -> Surface {
     let upright = |x: f64, half: f64| beveled_box([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
     join([
         upright(-0.87, 0.03),

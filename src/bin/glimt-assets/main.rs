@@ -24,7 +24,7 @@ const USAGE: &str =
     "usage: glimt-assets [million | figure]   (run in the repository root; writes to assets/)";
 
 /// A file's path relative to `assets/`, and its contents.
-type AssetFile = (&'static str, Vec<u8>);
+type AssetPathAndBytes = (&'static str, Vec<u8>);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -54,10 +54,10 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// All files stored in the repository.
-fn stored_assets() -> Vec<AssetFile> {
+fn stored_assets() -> Vec<AssetPathAndBytes> {
     let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
-        ("rope.ply", shapes::rope().to_ply()),
+        ("rope.ply", shapes::trefoil_knot_rope().to_ply()),
         ("knot.obj", shapes::knot().to_obj("A trefoil knot with texture coordinates and normals")),
         ("vase.obj", shapes::vase().to_obj("A vase, turned about y, with texture coordinates and normals")),
         ("gem.off", shapes::dodecahedron().to_off("A dodecahedron: twelve pentagons")),

@@ -1,7 +1,7 @@
 //! The textures, which all tile seamlessly. u points right and v points up, both in [0, 1).
 
 use super::noise::{fractal_noise, lattice_random, value_noise};
-use super::vector::{Vector, mix, scale, sin_cos_turns, smooth_step, unit};
+use super::vector::{Vector, mix, scale, sin_cos_turns, smoothstep, unit};
 
 /// Width and height of the larger textures.
 const SIDE: u32 = 512;
@@ -45,7 +45,7 @@ fn brick_at(u: f64, v: f64) -> ([i64; 2], f64) {
     let wide = COURSES / BRICKS;
     let wobble = 0.03 * (value_noise([u * 24.0, v * 24.0, 0.5], 24, 5) - 0.5);
     let border = x.min(wide - x).min(y).min(1.0 - y) + wobble;
-    ([along.floor() as i64, course as i64], smooth_step(0.045, 0.11, border))
+    ([along.floor() as i64, course as i64], smoothstep(0.045, 0.11, border))
 }
 
 /// Red bricks in running bond.
@@ -101,12 +101,12 @@ pub(crate) fn planks() -> Vec<u8> {
         let stretched = value_noise([u * 6.0, v * 96.0, board + 0.5], 0, 9);
         let edge = value_noise([0.0, v * 96.0, board + 0.5], 0, 9);
         // Blend toward the value at the left edge so that the grain tiles.
-        let blend = smooth_step(0.9, 1.0, u);
+        let blend = smoothstep(0.9, 1.0, u);
         let grain = ((stretched * (1.0 - blend) + edge * blend) * 24.0).round() / 24.0;
         let wood = mix([0.46, 0.30, 0.17], [0.70, 0.50, 0.31], 0.6 * tint + 0.4 * grain);
         let across = (v * 8.0).fract();
         let gap = across.min(1.0 - across).min(along.min(1.0 - along) * 8.0);
-        scale(wood, 0.35 + 0.65 * smooth_step(0.0, 0.04, gap))
+        scale(wood, 0.35 + 0.65 * smoothstep(0.0, 0.04, gap))
     });
     encode_png(SIDE, &pixels)
 }
@@ -133,8 +133,8 @@ pub(crate) fn tiles() -> Vec<u8> {
         let border = x.min(1.0 - x).min(y).min(1.0 - y);
         let (dx, dy) = (x - 0.5, y - 0.5);
         let ring = (dx * dx + dy * dy).sqrt();
-        let glaze = mix([0.20, 0.36, 0.62], [0.90, 0.90, 0.86], smooth_step(0.02, 0.07, (ring - 0.3).abs()));
-        mix([0.55, 0.53, 0.50], glaze, smooth_step(0.02, 0.08, border))
+        let glaze = mix([0.20, 0.36, 0.62], [0.90, 0.90, 0.86], smoothstep(0.02, 0.07, (ring - 0.3).abs()));
+        mix([0.55, 0.53, 0.50], glaze, smoothstep(0.02, 0.08, border))
     }));
     file
 }

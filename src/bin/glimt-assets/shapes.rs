@@ -4,27 +4,27 @@ use std::collections::HashMap;
 
 use super::noise::{fractal_noise, value_noise};
 use super::surface::{Surface, icosahedron, sphere_midpoint};
-use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, smooth_step, subtract, unit};
+use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, smoothstep, subtract, unit};
 
 /// A coral: a round lump with branching ridges and 81,920 triangles.
 pub(crate) fn coral() -> Surface {
-    displaced_sphere(6, |direction| {
+    icosphere_with_radius(6, |direction| {
         let ridge = 1.0 - (2.0 * fractal_noise(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
-        0.72 + 0.34 * smooth_step(0.62, 1.0, ridge) + 0.05 * fractal_noise(scale(direction, 14.0), 2, 0, 21)
+        0.72 + 0.34 * smoothstep(0.62, 1.0, ridge) + 0.05 * fractal_noise(scale(direction, 14.0), 2, 0, 21)
     })
 }
 
 /// A mountainous globe with 1,310,720 triangles.
 pub(crate) fn mountainous_globe() -> Surface {
-    displaced_sphere(8, |direction| {
+    icosphere_with_radius(8, |direction| {
         let height = fractal_noise(scale(direction, 2.0), 8, 0, 3);
         let crater = value_noise(scale(direction, 9.0), 0, 11);
-        0.82 + 0.42 * height - 0.05 * smooth_step(0.68, 0.8, crater)
+        0.82 + 0.42 * height - 0.05 * smoothstep(0.68, 0.8, crater)
     })
 }
 
 /// Three strands twisted along a knot: 36,864 triangles.
-pub(crate) fn rope() -> Surface {
+pub(crate) fn trefoil_knot_rope() -> Surface {
     let mut whole = Surface::default();
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
@@ -102,12 +102,13 @@ pub(crate) fn dodecahedron() -> Surface {
         unit(add(a, add(b, c)))
     };
     let positions = triangles.iter().map(center).collect();
-    let faces = (0..corners.len() as u32).map(|corner| triangles_around_corner(corner, &triangles)).collect();
+    let faces =
+        (0..corners.len() as u32).map(|corner| incident_triangles_in_order(corner, &triangles)).collect();
     Surface { positions, faces, ..Surface::default() }
 }
 
 /// The triangles around a corner, in order. The last edge of each triangle is the first edge of the next.
-fn triangles_around_corner(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
+fn incident_triangles_in_order(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut next = HashMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         if let Some(place) = triangle.iter().position(|&other| other == corner) {
@@ -129,7 +130,7 @@ fn triangles_around_corner(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
 
 /// An icosahedron subdivided `times` times. `radius` returns a vertex's distance from the center, given its
 /// direction.
-pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
+pub(crate) fn icosphere_with_radius(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
         let mut middles = HashMap::new();

@@ -1,7 +1,7 @@
 //! An evening sky as an equirectangular radiance map.
 
 use super::noise::fractal_noise;
-use super::vector::{Vector, add, dot, mix, scale, sin_cos_turns, smooth_step, unit};
+use super::vector::{Vector, add, dot, mix, scale, sin_cos_turns, smoothstep, unit};
 
 const WIDTH: u32 = 256;
 const HEIGHT: u32 = 128;
@@ -29,7 +29,7 @@ fn radiance(d: Vector) -> Vector {
     let to_sun = dot(d, sun).max(0.0);
     let haze = to_sun.powi(6);
     if d[1] < 0.0 {
-        let far = smooth_step(-0.25, 0.0, d[1]);
+        let far = smoothstep(-0.25, 0.0, d[1]);
         return mix([0.05, 0.045, 0.04], mix([0.16, 0.15, 0.15], [0.55, 0.38, 0.24], haze), far);
     }
     let height = 1.0 - (1.0 - d[1]).powi(4);
@@ -38,11 +38,11 @@ fn radiance(d: Vector) -> Vector {
     // Clouds are on a plane high above and thin out toward the horizon.
     let reach = 1.0 / (d[1] + 0.12);
     let cover = fractal_noise([d[0] * reach * 1.6 + 9.0, d[2] * reach * 1.6 + 5.0, 0.5], 5, 0, 23);
-    let thick = smooth_step(0.50, 0.68, cover) * smooth_step(0.02, 0.2, d[1]);
+    let thick = smoothstep(0.50, 0.68, cover) * smoothstep(0.02, 0.2, d[1]);
     let cloud = mix([0.62, 0.60, 0.64], [2.6, 1.7, 1.0], to_sun.powi(12));
     let clear = mix(sky, cloud, 0.85 * thick);
     let glow = scale([9.0, 5.5, 2.4], to_sun.powi(400));
-    let disc = scale([640.0, 430.0, 230.0], smooth_step(0.9988, 0.9992, to_sun));
+    let disc = scale([640.0, 430.0, 230.0], smoothstep(0.9988, 0.9992, to_sun));
     add(clear, scale(add(glow, disc), 1.0 - 0.5 * thick))
 }
 

@@ -35,7 +35,7 @@ pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
 }
 
 /// 0 below `from`, 1 above `to`, and smooth in between.
-pub(crate) fn smooth_step(from: f64, to: f64, at: f64) -> f64 {
+pub(crate) fn smoothstep(from: f64, to: f64, at: f64) -> f64 {
     let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

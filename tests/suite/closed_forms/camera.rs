@@ -51,7 +51,7 @@ fn rays_pass_through_projected_points() {
         let render = RenderOptions { width: 333, height: 200, ..settings.render };
         let settings = RenderSettings { render, ..settings };
         let pixel = DVec2::new((ndc.x + 1.0) / 2.0 * 333.0, (1.0 - ndc.y) / 2.0 * 200.0);
-        let ray = camera.ray(settings.pixel_to_camera(pixel), Vec2::ZERO);
+        let ray = camera.ray(settings.pixel_to_image_plane(pixel), Vec2::ZERO);
         let along = (point - ray.origin.as_dvec3()).normalize();
         assert!((along - ray.direction.as_dvec3()).length() < 1e-6, "{point} is not on its ray");
         assert_close("depth", camera.depth_of(point), eye.z);

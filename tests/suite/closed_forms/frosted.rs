@@ -332,7 +332,7 @@ fn only_closed_unlit_solids_are_dark_inside() {
     let ball = |build: Build, at: DVec3, material: Material| build.sphere(at, 0.5, material);
     let (first, second) = (v(-1.0, 0.0, -5.0), v(1.0, 0.0, -5.0));
     let two = |material: &Material| ball(ball(scene(), first, material.clone()), second, material.clone());
-    let dark = |build: &Build| [0, 1].map(|body| build.world().is_unlit_glass(body));
+    let dark = |build: &Build| [0, 1].map(|body| build.world().is_glass_interior_shadowed(body));
     let rough = two(&frosted(1.5, 0.4));
     assert_eq!(dark(&rough), [true, true]);
     assert_eq!(dark(&two(&glass(1.5))), [false, false], "smooth glass needs no light sampling");
@@ -348,10 +348,10 @@ fn only_closed_unlit_solids_are_dark_inside() {
     assert_eq!(dark(&through), [false, false]);
     assert_eq!(dark(&rough.environment(1.0)), [true, true]);
     let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
-    assert!(!open.world().is_unlit_glass(0), "an open surface has no inside");
+    assert!(!open.world().is_glass_interior_shadowed(0), "an open surface has no inside");
     let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
     assert!(
-        !scene().shape(plane, frosted(1.5, 0.4)).world().is_unlit_glass(0),
+        !scene().shape(plane, frosted(1.5, 0.4)).world().is_glass_interior_shadowed(0),
         "an unbounded solid may contain lights"
     );
 }
@@ -366,7 +366,7 @@ fn rough_glass_is_lit_inside_without_shadows() {
         .with(|scene| scene.render.shadows = ShadowMode::Off)
         .pictured(v(0.0, 0.0, 0.0), v(0.0, 0.0, -5.0), 18.0, 12, 12);
     let spark = ball.clone().point_light(v(0.0, 0.0, -5.0), 1e-6, Falloff::Square);
-    assert_eq!([&ball, &spark].map(|build| build.world().is_unlit_glass(0)), [true, false]);
+    assert_eq!([&ball, &spark].map(|build| build.world().is_glass_interior_shadowed(0)), [true, false]);
     let [dark, lit] = [&ball, &spark].map(|build| mean_and_error(&build.values(8192, 16)));
     let error = dark.1.hypot(lit.1);
     assert!(error < 0.01 * lit.0, "{dark:?}, {lit:?}");

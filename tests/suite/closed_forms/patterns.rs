@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::LightSamplingMode;
+use glimt::lights::LightSamplingPurpose;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -198,7 +198,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler_for_mode(LightSamplingMode::Eye).is_some());
+    assert!(build.world().lights.sampler_for_mode(LightSamplingPurpose::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

@@ -53,7 +53,7 @@ fn stored_photons_carry_emitted_power() {
             PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
                 .expect("the token is not cancelled");
         let (power, n) = (4.0 * PI, f64::from(count));
-        let flux = |map: &PhotonMap| map.photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
+        let flux = |map: &PhotonMap| map.iter_photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
         let [caustic, bounced] =
             [&pass.caustic, &pass.bounced].map(|map| (flux(map) / power, map.len() as f64 / n));
@@ -62,7 +62,7 @@ fn stored_photons_carry_emitted_power() {
         assert!((bounced.0 - reflectance).abs() < 4.0 * error, "ρ {reflectance}: {}", bounced.0);
         assert!((bounced.1 - reflectance).abs() < 4.0 * error, "ρ {reflectance}: {}", bounced.1);
         assert_eq!(pass.emitted, u64::from(count));
-        assert!(pass.caustic.photons().all(|photon| photon.depth > 0));
+        assert!(pass.caustic.iter_photons().all(|photon| photon.depth > 0));
     }
 }
 
@@ -75,7 +75,7 @@ fn no_photons_without_mirrors_or_glass() {
         PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not cancelled");
     assert!(!photons.emits_photons());
-    assert_eq!((pass.emitted, pass.photon_count()), (0, 0));
+    assert_eq!((pass.emitted, pass.stored_photon_count()), (0, 0));
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
         for (one, other) in all.passes.iter().zip(&others.passes) {
             for (one, other) in [(&one.caustic, &other.caustic), (&one.bounced, &other.bounced)] {
                 assert!(!one.is_empty());
-                assert!(one.photons().eq(other.photons()));
+                assert!(one.iter_photons().eq(other.iter_photons()));
                 assert_eq!(one.radius().to_bits(), other.radius().to_bits());
             }
         }

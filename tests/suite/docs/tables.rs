@@ -202,7 +202,7 @@ fn is_row(row: &[String], key: &KeyInfo) -> bool {
         && has_kind
         && unit == key.unit
         && *range == key.range_text()
-        && *default == key.default_text()
+        && *default == key.default_markdown()
         && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(". See "))
 }
 
@@ -221,7 +221,7 @@ fn documented_rows_match_definitions() {
     for DefinedTable { head, headings, keys: _ } in tables() {
         let name = head.trim_matches(['[', '\n']).split([']', '.']).next().unwrap_or_default();
         let table = keys::find_table(name).expect("a table");
-        let kind = head.split('"').nth(1).and_then(|kind| table.find_type(Some(kind)));
+        let kind = head.split('"').nth(1).and_then(|kind| table.find_type_or_default(Some(kind)));
         let rows = headings.iter().flat_map(|(heading, number)| {
             let rows = page.rows(heading);
             assert_eq!(rows.len(), *number, "{heading}");
@@ -232,8 +232,13 @@ fn documented_rows_match_definitions() {
             // The page has a single row for the material of all shapes.
             let is_right = is_row(&row, key) || head == "[[mesh]]\n" && key.name == "material";
             if !is_right {
-                let key =
-                    [key.kind_text(), key.unit.into(), key.range_text(), key.default_text(), key.doc.into()];
+                let key = [
+                    key.kind_text(),
+                    key.unit.into(),
+                    key.range_text(),
+                    key.default_markdown(),
+                    key.doc.into(),
+                ];
                 wrong.push(format!("{head}| {}\n{key:?}", row.join(" | ")));
             }
         }

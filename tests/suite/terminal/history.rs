@@ -147,7 +147,7 @@ fn noise_curve_shows_the_target() {
     terminal.wait("a curve", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains(messages::NOISE_OVER_TIME)
-            && beside.contains(&messages::noise_target("0.01 %"))
+            && beside.contains(&messages::noise_target_line_label("0.01 %"))
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
     // Changing the exposure does not start a new render.

@@ -80,7 +80,7 @@ impl CancelToken {
     /// # Errors
     /// [`Cancelled`] if [`CancelToken::cancel`] was called.
     #[inline]
-    pub fn check(&self) -> Result<(), Cancelled> {
+    pub fn check_pause_and_cancel(&self) -> Result<(), Cancelled> {
         if self.is_paused() {
             self.wait_while_paused();
         }
@@ -112,9 +112,9 @@ mod tests {
     fn cancel_affects_all_clones() {
         let token = CancelToken::new();
         let other = token.clone();
-        assert_eq!(other.check(), Ok(()));
+        assert_eq!(other.check_pause_and_cancel(), Ok(()));
         token.cancel();
-        assert_eq!(other.check(), Err(Cancelled));
+        assert_eq!(other.check_pause_and_cancel(), Err(Cancelled));
     }
 
     #[test]
@@ -140,7 +140,7 @@ mod tests {
         token.set_paused(true);
         let worker = {
             let token = token.clone();
-            std::thread::spawn(move || token.check())
+            std::thread::spawn(move || token.check_pause_and_cancel())
         };
         assert!(!worker.is_finished());
         token.cancel();

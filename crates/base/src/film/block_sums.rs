@@ -2,14 +2,14 @@
 
 use super::Rect;
 use super::sum_order::SumOrder;
-use super::sums::{Film, FilmError, Tile, bytes_needed, can_allocate};
+use super::sums::{Film, FilmError, Tile, can_allocate, film_and_image_bytes};
 use crate::math::DVec3;
 use crate::system::memory::try_reserve_exact;
 
 impl Tile {
     /// Moves a pixel's running sum to its block sum if the block is complete.
     pub(super) fn close_block_if_complete(&mut self, pixel: usize, blocks: SumOrder) {
-        let Some(block) = blocks.finished_block(self.counts[pixel]) else { return };
+        let Some(block) = blocks.block_ending_at(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
             if let Some(block) = earlier.get_mut(block) {
                 block[pixel] += std::mem::take(&mut sums[pixel]);
@@ -52,8 +52,8 @@ impl Film {
     /// Memory in bytes for a crop's sums in this summation order, and for the full-size finished image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
-        let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
-        (bytes_needed(width, height, crop) - picture + more, picture)
+        let picture = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
+        (film_and_image_bytes(width, height, crop) - picture + more, picture)
     }
 
     /// Summation order of the samples.

@@ -165,7 +165,12 @@ impl SquaredMeanChanges {
     }
 
     /// Squared steps in a half-cell at 2^`level` samples and one doubling earlier.
-    fn step_pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
+    fn last_two_squared_steps(
+        &self,
+        level: usize,
+        (cell, half): (usize, usize),
+        is_relative: bool,
+    ) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
             false => (sums.outer, sums.inner),
@@ -178,14 +183,15 @@ impl SquaredMeanChanges {
 
     /// Squared steps in a half-cell at 2^`level` samples and one, two and three doublings earlier.
     fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
-        let StepPair { last, before } = self.step_pair(level, at, is_relative)?;
-        let earlier = |back: usize| self.step_pair(level.checked_sub(back)?, at, is_relative)?.before;
+        let StepPair { last, before } = self.last_two_squared_steps(level, at, is_relative)?;
+        let earlier =
+            |back: usize| self.last_two_squared_steps(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
     /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of
     /// every cell. `None` if unknown, including for fewer than 16 samples.
-    fn quadrupling_variance_reduction(&self, level: usize, half: usize) -> Option<f64> {
+    fn measured_quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
             let steps = self.last_four_steps(level, (cell, half), false)?;
@@ -222,7 +228,7 @@ impl SquaredMeanChanges {
     pub(super) fn measured_variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
-            let pair = self.step_pair(level, (cell, half), false)?;
+            let pair = self.last_two_squared_steps(level, (cell, half), false)?;
             if pair.last > 0.0 {
                 last += pair.last;
                 before += pair.before?;
@@ -234,7 +240,7 @@ impl SquaredMeanChanges {
 
 /// Convergence model: how the variance of a pixel's mean falls with its sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Convergence {
+pub enum ConvergenceModel {
     /// Stratified samples, where each doubling fills the gaps between earlier samples. Doubling the samples
     /// divides the variance by 2 for rare light, by 2.8 at edges and in penumbras, and by 4 or more in smooth
     /// regions. The factor is measured by comparing the steps of successive doublings.
@@ -278,7 +284,7 @@ const FOURFOLD_LASTING: f64 = 1.2;
 /// Maximum variance reduction expected from quadrupling the sample count.
 const FOURFOLD_MOST: f64 = 40.0;
 
-impl Convergence {
+impl ConvergenceModel {
     /// Typical long-term exponent: the variance falls with this power of the sample count. Does not depend on
     /// the latest steps.
     pub fn typical_variance_exponent(self) -> f64 {
@@ -290,7 +296,7 @@ impl Convergence {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
     /// tile.
-    fn variance_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
+    fn doubling_variance_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
         steps
             .measured_variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
@@ -303,8 +309,8 @@ impl Convergence {
         level: usize,
         halves: &[usize],
     ) -> f64 {
-        predict_variance_reduction(
-            Self::variance_reduction(steps, level, halves),
+        predict_doubling_variance_reduction(
+            Self::doubling_variance_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
     }
@@ -316,17 +322,17 @@ impl Convergence {
     /// the last step with a prediction from the two previous steps, because each step is noisy. However,
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
-    pub(super) fn half_cell_variance(
+    pub(super) fn predict_half_cell_variance(
         steps: &SquaredMeanChanges,
         (cell, half): (usize, usize),
         count: u32,
         is_relative: bool,
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
-        let StepPair { last, before } = steps.step_pair(level, (cell, half), is_relative)?;
-        let fall = Self::variance_reduction(steps, level, &[half]);
+        let StepPair { last, before } = steps.last_two_squared_steps(level, (cell, half), is_relative)?;
+        let fall = Self::doubling_variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = predict_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
+        let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);
         let variance = match Self::estimate_variance_from_quadrupling(steps, level, (cell, half), is_relative)
         {
@@ -345,7 +351,7 @@ impl Convergence {
         is_relative: bool,
     ) -> Option<f64> {
         let [last, before, ..] = steps.last_four_steps(level, at, is_relative)?;
-        let fall = steps.quadrupling_variance_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
+        let fall = steps.measured_quadrupling_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
         let lasting =
             FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.reduction_confidence(level, &[at.1]);
         let rate = (FOURFOLD_RATE + lasting).min(FOURFOLD_MOST);
@@ -355,7 +361,7 @@ impl Convergence {
 
 /// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
 /// confidence in this measurement.
-fn predict_variance_reduction(fall: f64, trust: f64) -> f64 {
+fn predict_doubling_variance_reduction(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 

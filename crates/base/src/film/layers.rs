@@ -82,7 +82,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{NegativeLobeSamples, StoredTile, TileSamples};
+    use crate::film::{NegativeLobeMask, StoredTile, TileSamples};
     use crate::math::random::unit_generator;
 
     /// Five samples per pixel of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter has
@@ -98,7 +98,7 @@ mod tests {
             let double: Vec<Vec3> = values.iter().map(|value| value * 2.0).collect();
             layers.add(pixel, &[(0, values), (1, &double)], is_signed.then_some(signs));
         }
-        let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
+        let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
         TileSamples { pixels, samples: 5, radiance, negative, layers }
     }
 

@@ -26,11 +26,11 @@ mod sum_order;
 mod sums;
 pub mod tone;
 
-pub use convergence::Convergence;
+pub use convergence::ConvergenceModel;
 pub use layer_sums::LayerSums;
-pub use noise::{CellHalfNoise, ImageNoise, total_samples_to_reduce_error};
+pub use noise::{CellHalfNoise, ImageNoiseAndConvergence, total_samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, SelectedPixels};
-pub use prepass::{BrightnessPrepass, PREPASS_SAMPLES};
+pub use prepass::{BrightnessPrepassPixels, PREPASS_SAMPLES};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8_by_table;
@@ -103,7 +103,7 @@ pub struct TileSamples {
     /// value.
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
-    pub negative: Option<NegativeLobeSamples>,
+    pub negative: Option<NegativeLobeMask>,
     /// Sums of the layers in these pixels, including the film's earlier samples; see [`Film::layer_sums`].
     pub layers: LayerSums,
 }
@@ -112,7 +112,7 @@ pub struct TileSamples {
 /// samples − `weight` · mean of the samples in negative lobes. A constant image therefore stays constant
 /// regardless of the sample positions.
 #[derive(Clone, Debug)]
-pub struct NegativeLobeSamples {
+pub struct NegativeLobeMask {
     /// Weight of the negative lobes: −∫min(f, 0)/∫f for the filter f.
     pub weight: f64,
     /// Whether each sample is in a negative lobe.

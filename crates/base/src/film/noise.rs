@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::convergence::{Convergence, luminance};
+use super::convergence::{ConvergenceModel, luminance};
 use super::{CELLS, Film, PixelSubset, SelectedPixels, is_in_thread_pool};
 
 /// Sample count at which the standard error drops to `part` times its value at `count` samples, if the
@@ -26,7 +26,7 @@ pub struct CellHalfNoise {
 
 /// An image's noise level and convergence rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImageNoise {
+pub struct ImageNoiseAndConvergence {
     /// Relative standard error: [`Film::relative_error`].
     pub relative_error: f64,
     /// Expected exponent: the squared error falls with this power of the sample count.
@@ -66,13 +66,13 @@ impl Film {
     }
 
     /// Returns [`Film::relative_error`] and its convergence exponent.
-    pub fn image_noise(&self) -> Option<ImageNoise> {
+    pub fn image_noise(&self) -> Option<ImageNoiseAndConvergence> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(ImageNoise { relative_error, power: sums.convergence_exponent() })
+        Some(ImageNoiseAndConvergence { relative_error, power: sums.convergence_exponent() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
@@ -81,7 +81,7 @@ impl Film {
     /// samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
         let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
-        let is_apart = self.convergence == Convergence::Stratified;
+        let is_apart = self.convergence == ConvergenceModel::Stratified;
         let sums = if is_whole && is_apart { self.noise_sums()? } else { return None };
         Some(sums.variance.sqrt() / self.crop().area() as f64).filter(|error| error.is_finite())
     }
@@ -129,8 +129,12 @@ impl Film {
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
-        let (variance, rate) =
-            Convergence::half_cell_variance(&tile.steps, (number % CELLS, half), samples, false)?;
+        let (variance, rate) = ConvergenceModel::predict_half_cell_variance(
+            &tile.steps,
+            (number % CELLS, half),
+            samples,
+            false,
+        )?;
         Some(CellHalfNoise {
             variance: variance / pixels,
             mean: sum / pixels,
@@ -141,7 +145,7 @@ impl Film {
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
     /// completed that doubling. `None` if there are not enough steps.
-    pub fn last_variance_reduction(&self, tile: usize) -> Option<f64> {
+    pub fn last_doubling_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.lock_tile(tile);
         tile.steps.measured_variance_reduction(tile.steps.level_count(), &[0, 1])
     }
@@ -155,7 +159,7 @@ impl Film {
 
     /// Noise in one half of every cell in a tile. `None` under the same conditions as
     /// [`Film::cell_half_noise`].
-    pub fn tile_half_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
+    pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.cell_half_pixel_count(cell, half) as f64;
@@ -178,12 +182,13 @@ impl Film {
     pub fn cell_half_relative_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
         let pixels = self.cell_half_pixel_count(number, half);
-        let (sum, rate) = Convergence::half_cell_variance(&tile.steps, (number % CELLS, half), count, true)?;
+        let (sum, rate) =
+            ConvergenceModel::predict_half_cell_variance(&tile.steps, (number % CELLS, half), count, true)?;
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
     /// Convergence model for this film's noise.
-    pub fn convergence(&self) -> Convergence {
+    pub fn convergence(&self) -> ConvergenceModel {
         self.convergence
     }
 
@@ -261,8 +266,12 @@ mod tests {
     fn halves_with_fewer_samples_are_ignored() {
         // Two pixels in different halves: one with steps of 1 and 0.5, the other with a single step of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
-        assert_eq!(film.last_variance_reduction(0), Some(4.0));
-        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).last_variance_reduction(0), None, "one step");
+        assert_eq!(film.last_doubling_variance_reduction(0), Some(4.0));
+        assert_eq!(
+            self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).last_doubling_variance_reduction(0),
+            None,
+            "one step"
+        );
     }
 
     #[test]
@@ -283,7 +292,7 @@ mod tests {
         let error = film.mean_luminance_error().expect("an estimate");
         assert!((error - 1.25_f64.sqrt() / 2.0).abs() < 1e-6, "{error}");
         assert_eq!(
-            film.with_convergence(Convergence::Photons).mean_luminance_error(),
+            film.with_convergence_model(ConvergenceModel::Photons).mean_luminance_error(),
             None,
             "photons correlate pixel errors"
         );
@@ -300,9 +309,9 @@ mod tests {
             let pixels: Vec<Vec<f32>> = (0..4000).map(|_| (0..count).map(|_| next()).collect()).collect();
             let pixels: Vec<&[f32]> = pixels.iter().map(Vec::as_slice).collect();
             let exact = (1.0 / 12.0 / f64::from(count)).sqrt() / 0.5;
-            for convergence in [Convergence::Stratified, Convergence::Photons] {
+            for convergence in [ConvergenceModel::Stratified, ConvergenceModel::Photons] {
                 let error =
-                    film(&pixels).with_convergence(convergence).relative_error().expect("an estimate");
+                    film(&pixels).with_convergence_model(convergence).relative_error().expect("an estimate");
                 assert!(
                     (0.9..1.04).contains(&(error / exact)),
                     "{count} samples: got {error}, expected {exact}"

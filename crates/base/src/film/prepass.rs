@@ -14,25 +14,25 @@ pub const PREPASS_SAMPLES: u32 = 16;
 
 /// Brightness prepass for an image or crop.
 #[derive(Clone, Copy, Debug)]
-pub struct BrightnessPrepass {
+pub struct BrightnessPrepassPixels {
     crop: Rect,
 }
 
-impl BrightnessPrepass {
+impl BrightnessPrepassPixels {
     /// Creates the prepass for the pixels in `crop`.
     pub fn new(crop: Rect) -> Self {
         Self { crop }
     }
 
     /// Number of prepass pixels.
-    pub fn count(&self) -> u64 {
+    pub fn pixel_count(&self) -> u64 {
         PIXELS.min(self.crop.area() as u64)
     }
 
     /// Column and row of a prepass pixel. The row-major pixels are divided into `count` equal runs, and one
     /// pixel is chosen pseudo-randomly from each.
-    pub fn position(&self, number: u64) -> (u32, u32) {
-        let (area, count) = (self.crop.area() as u64, self.count().max(1));
+    pub fn pixel_position(&self, number: u64) -> (u32, u32) {
+        let (area, count) = (self.crop.area() as u64, self.pixel_count().max(1));
         let (start, end) = (number * area / count, (number + 1) * area / count);
         let index = start + hash(number) % (end - start).max(1);
         let width = u64::from(self.crop.width.max(1));
@@ -42,20 +42,20 @@ impl BrightnessPrepass {
     /// Mean luminance of the prepass pixels in a film, or `None` if one of them has no samples.
     pub fn film_mean_luminance(&self, film: &Film) -> Option<f64> {
         self.mean_luminance(|number| {
-            let (x, y) = self.position(number);
+            let (x, y) = self.pixel_position(number);
             film.pixel(Quantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
         })
     }
 
     /// Mean of the prepass pixels' luminances.
     pub fn mean_luminance(&self, luminance_of: impl Fn(u64) -> Option<f64>) -> Option<f64> {
-        let sum: Option<f64> = (0..self.count()).map(luminance_of).sum();
-        sum.map(|sum| sum / self.count() as f64)
+        let sum: Option<f64> = (0..self.pixel_count()).map(luminance_of).sum();
+        sum.map(|sum| sum / self.pixel_count() as f64)
     }
 
     /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film. `None` if
     /// there are no samples.
-    pub fn pixel_luminance(mut samples: TileSamples) -> Option<f64> {
+    pub fn luminance_from_samples(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
         let film = Film::new(1, 1, None).ok()?;
@@ -74,8 +74,9 @@ mod tests {
     #[test]
     fn prepass_pixels_are_spread_over_the_image() {
         for crop in [(4096, 2048), (97, 501), (64, 64), (3, 5)] {
-            let prepass = BrightnessPrepass::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
-            let places: HashSet<_> = (0..prepass.count()).map(|number| prepass.position(number)).collect();
+            let prepass = BrightnessPrepassPixels::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
+            let places: HashSet<_> =
+                (0..prepass.pixel_count()).map(|number| prepass.pixel_position(number)).collect();
             assert_eq!(places.len() as u64, u64::from(crop.0 * crop.1).min(4096));
             let inside = |&(x, y): &(u32, u32)| (7..7 + crop.0).contains(&x) && (9..9 + crop.1).contains(&y);
             assert!(places.iter().all(inside));
@@ -104,15 +105,15 @@ mod tests {
         for tile in 0..film.tile_count() {
             film.add_samples(tile, &samples(film.tile_rect(tile).expect("a tile")));
         }
-        let prepass = BrightnessPrepass::new(crop);
+        let prepass = BrightnessPrepassPixels::new(crop);
         let apart = prepass.mean_luminance(|number| {
-            let (x, y) = prepass.position(number);
-            BrightnessPrepass::pixel_luminance(samples(Rect { x, y, width: 1, height: 1 }))
+            let (x, y) = prepass.pixel_position(number);
+            BrightnessPrepassPixels::luminance_from_samples(samples(Rect { x, y, width: 1, height: 1 }))
         });
         assert_eq!(prepass.film_mean_luminance(&film), apart);
         assert!(
             apart.is_some()
-                && BrightnessPrepass::new(crop)
+                && BrightnessPrepassPixels::new(crop)
                     .film_mean_luminance(&Film::new(40, 3, None).expect("a film"))
                     .is_none()
         );

@@ -54,11 +54,11 @@ const TILES_AT_ONCE: usize = 32;
 impl Previewer {
     /// Creates a previewer for images of this size, which must be at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Self::with_quantity(Quantity::Radiance, width, height)
+        Self::for_quantity(Quantity::Radiance, width, height)
     }
 
     /// Creates a previewer that shows this quantity.
-    pub fn with_quantity(quantity: Quantity, width: u32, height: u32) -> Self {
+    pub fn for_quantity(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }

@@ -1,6 +1,6 @@
 //! Quantities that a film can display: mean radiance and sample statistics.
 
-use super::convergence::{Convergence, variance_from_squared_step};
+use super::convergence::{ConvergenceModel, variance_from_squared_step};
 use super::sums::{Tile, tile_grid, tile_rect};
 use super::{Film, RadianceImage, Rect, TILE_SIZE};
 use crate::math::{DVec3, Vec3};
@@ -90,7 +90,8 @@ impl Tile {
             }
         }
         let variance = if count > 1 && pixels > 0 {
-            let rate = Convergence::predicted_next_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
+            let rate =
+                ConvergenceModel::predicted_next_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
             variance_from_squared_step(sum / f64::from(pixels), count, rate)
         } else {
             0.0

@@ -77,7 +77,7 @@ impl RangeMap {
 impl DataRange {
     fn from_image(kind: DataKind, image: &RadianceImage) -> Self {
         let mut seen = match kind {
-            DataKind::Distances => distances(image),
+            DataKind::Distances => depths_excluding_edges(image),
             DataKind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
         };
         let greatest = seen.iter().copied().fold(0.0, f32::max);
@@ -122,7 +122,7 @@ impl DataRange {
 
 /// Distances in view. Pixels at the border of empty space average distances with zeros, so they are used only
 /// if there are no other pixels.
-fn distances(image: &RadianceImage) -> Vec<f32> {
+fn depths_excluding_edges(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;
     let is_whole = |x: usize, y: usize| {

@@ -227,7 +227,7 @@ impl ByteReader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{BLOCK_SIZE, NegativeLobeSamples, Rect, SumOrder, TileSamples};
+    use crate::film::{BLOCK_SIZE, NegativeLobeMask, Rect, SumOrder, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -246,7 +246,7 @@ mod tests {
                     }
                 }
             }
-            let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
+            let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
             let samples = range.end - range.start;
             film.add_samples(
                 tile,

@@ -37,7 +37,7 @@ impl SumOrder {
     }
 
     /// Index of the block sum that receives the block ending at `count` samples, or `None` within a block.
-    pub(super) fn finished_block(self, count: u32) -> Option<usize> {
+    pub(super) fn block_ending_at(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {
             Self::Blocked if is_end => Some(0),
@@ -49,7 +49,7 @@ impl SumOrder {
 
 /// Adds a pixel's finished blocks in order, followed by the unfinished block.
 #[cold]
-pub(super) fn sum_with_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
+pub(super) fn sum_pixel_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
     match earlier {
         [] => sums[index],
         [first, others @ ..] => {

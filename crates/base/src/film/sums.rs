@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::convergence::{Convergence, SquaredMeanChanges, luminance};
+use super::convergence::{ConvergenceModel, SquaredMeanChanges, luminance};
 use super::layer_sums::LayerSums;
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, add_finite, sum_with_blocks};
+use super::sum_order::{SumOrder, add_finite, sum_pixel_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -79,7 +79,7 @@ pub struct Film {
     order: OnceLock<Vec<usize>>,
     pub(super) non_finite_samples: AtomicU64,
     id: u64,
-    pub(super) convergence: Convergence,
+    pub(super) convergence: ConvergenceModel,
     pub(super) blocks: SumOrder,
     /// Number of layers.
     pub(super) layers: usize,
@@ -125,8 +125,8 @@ impl Tile {
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         self.signed_mean(
             index,
-            || self.sum(index),
-            |negative| sum_with_blocks(&negative.earlier, &negative.sums, index),
+            || self.positive_lobe_sum(index),
+            |negative| sum_pixel_blocks(&negative.earlier, &negative.sums, index),
         )
     }
 
@@ -159,11 +159,11 @@ impl Tile {
 
     /// Sum of a pixel's samples outside negative lobes.
     #[inline(always)]
-    fn sum(&self, index: usize) -> DVec3 {
+    fn positive_lobe_sum(&self, index: usize) -> DVec3 {
         if self.earlier.is_empty() {
             self.sums[index]
         } else {
-            sum_with_blocks(&self.earlier, &self.sums, index)
+            sum_pixel_blocks(&self.earlier, &self.sums, index)
         }
     }
 
@@ -199,9 +199,12 @@ impl Tile {
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
                 None => add_finite(&mut self.sums[index], &radiances[part.clone()]),
-                Some((weight, signs)) => {
-                    self.add_signed(index, weight, &radiances[part.clone()], &signs[part.clone()])
-                }
+                Some((weight, signs)) => self.add_with_negative_lobes(
+                    index,
+                    weight,
+                    &radiances[part.clone()],
+                    &signs[part.clone()],
+                ),
             };
             self.counts[index] += part.len() as u32;
             rest.start = part.end;
@@ -217,7 +220,13 @@ impl Tile {
         non_finite
     }
 
-    fn add_signed(&mut self, index: usize, weight: f64, radiances: &[Vec3], is_negative: &[bool]) -> u64 {
+    fn add_with_negative_lobes(
+        &mut self,
+        index: usize,
+        weight: f64,
+        radiances: &[Vec3],
+        is_negative: &[bool],
+    ) -> u64 {
         let (area, blocks) = (self.sums.len(), self.earlier.len());
         let negative = self.negative.get_or_insert_with(|| NegativeLobeSums::new(weight, area, blocks));
         let mut non_finite = 0;
@@ -252,10 +261,10 @@ impl Film {
     ) -> Result<Self, FilmError> {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
-        let bytes = bytes_needed(width, height, crop);
+        let bytes = film_and_image_bytes(width, height, crop);
         let tiles = if bytes <= most_bytes { allocate_tiles(width, height, crop) } else { None };
         let tiles = tiles.ok_or_else(|| {
-            let least = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
+            let least = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
             let crop_helps = crop == whole && least <= most_bytes && can_allocate(least);
             FilmError::Memory { width, height, bytes, crop_helps }
         })?;
@@ -268,14 +277,14 @@ impl Film {
             order: OnceLock::new(),
             non_finite_samples: AtomicU64::new(0),
             id: IDS.fetch_add(1, Ordering::Relaxed),
-            convergence: Convergence::default(),
+            convergence: ConvergenceModel::default(),
             blocks: SumOrder::default(),
             layers: 0,
         })
     }
 
     /// Sets the convergence model for noise estimates.
-    pub fn with_convergence(self, convergence: Convergence) -> Self {
+    pub fn with_convergence_model(self, convergence: ConvergenceModel) -> Self {
         Self { convergence, ..self }
     }
 
@@ -443,7 +452,7 @@ fn tiles_in_rings(crop: Rect) -> Vec<usize> {
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
 /// Bytes needed for the crop's sums and for the full image as both radiance and sRGB.
-pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
+pub(super) fn film_and_image_bytes(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
@@ -457,7 +466,7 @@ pub(super) fn can_allocate(bytes: u64) -> bool {
 /// Allocates the tiles. First tries to allocate all the memory at once, because a system that overcommits
 /// memory refuses only a single huge allocation.
 fn allocate_tiles(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
-    if !can_allocate(bytes_needed(width, height, crop)) {
+    if !can_allocate(film_and_image_bytes(width, height, crop)) {
         return None;
     }
     let (columns, rows) = tile_grid(crop);

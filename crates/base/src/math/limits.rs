@@ -15,7 +15,7 @@ pub fn robust_length(vector: DVec3) -> f64 {
 }
 
 /// Whether a length is nonzero but too short to compute with.
-pub fn is_too_short(length: f64) -> bool {
+pub fn is_nonzero_but_too_short(length: f64) -> bool {
     length != 0.0 && length.abs() < SHORTEST
 }
 
@@ -31,6 +31,11 @@ mod tests {
                 (robust_length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15
             );
         }
-        assert!(is_too_short(1e-200) && is_too_short(-1e-19) && !is_too_short(0.0) && !is_too_short(1e-18));
+        assert!(
+            is_nonzero_but_too_short(1e-200)
+                && is_nonzero_but_too_short(-1e-19)
+                && !is_nonzero_but_too_short(0.0)
+                && !is_nonzero_but_too_short(1e-18)
+        );
     }
 }

@@ -14,7 +14,7 @@ const OFF_POWERS: f64 = 1.37;
 /// Local origin for a scene of this size around `place`. Returns 0 if `place` is near 0, and otherwise a
 /// point on a grid whose spacing is a power of two. Subtracting the origin is therefore exact, and small
 /// changes to `place` do not move the origin.
-pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
+pub fn local_coordinate_origin(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
     // Adding 0 converts −0 to 0.
     let origin = (place / step).round() * step + DVec3::ZERO;
@@ -27,15 +27,18 @@ mod tests {
 
     #[test]
     fn origin_is_zero_or_within_half_a_step() {
-        assert_eq!(origin_near(DVec3::new(20.0, -20.0, 0.0), 1.0), DVec3::ZERO);
+        assert_eq!(local_coordinate_origin(DVec3::new(20.0, -20.0, 0.0), 1.0), DVec3::ZERO);
         let far = DVec3::new(1e8, -3e5, 7.0);
         for size in [0.1, 1.0, 5.0, 1e3] {
-            let origin = origin_near(far, size);
+            let origin = local_coordinate_origin(far, size);
             assert!((far - origin).abs().max_element() <= 0.5 * STEP * OFF_POWERS * size, "{size}: {origin}");
             // Doubling all numbers doubles the origin.
-            assert_eq!(origin_near(far * 2.0, size * 2.0), origin * 2.0);
+            assert_eq!(local_coordinate_origin(far * 2.0, size * 2.0), origin * 2.0);
         }
-        assert_eq!(origin_near(far, 5.0), origin_near(far + DVec3::ONE, 5.0 * (1.0 - 1e-12)));
+        assert_eq!(
+            local_coordinate_origin(far, 5.0),
+            local_coordinate_origin(far + DVec3::ONE, 5.0 * (1.0 - 1e-12))
+        );
     }
 
     #[test]
@@ -48,7 +51,7 @@ mod tests {
             (1.0, 1e-310),
             (1e308, 1e-300),
         ] {
-            assert_eq!(origin_near(DVec3::splat(place), size), DVec3::ZERO, "{place} {size}");
+            assert_eq!(local_coordinate_origin(DVec3::splat(place), size), DVec3::ZERO, "{place} {size}");
         }
     }
 }

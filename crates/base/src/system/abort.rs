@@ -87,7 +87,7 @@ unsafe impl GlobalAlloc for AbortingAllocator {
 /// Returns an error if the handler cannot be installed.
 pub fn install_abort_handler() -> io::Result<()> {
     // SAFETY: `on_abort` makes only async-signal-safe calls.
-    unsafe { low_level::register(SIGABRT, on_abort) }.map(drop)
+    unsafe { low_level::register(SIGABRT, handle_abort_signal) }.map(drop)
 }
 
 /// Sets the function that restores the terminal before the message is printed. It may only make
@@ -99,7 +99,7 @@ pub fn set_terminal_restore(restore: fn()) {
 /// Whether a thread is already ending the process.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
-fn on_abort() {
+fn handle_abort_signal() {
     end_with_message(format_args!("error: glimt was aborted (SIGABRT)"));
 }
 

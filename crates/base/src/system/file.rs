@@ -69,7 +69,7 @@ pub struct FileStamp {
 
 impl FileStamp {
     /// Time of the last change to the content or metadata. `None` for times before 1970.
-    pub fn last_change(&self) -> Option<SystemTime> {
+    pub fn last_content_or_metadata_change(&self) -> Option<SystemTime> {
         let (seconds, nanoseconds) = self.modified.max(self.changed);
         let since_1970 = Duration::new(seconds.try_into().ok()?, nanoseconds.try_into().ok()?);
         SystemTime::UNIX_EPOCH.checked_add(since_1970)

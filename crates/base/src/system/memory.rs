@@ -35,7 +35,7 @@ static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 /// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
 /// the process without a message. `stacks` is the size of the thread stacks, which count in full but are hardly
 /// used. They are added to the limit, up to an eighth.
-pub fn apply_cgroup_limit(stacks: u64) {
+pub fn set_rlimit_from_cgroup(stacks: u64) {
     let Some(limit) = current_cgroup_limit() else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
     let bytes = limit.bytes.saturating_add(stacks.min(limit.bytes / 8));
@@ -47,7 +47,7 @@ pub fn apply_cgroup_limit(stacks: u64) {
 
 /// Returns the setting that prevents this process from mapping `bytes` more bytes of memory. `None` if there
 /// is enough room.
-pub fn exhausted_limit(bytes: u64) -> Option<&'static str> {
+pub fn limit_preventing_mapping(bytes: u64) -> Option<&'static str> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let limits = [
         (Resource::RLIMIT_AS, status_bytes(&status, "VmSize"), "`ulimit -v`"),

@@ -20,12 +20,12 @@ pub fn spawn<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<JoinHandle<T>> {
-    check_stack_space(1)?;
+    check_thread_stack_memory(1)?;
     Builder::new().name(name.to_owned()).spawn(work)
 }
 
 /// Number of cores.
-pub fn core_count() -> usize {
+pub fn logical_cpu_count() -> usize {
     available_parallelism().map_or(1, NonZero::get)
 }
 
@@ -34,9 +34,9 @@ pub fn core_count() -> usize {
 /// # Errors
 /// Returns the message from [`describe_start_failure`].
 pub fn core_pool() -> std::result::Result<ThreadPool, String> {
-    let threads = core_count();
+    let threads = logical_cpu_count();
     let failed = |error: &dyn Display| describe_start_failure(threads, false, &error);
-    check_stack_space(threads).map_err(|error| failed(&error))?;
+    check_thread_stack_memory(threads).map_err(|error| failed(&error))?;
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| failed(&error))
 }
 
@@ -45,16 +45,16 @@ pub fn core_pool() -> std::result::Result<ThreadPool, String> {
 ///
 /// # Errors
 /// Returns the system's out-of-memory error if the stacks do not fit.
-pub fn check_stack_space(threads: usize) -> Result<()> {
-    match exhausted_stack_limit(threads) {
+pub fn check_thread_stack_memory(threads: usize) -> Result<()> {
+    match limit_exhausted_by_thread_stacks(threads) {
         Some(_) => Err(Error::from_raw_os_error(nix::libc::ENOMEM)),
         None => Ok(()),
     }
 }
 
 /// Setting whose limit leaves no room for the stacks of `threads` more threads.
-fn exhausted_stack_limit(threads: usize) -> Option<&'static str> {
-    memory::exhausted_limit((threads as u64).saturating_mul(STACK_BYTES))
+fn limit_exhausted_by_thread_stacks(threads: usize) -> Option<&'static str> {
+    memory::limit_preventing_mapping((threads as u64).saturating_mul(STACK_BYTES))
 }
 
 /// Explains why `threads` threads could not be started and how to fix it. The system reports the same error
@@ -62,7 +62,7 @@ fn exhausted_stack_limit(threads: usize) -> Option<&'static str> {
 pub fn describe_start_failure(threads: usize, has_threads_option: bool, error: &impl Display) -> String {
     let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
     let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };
-    match exhausted_stack_limit(threads) {
+    match limit_exhausted_by_thread_stacks(threads) {
         Some(setting) => {
             format!("out of memory: cannot start {what}; {fewer}raise the memory limit ({setting})")
         }

@@ -8,7 +8,7 @@ use super::{
     parse_thread_count, parse_u32,
 };
 use crate::scene::description::{Accel, Integrator, ShadowMode};
-use crate::tui::ColorChoice;
+use crate::tui::ColorDepthChoice;
 
 pub(super) const HELP: &str = "\
 Each image is compared with two references whose noise is independent, using the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
@@ -120,7 +120,7 @@ pub struct BenchArgs {
     pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
 }
 
 fn parse_seed_count(text: &str) -> Result<u32, String> {

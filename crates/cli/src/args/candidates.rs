@@ -46,7 +46,7 @@ fn is_scene(path: &Path) -> bool {
 
 /// Completes `TABLE.KEY=VALUE` with keys from the scene on the command line. Without a scene, completes keys
 /// from the tables that every scene has.
-pub(crate) fn set_arg_completer() -> ArgValueCompleter {
+pub(crate) fn key_assignment_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
         let scene = command_line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
@@ -56,7 +56,7 @@ pub(crate) fn set_arg_completer() -> ArgValueCompleter {
 }
 
 /// Completes key paths for `glimt explain`.
-pub(crate) fn key_path_completer() -> ArgValueCompleter {
+pub(crate) fn explain_path_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
         let all = all_paths_with_descriptions().into_iter().filter(|(path, _)| path.starts_with(current));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{ProgressMode, candidates, choice_long_help, choice_parser};
 use crate::choice;
-use crate::tui::ColorChoice;
+use crate::tui::ColorDepthChoice;
 
 /// Maximum number of parts per image.
 pub(super) const MAX_PARTS: u32 = 1 << 20;
@@ -42,12 +42,12 @@ pub struct MergeArgs {
     pub progress: ProgressMode,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
 }
 
 choice! {
     /// Job schedulers.
-    pub enum Scheduler {
+    pub enum ClusterScheduler {
         /// An sbatch array and a merge job that depends on it.
         Slurm = "slurm",
         /// A GNU parallel command, optionally over ssh.
@@ -71,7 +71,7 @@ pub struct FarmArgs {
     pub shards: u32,
     /// The job scheduler
     #[arg(long, value_parser = choice_parser::<Scheduler>(), value_name = "ENGINE")]
-    pub engine: Scheduler,
+    pub engine: ClusterScheduler,
     /// ssh login for parallel, such as user@machine; can be given several times
     #[arg(long = "host", value_name = "LOGIN")]
     pub hosts: Vec<String>,
@@ -83,7 +83,7 @@ pub struct FarmArgs {
     pub claim: String,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
-    pub color: ColorChoice,
+    pub color: ColorDepthChoice,
     /// Options for every render
     #[arg(last = true, value_name = "OPTIONS")]
     pub options: Vec<String>,

@@ -42,7 +42,7 @@ pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> 
     }
     let pairs = PairwiseErrorProducts::from_images(references, pictures);
     let by_references = references.relmse_standard_error(&mean_image(pictures));
-    let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance());
+    let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance_of_mean());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
     let by_chance =
@@ -93,7 +93,7 @@ impl PairwiseErrorProducts {
     }
 
     /// Jackknife estimate of the variance of the mean.
-    fn jackknife_variance(&self) -> f64 {
+    fn jackknife_variance_of_mean(&self) -> f64 {
         let (mean, count) = (self.mean(), self.count as f64);
         let squares = (0..self.count).map(|seed| self.mean_without(seed) - mean);
         squares.map(|difference| difference * difference).sum::<f64>() * (count - 1.0) / count

@@ -82,7 +82,7 @@ pub(super) struct ReferenceCost {
 
 /// The JSON line of a cache file.
 #[derive(Serialize, Deserialize)]
-struct CacheHeader {
+struct CachedReferenceHeader {
     width: u32,
     height: u32,
     cost: ReferenceCost,
@@ -98,7 +98,7 @@ pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCos
         return None;
     }
     let end = content.iter().position(|byte| *byte == b'\n')?;
-    let CacheHeader { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
+    let CachedReferenceHeader { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
     let (floats, _) = content[end + 1..].as_chunks();
     let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let pixels: Vec<Vec3> =
@@ -123,8 +123,8 @@ pub(super) fn store(
 ) -> Result<(), OutputError> {
     let path = cache_file_path(folder, key);
     create_folder(folder)?;
-    let (a, b) = (stored.pair.a(), stored.pair.b());
-    let head = CacheHeader { width: a.width, height: a.height, cost: stored.cost };
+    let (a, b) = (stored.pair.a(), stored.pair.reference());
+    let head = CachedReferenceHeader { width: a.width, height: a.height, cost: stored.cost };
     let mut bytes = serde_json::to_vec(&head)
         .map_err(|error| OutputError::File { path: path.clone(), source: error.into() })?;
     bytes.push(b'\n');
@@ -152,7 +152,7 @@ fn is_replaceable(path: &Path) -> bool {
     let mut start = Vec::new();
     let is_read = file.take(HEAD_BYTES).read_to_end(&mut start).is_ok();
     let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    is_read && (start.is_empty() || serde_json::from_slice::<CacheHeader>(line).is_ok())
+    is_read && (start.is_empty() || serde_json::from_slice::<CachedReferenceHeader>(line).is_ok())
 }
 
 fn integrity_checksum(content: &[u8]) -> String {
@@ -211,7 +211,7 @@ mod tests {
         store(&folder, &key, &stored()).expect("stored");
         let back = load(&folder, &key).expect("stored references");
         assert_eq!(back.cost, stored().cost);
-        assert_eq!((back.pair.a(), back.pair.b()), (stored().pair.a(), stored().pair.b()));
+        assert_eq!((back.pair.a(), back.pair.reference()), (stored().pair.a(), stored().pair.reference()));
         assert!(load(&folder, &FingerprintHasher::new("y").finish()).is_none());
     }
 

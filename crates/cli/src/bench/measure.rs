@@ -13,7 +13,7 @@ use super::time_budget::TimeBudget;
 use crate::compare::ReferencePair;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
-use crate::pipeline::session::{RenderedImage, Session};
+use crate::pipeline::session::{HeadlessSession, RenderedImage};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
@@ -48,19 +48,19 @@ impl MethodRun<'_> {
         budget: &TimeBudget,
         threads: &mut usize,
     ) -> Result<MethodResult, BenchError> {
-        let mut session = Session::default();
+        let mut session = HeadlessSession::default();
         // Warm the caches before measuring.
         let begin = StepTarget { index: 0, samples: 1, budget: None };
-        let first = self.render(&mut session, SEEDS[0], begin)?;
+        let first = self.render_step(&mut session, SEEDS[0], begin)?;
         *threads = first.report.settings.threads;
         let mut steps: Vec<StepResult> = Vec::new();
         let mut took = Vec::new();
-        while let Some(aim) = self.next_step(&steps, &took, budget) {
+        while let Some(aim) = self.choose_next_step(&steps, &took, budget) {
             let before = budget.method_elapsed_seconds();
             steps.push(self.measure_step(&mut session, aim, budget, &took)?);
             took.push(budget.method_elapsed_seconds() - before);
         }
-        let last = self.render(&mut session, SEEDS[0], begin)?;
+        let last = self.render_step(&mut session, SEEDS[0], begin)?;
         if last.key != first.key
             || self.run.reference_renderer(self.common).compute_reference_fingerprints(&mut session)?
                 != *self.keys
@@ -71,7 +71,12 @@ impl MethodRun<'_> {
     }
 
     /// Chooses the next step from the previous steps and their durations in seconds.
-    fn next_step(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
+    fn choose_next_step(
+        &self,
+        steps: &[StepResult],
+        took: &[f64],
+        budget: &TimeBudget,
+    ) -> Option<StepTarget> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
             StepSchedule::Samples(list) => {
@@ -94,7 +99,7 @@ impl MethodRun<'_> {
 
     fn measure_step(
         &self,
-        session: &mut Session,
+        session: &mut HeadlessSession,
         aim: StepTarget,
         budget: &TimeBudget,
         took: &[f64],
@@ -105,7 +110,7 @@ impl MethodRun<'_> {
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.report_image(aim, number, budget, took, &pictures);
-            let RenderedImage { image, report, .. } = self.render(session, seed, aim)?;
+            let RenderedImage { image, report, .. } = self.render_step(session, seed, aim)?;
             let relmse = self.two.unbiased_relmse(&image);
             are_pixels_independent &= report.photons.is_none();
             if !relmse.is_finite() {
@@ -151,13 +156,13 @@ impl MethodRun<'_> {
         // Estimate the time per image from the previous image or step.
         let each = match (pictures, took.last()) {
             ([.., last], _) => Some(last.seconds),
-            ([], Some(step)) => Some(self.time_ratio_to_previous_step(aim) * step / f64::from(order.seeds)),
+            ([], Some(step)) => Some(self.expected_step_time_ratio(aim) * step / f64::from(order.seeds)),
             ([], None) => None,
         };
         let remaining = f64::from(order.seeds - number);
         let left = each.map(|each| {
             budget.estimate_seconds_to_end(
-                each * (remaining + f64::from(order.seeds) * self.later_to_current_time_ratio(aim)),
+                each * (remaining + f64::from(order.seeds) * self.later_steps_time_ratio(aim)),
                 false,
             )
         });
@@ -165,7 +170,7 @@ impl MethodRun<'_> {
     }
 
     /// Returns the expected ratio of this step's time to the previous step's time.
-    fn time_ratio_to_previous_step(&self, aim: StepTarget) -> f64 {
+    fn expected_step_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => f64::from(SAMPLE_RATIO),
@@ -175,7 +180,7 @@ impl MethodRun<'_> {
     }
 
     /// Returns the expected total time of all later steps, as a multiple of this step's time.
-    fn later_to_current_time_ratio(&self, aim: StepTarget) -> f64 {
+    fn later_steps_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => 0.0,
@@ -187,7 +192,12 @@ impl MethodRun<'_> {
         }
     }
 
-    fn render(&self, session: &mut Session, seed: u32, aim: StepTarget) -> Result<RenderedImage, BenchError> {
+    fn render_step(
+        &self,
+        session: &mut HeadlessSession,
+        seed: u32,
+        aim: StepTarget,
+    ) -> Result<RenderedImage, BenchError> {
         let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
         let overrides = Overrides {
             integrator,

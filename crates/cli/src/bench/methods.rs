@@ -42,7 +42,7 @@ struct MethodSettings {
 /// settings if they differ from both.
 pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     let all = if *toggles == MethodSweep::default() {
-        default_settings(scene)
+        default_benchmark_methods(scene)
     } else {
         requested_settings(scene, toggles)
     };
@@ -52,10 +52,10 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
             distinct.push(settings);
         }
     }
-    distinct.into_iter().map(|settings| create_named_method(settings, toggles)).collect()
+    distinct.into_iter().map(|settings| create_method_from_settings(settings, toggles)).collect()
 }
 
-fn default_settings(scene: &Scene) -> Vec<MethodSettings> {
+fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
@@ -103,7 +103,7 @@ fn normalize_method_settings(
 }
 
 /// Creates a method, named after the requested settings.
-fn create_named_method(settings: MethodSettings, toggles: &MethodSweep) -> Method {
+fn create_method_from_settings(settings: MethodSettings, toggles: &MethodSweep) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {

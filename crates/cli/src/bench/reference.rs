@@ -8,7 +8,7 @@ use super::results::ReferenceResult;
 use crate::compare::{Pair, ReferencePair};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
-use crate::pipeline::session::{RenderedImage, Session};
+use crate::pipeline::session::{HeadlessSession, RenderedImage};
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;
@@ -37,13 +37,13 @@ pub(super) fn max_measurable_samples(of_references: Option<f64>) -> f64 {
 
 /// Requested quality of the references.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ReferenceQuality {
+pub(super) struct ReferenceBudget {
     pub(super) samples: u32,
     /// Time limit in seconds for both references together.
     pub(super) seconds: Option<f64>,
 }
 
-impl ReferenceQuality {
+impl ReferenceBudget {
     /// Requests the best quality possible in this time, but no better than needed to measure `most` samples.
     pub(super) fn from_time_limit(seconds: f64, most: Option<u32>) -> Self {
         let samples = most
@@ -73,7 +73,7 @@ pub(super) struct SceneReferences {
 pub(super) struct ReferenceFingerprints([Fingerprint; 2]);
 
 /// Rendered references that are not cached yet.
-pub(super) struct RenderedReferences {
+pub(super) struct UncachedReferences {
     pub(super) keys: ReferenceFingerprints,
     stored: ReferencesWithCost,
     warnings: Vec<Diagnostic>,
@@ -112,10 +112,10 @@ impl ReferenceRenderer<'_> {
     /// be read.
     pub(super) fn compute_reference_fingerprints(
         &self,
-        session: &mut Session,
+        session: &mut HeadlessSession,
     ) -> Result<ReferenceFingerprints, BenchError> {
         let [one, two] = SEEDS.map(|seed| {
-            self.render(session, seed, ReferenceQuality { samples: 1, seconds: None }).map(|it| it.key)
+            self.render(session, seed, ReferenceBudget { samples: 1, seconds: None }).map(|it| it.key)
         });
         Ok(ReferenceFingerprints([one?, two?]))
     }
@@ -124,21 +124,21 @@ impl ReferenceRenderer<'_> {
     pub(super) fn load_cached(
         &self,
         keys: &ReferenceFingerprints,
-        amount: ReferenceQuality,
+        amount: ReferenceBudget,
     ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
             .filter(|stored| amount.is_met(stored.cost))?;
-        Some(create_scene_references(stored, true, Vec::new(), None))
+        Some(assemble_scene_references(stored, true, Vec::new(), None))
     }
 
     /// Renders both references. Calls `begin` before each one and passes it the number of references left.
     pub(super) fn render_reference_pair(
         &self,
-        session: &mut Session,
-        amount: ReferenceQuality,
+        session: &mut HeadlessSession,
+        amount: ReferenceBudget,
         mut begin: impl FnMut(usize),
-    ) -> Result<RenderedReferences, BenchError> {
-        let half = ReferenceQuality { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
+    ) -> Result<UncachedReferences, BenchError> {
+        let half = ReferenceBudget { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
         let first = self.render(session, SEEDS[0], half)?;
         begin(1);
@@ -152,23 +152,23 @@ impl ReferenceRenderer<'_> {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);
-        Ok(RenderedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
+        Ok(UncachedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
     }
 
     /// Stores rendered references in the cache, if it is enabled.
-    pub(super) fn store_in_cache(&self, made: RenderedReferences) -> SceneReferences {
-        let RenderedReferences { keys, stored, warnings } = made;
+    pub(super) fn store_in_cache(&self, made: UncachedReferences) -> SceneReferences {
+        let UncachedReferences { keys, stored, warnings } = made;
         let cache_error = self
             .cache
             .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());
-        create_scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
+        assemble_scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
     fn render(
         &self,
-        session: &mut Session,
+        session: &mut HeadlessSession,
         seed: u32,
-        amount: ReferenceQuality,
+        amount: ReferenceBudget,
     ) -> Result<RenderedImage, BenchError> {
         let overrides = Overrides {
             integrator: Some(Integrator::Path),
@@ -198,7 +198,7 @@ fn cache_key(
     key.finish()
 }
 
-fn create_scene_references(
+fn assemble_scene_references(
     stored: ReferencesWithCost,
     is_cached: bool,
     warnings: Vec<Diagnostic>,

@@ -92,7 +92,7 @@ pub enum BenchEvent {
 
 /// The error and the partial results of a benchmark that ended early.
 #[derive(Clone, Debug)]
-pub struct UnfinishedBenchmark {
+pub struct PartialResultsError {
     /// Why the benchmark ended early.
     pub error: BenchError,
     /// Results of the completed scenes.

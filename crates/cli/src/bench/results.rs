@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bias::SquaredBias;
 use super::brightness::BrightnessDifference;
-use super::slope::{Slope, TimeToError, mean_loglog_slope, time_to_error};
+use super::slope::{Slope, TimeToError, interpolate_time_to_error, mean_loglog_slope};
 use super::statistics::mean_and_standard_error;
 
 /// Target errors. The results include the time needed to reach each of them.
@@ -175,9 +175,11 @@ impl MethodResult {
         Self {
             name,
             setup_seconds,
-            slope: mean_loglog_slope(&error_series_by_image(&steps)),
-            last_slope: mean_loglog_slope(&error_series_by_image(&steps[steps.len().saturating_sub(2)..])),
-            time_to: TARGETS.map(|target| time_to_error(target, &middle).filter(is_expected)),
+            slope: mean_loglog_slope(&error_series_by_image_number(&steps)),
+            last_slope: mean_loglog_slope(&error_series_by_image_number(
+                &steps[steps.len().saturating_sub(2)..],
+            )),
+            time_to: TARGETS.map(|target| interpolate_time_to_error(target, &middle).filter(is_expected)),
             verdict,
             steps,
         }
@@ -186,7 +188,7 @@ impl MethodResult {
 
 /// Groups the results into one series per image number: the first image of every step, the second image of
 /// every step, and so on.
-fn error_series_by_image(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
+fn error_series_by_image_number(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
     let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
     (0..count).map(|index| steps.iter().map(|step| point(step, index)).collect()).collect()

@@ -6,17 +6,17 @@ use std::sync::Arc;
 use super::measure::MethodRun;
 use super::methods::methods_to_measure;
 use super::reference::{
-    ReferenceFingerprints, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
+    ReferenceBudget, ReferenceFingerprints, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
     max_measurable_samples,
 };
 use super::request::{
-    BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark,
+    BenchError, BenchEvent, BenchRequest, PartialResultsError, ReferenceSource, StepSchedule,
 };
 use super::results::{Results, SceneResult, StepResult};
 use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::session::Session;
+use crate::pipeline::session::HeadlessSession;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 use crate::scene;
@@ -34,7 +34,7 @@ pub fn run(
     order: &BenchRequest,
     token: &CancelToken,
     tell: &dyn Fn(BenchEvent),
-) -> Result<Results, Box<UnfinishedBenchmark>> {
+) -> Result<Results, Box<PartialResultsError>> {
     let mut budget = TimeBudget::new(order.within, order.scenes.len());
     let mut results =
         Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
@@ -53,7 +53,7 @@ pub fn run(
     results.seconds = budget.elapsed_seconds();
     match measured {
         Ok(()) => Ok(results),
-        Err(error) => Err(Box::new(UnfinishedBenchmark { error, done: results })),
+        Err(error) => Err(Box::new(PartialResultsError { error, done: results })),
     }
 }
 
@@ -61,7 +61,7 @@ pub fn run(
 fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     let mut wrong = Vec::new();
     for run in runs {
-        match run.prepare(&mut Session::default()) {
+        match run.prepare(&mut HeadlessSession::default()) {
             Ok(_) => {}
             Err(BenchError::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
             Err(
@@ -121,7 +121,7 @@ fn scene_changed_message(scene: &Path) -> String {
 }
 
 /// A validated scene, ready to be measured.
-struct PreparedScene {
+struct ValidatedScene {
     scene: Arc<Scene>,
     /// References specified as files.
     given: Option<SceneReferences>,
@@ -132,7 +132,7 @@ struct PreparedScene {
 
 impl SceneRun<'_> {
     /// Reads and validates the scene and its files.
-    fn prepare(&self, session: &mut Session) -> Result<PreparedScene, BenchError> {
+    fn prepare(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
         let order = self.order;
         self.report_task_begin("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
@@ -148,8 +148,8 @@ impl SceneRun<'_> {
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
         let keys = self.reference_renderer(&common).compute_reference_fingerprints(session)?;
-        self.check_outputs_are_not_inputs(session)?;
-        Ok(PreparedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
+        self.check_output_input_overlap(session)?;
+        Ok(ValidatedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
     pub(super) fn reference_renderer<'a>(&'a self, common: &'a Overrides) -> ReferenceRenderer<'a> {
@@ -168,8 +168,8 @@ impl SceneRun<'_> {
 
     /// Measures the scene. Prepares it again first, because it may have been saved since the first check.
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
-        let mut session = Session::default();
-        let PreparedScene { scene, given, common, keys } = self.prepare(&mut session)?;
+        let mut session = HeadlessSession::default();
+        let ValidatedScene { scene, given, common, keys } = self.prepare(&mut session)?;
         let methods = methods_to_measure(&scene, &self.order.toggles);
         budget.begin_scene(methods.len());
         let reference = match given {
@@ -201,17 +201,16 @@ impl SceneRun<'_> {
     /// Loads cached references if they are good enough. Otherwise, renders new references.
     fn load_or_render_references(
         &self,
-        session: &mut Session,
+        session: &mut HeadlessSession,
         common: &Overrides,
         keys: &ReferenceFingerprints,
         budget: &TimeBudget,
     ) -> Result<SceneReferences, BenchError> {
         let amount = match &self.order.reference {
-            ReferenceSource::Samples(samples) => ReferenceQuality { samples: *samples, seconds: None },
-            ReferenceSource::InTime | ReferenceSource::Files(_) => ReferenceQuality::from_time_limit(
-                budget.reference_allowance(),
-                self.order.steps.max_samples(),
-            ),
+            ReferenceSource::Samples(samples) => ReferenceBudget { samples: *samples, seconds: None },
+            ReferenceSource::InTime | ReferenceSource::Files(_) => {
+                ReferenceBudget::from_time_limit(budget.reference_allowance(), self.order.steps.max_samples())
+            }
         };
         let maker = self.reference_renderer(common);
         if let Some(kept) = maker.load_cached(keys, amount) {
@@ -233,7 +232,7 @@ impl SceneRun<'_> {
     }
 
     /// Checks that no output file is an input of the scene.
-    fn check_outputs_are_not_inputs(&self, session: &Session) -> Result<(), BenchError> {
+    fn check_output_input_overlap(&self, session: &HeadlessSession) -> Result<(), BenchError> {
         match self.order.targets.iter().find(|target| session.depends_on_file(target)) {
             Some(target) => Err(BenchError::Call(format!(
                 "cannot write {}: {} depends on it; choose another file",

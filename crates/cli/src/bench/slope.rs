@@ -38,7 +38,7 @@ fn fit_loglog_slope(points: &[(f64, f64)]) -> Option<f64> {
 /// Returns the time at which the error reaches `target`, interpolated linearly on log–log axes or
 /// extrapolated from the last two points. `None` if the first error is below the target, the error does not
 /// decrease, or the time is more than 1000 times the last measured time.
-pub fn time_to_error(target: f64, points: &[(f64, f64)]) -> Option<TimeToError> {
+pub fn interpolate_time_to_error(target: f64, points: &[(f64, f64)]) -> Option<TimeToError> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {
         Some(0) | None if points.len() < 2 => return None,
@@ -102,13 +102,13 @@ mod tests {
     #[test]
     fn times_are_interpolated_or_extrapolated() {
         let fall = points(-1.0, 0.0);
-        let inside = time_to_error(0.01, &fall).expect("a time");
+        let inside = interpolate_time_to_error(0.01, &fall).expect("a time");
         assert!(inside.is_measured && (inside.seconds - 0.1).abs() < 1e-9, "{inside:?}");
-        let beyond = time_to_error(1e-4, &fall).expect("a time");
+        let beyond = interpolate_time_to_error(1e-4, &fall).expect("a time");
         assert!(!beyond.is_measured && (beyond.seconds - 10.0).abs() < 1e-6, "{beyond:?}");
-        assert_eq!(time_to_error(1e-9, &fall), None, "too far");
-        assert_eq!(time_to_error(0.5, &fall), None, "the first point is below the target");
-        assert_eq!(time_to_error(0.001, &points(0.0, 0.0)), None, "the error does not decrease");
-        assert_eq!(time_to_error(0.1, &[(1.0, 1.0)]), None);
+        assert_eq!(interpolate_time_to_error(1e-9, &fall), None, "too far");
+        assert_eq!(interpolate_time_to_error(0.5, &fall), None, "the first point is below the target");
+        assert_eq!(interpolate_time_to_error(0.001, &points(0.0, 0.0)), None, "the error does not decrease");
+        assert_eq!(interpolate_time_to_error(0.1, &[(1.0, 1.0)]), None);
     }
 }

@@ -15,8 +15,8 @@ use crate::args::BenchArgs;
 use crate::bench::baseline::{compare_runs, format_changes};
 use crate::bench::table::format_results;
 use crate::bench::{
-    self, BenchError, BenchEvent, BenchRequest, MethodSweep, ReferenceSource, Results, StepSchedule,
-    UnfinishedBenchmark, cache,
+    self, BenchError, BenchEvent, BenchRequest, MethodSweep, PartialResultsError, ReferenceSource, Results,
+    StepSchedule, cache,
 };
 use crate::console::Console;
 use crate::control::CancelToken;
@@ -40,7 +40,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_inherited_priority(args.nice);
     let order = bench_request(args, console)?;
     let scenes = order.scenes.len();
-    let outputs = BenchOutputs::from_checked_args(args, &order.scenes, console)?;
+    let outputs = BenchOutputs::try_from_args(args, &order.scenes, console)?;
     let baseline = outputs.read_baseline(console)?;
     // The first signal stops measuring. The second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
@@ -66,7 +66,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
             Ok(ended.signal_number().map_or(Exit::DONE, Exit::from_signal))
         }
         Err(unfinished) => {
-            let UnfinishedBenchmark { error, done } = *unfinished;
+            let PartialResultsError { error, done } = *unfinished;
             // Nothing was measured if the arguments are invalid.
             if !done.scenes.is_empty() {
                 print_results(&done, baseline.as_ref(), console);
@@ -88,7 +88,7 @@ fn print_results(results: &Results, baseline: Option<&(String, Results)>, consol
 }
 
 /// The measurement thread.
-type BenchThread = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
+type BenchThread = JoinHandle<Result<Results, Box<PartialResultsError>>>;
 
 /// Starts the benchmark on a thread. Returns the thread and a receiver for its events.
 fn spawn_benchmark(
@@ -116,9 +116,9 @@ fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
 }
 
 /// Returns the result for a benchmark that panicked. The panic handler has already printed a message.
-fn unfinished_after_panic() -> UnfinishedBenchmark {
+fn unfinished_after_panic() -> PartialResultsError {
     let what = "internal error: the renderer panicked".to_owned();
-    UnfinishedBenchmark { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
+    PartialResultsError { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }
 
 /// Reports why the benchmark did not finish. `scenes` contains the number of measured scenes and the total

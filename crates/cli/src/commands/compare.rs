@@ -32,12 +32,12 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
 /// Runs the comparison and reports errors. `Err` contains the exit code.
 fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff =
-        args.diff.as_deref().map(|path| ErrorImage::from_checked_args(path, args, console)).transpose()?;
+        args.diff.as_deref().map(|path| ErrorImageOutput::try_from_args(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
-        errors.iter().for_each(|error| console.print_message(&format!("error: {error}")));
+        errors.iter().for_each(|error| console.print_line_to_stderr(&format!("error: {error}")));
         Exit::WRONG
     })?;
-    pair.warnings().iter().for_each(|warning| console.print_message(&format!("warning: {warning}")));
+    pair.warnings().iter().for_each(|warning| console.print_line_to_stderr(&format!("warning: {warning}")));
     warn_about_same_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
@@ -52,8 +52,8 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
         let warnings = written.map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
-        warnings.iter().for_each(|warning| console.print_message(&format!("warning: {warning}")));
-        console.print_message(&format!("wrote {} ({})", diff.path.display(), diff.description()));
+        warnings.iter().for_each(|warning| console.print_line_to_stderr(&format!("warning: {warning}")));
+        console.print_line_to_stderr(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
     Ok(compare_to_thresholds(&summary, console))
 }
@@ -77,24 +77,26 @@ fn warn_about_same_file(args: &CompareArgs, console: &Console) {
         } else {
             format!("{a} and {b} are the same file")
         };
-        console.print_message(&format!("warning: {which}, so the error is 0; pass an image and a reference"));
+        console.print_line_to_stderr(&format!(
+            "warning: {which}, so the error is 0; pass an image and a reference"
+        ));
     }
 }
 
 /// The error image requested with `--diff`.
-struct ErrorImage<'a> {
+struct ErrorImageOutput<'a> {
     path: &'a Path,
     format: Format,
 }
 
-impl<'a> ErrorImage<'a> {
+impl<'a> ErrorImageOutput<'a> {
     /// Reports errors that can be detected before the measurement.
-    fn from_checked_args(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
+    fn try_from_args(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format =
             Format::from_path(path).map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
         check_not_input(path, path, args)
             .map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_image_target(path)
+        output::check_image_path(path)
             .map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
     }
@@ -219,7 +221,7 @@ impl<'a> Summary<'a> {
 fn print_json(summary: &Summary<'_>, console: &Console) {
     match output::json::to_line(summary) {
         Ok(text) => console.print_line(&text),
-        Err(error) => console.print_message(&format!("error: {error}")),
+        Err(error) => console.print_line_to_stderr(&format!("error: {error}")),
     }
 }
 
@@ -298,7 +300,7 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
         );
         rows.push((
             "bias",
-            format_possibly_negative(bias),
+            format_signed_six_digits(bias),
             "",
             format!("linear: mean(a - b)/mean(b); {noise}"),
         ));
@@ -310,7 +312,7 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
     rows
 }
 
-fn format_possibly_negative(value: f64) -> String {
+fn format_signed_six_digits(value: f64) -> String {
     let sign = if value < 0.0 { "-" } else { "" };
     format!("{sign}{}", format_six_significant_digits(value.abs()))
 }

@@ -9,7 +9,7 @@ use crate::commands::check::format_count;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::system::folder::entry_names;
-use crate::tui::{self, ColorDepth, ProbeReplies, TerminalProbe, probe_terminal};
+use crate::tui::{self, ColorDepth, ProbeReplies, TerminalProbeResult, probe_terminal};
 
 /// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
@@ -26,7 +26,7 @@ pub(crate) fn run(console: &Console) -> Exit {
     Exit::DONE
 }
 
-fn environment_variable(name: &str) -> Option<String> {
+fn nonempty_environment_variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
@@ -37,7 +37,7 @@ fn describe_simd_instructions() -> String {
         InstructionSet::Avx512 => "AVX-512",
     };
     let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.or_best_supported());
-    match environment_variable("GLIMT_SIMD") {
+    match nonempty_environment_variable("GLIMT_SIMD") {
         Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),
     }
@@ -51,8 +51,8 @@ fn describe_threads() -> String {
 }
 
 /// Describes the terminal as a list of property names and values.
-fn describe_terminal(probe: &TerminalProbe) -> Vec<(&'static str, String)> {
-    let term = environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
+fn describe_terminal(probe: &TerminalProbeResult) -> Vec<(&'static str, String)> {
+    let term = nonempty_environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
     let size = match (columns, rows) {
@@ -75,7 +75,7 @@ fn describe_terminal(probe: &TerminalProbe) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn describe_colors(probe: &TerminalProbe) -> String {
+fn describe_colors(probe: &TerminalProbeResult) -> String {
     let depth = match probe.depth {
         ColorDepth::TrueColor => "24 bits",
         ColorDepth::Indexed256 => "256",
@@ -91,7 +91,7 @@ fn describe_colors(probe: &TerminalProbe) -> String {
     format!("{depth} according to the environment{asked}{background}")
 }
 
-fn describe_preview(probe: &TerminalProbe) -> String {
+fn describe_preview(probe: &TerminalProbeResult) -> String {
     let protocol = |name, is_there| if is_there { Some(name) } else { None };
     let answers = probe.answers.clone().unwrap_or_default();
     let pixels = [

@@ -1,11 +1,11 @@
 //! `glimt explain`: describes scene keys.
 
-use crate::console::{Console, stdout_columns};
+use crate::console::{Console, stdout_columns_or_default};
 use crate::exit::Exit;
 use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableTypeInfo, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, find_table};
-use crate::scene::nearest::{nearest_name, translate_foreign_name};
-use crate::scene::sanitize::shortened;
+use crate::scene::nearest::{foreign_or_nearest_name, nearest_name};
+use crate::scene::sanitize::escape_and_truncate;
 use crate::tui::wrap_text;
 
 /// Prints the description of a key, a type or a table, or a list of all tables.
@@ -16,7 +16,7 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.print_trusted_text(&wrap_indented(&text, stdout_columns()));
+            console.print_trusted_text(&wrap_indented(&text, stdout_columns_or_default()));
             Exit::DONE
         }
         None => console.print_error(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),
@@ -44,7 +44,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
 const MIN_COLUMNS: usize = 16;
 
 /// Whether a table defines a type with this name.
-fn has_table_type_named(table: &TableInfo, name: &str) -> bool {
+fn defines_type_named(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
 
@@ -67,16 +67,17 @@ fn explain_path(path: &str) -> Option<String> {
     match parts.as_slice() {
         [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
-            None if all_tables().iter().any(|table| has_table_type_named(table, name)) => {
-                let types = all_tables().iter().filter(|table| has_table_type_named(table, name));
-                let texts = types.filter_map(|table| Some(type_details(table, table.find_type(Some(name))?)));
+            None if all_tables().iter().any(|table| defines_type_named(table, name)) => {
+                let types = all_tables().iter().filter(|table| defines_type_named(table, name));
+                let texts = types
+                    .filter_map(|table| Some(type_details(table, table.find_type_or_default(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
             None => found(all_keys().filter(|(_, key)| key.name == *name).collect()),
         },
         [name, second] => {
             let table = find_table(name)?;
-            if let Some(kind) = table.find_type(Some(second)) {
+            if let Some(kind) = table.find_type_or_default(Some(second)) {
                 return Some(type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
@@ -86,7 +87,7 @@ fn explain_path(path: &str) -> Option<String> {
         }
         [name, second, third] => {
             let table = find_table(name)?;
-            let kind = table.find_type(Some(second))?;
+            let kind = table.find_type_or_default(Some(second))?;
             if *third == "type" {
                 return Some(format_type_list(table));
             }
@@ -131,7 +132,7 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
         match key.default {
             DefaultValue::Required(_) => "required".to_owned(),
             DefaultValue::Is(_) | DefaultValue::By(_) | DefaultValue::Absent => {
-                without_backticks(&key.default_text())
+                without_backticks(&key.default_markdown())
             }
         },
     );
@@ -150,7 +151,7 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
         DefaultValue::Required(_) => "required".to_owned(),
         DefaultValue::Is(_) | DefaultValue::By(_) => {
-            format!("default {}", without_backticks(&key.default_text()))
+            format!("default {}", without_backticks(&key.default_markdown()))
         }
         DefaultValue::Absent => String::new(),
     };
@@ -196,7 +197,7 @@ fn format_sentence(text: &str) -> String {
 
 /// Error message for an unknown path, with a suggestion.
 fn unknown_path_message(path: &str) -> String {
-    let shown = shortened(path, 60);
+    let shown = escape_and_truncate(path, 60);
     let all = all_paths_with_descriptions();
     let names: Vec<&str> = all.iter().map(|(path, _)| path.as_str()).collect();
     let parts: Vec<&str> = path.split('.').collect();
@@ -207,13 +208,13 @@ fn unknown_path_message(path: &str) -> String {
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near_end = || {
-        translate_foreign_name(last, &ends)
+        foreign_or_nearest_name(last, &ends)
             .and_then(|end| in_table.iter().copied().find(|name| name.ends_with(&format!(".{end}"))))
     };
     let keys: Vec<&str> = names.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near = nearest_name(path, names.iter().copied())
         .or_else(near_end)
-        .or_else(|| translate_foreign_name(last, &keys));
+        .or_else(|| foreign_or_nearest_name(last, &keys));
     match near {
         Some(near) => format!("unknown key {shown:?}; did you mean `{near}`?"),
         None => format!("unknown key {shown:?}; `glimt explain` lists all tables"),

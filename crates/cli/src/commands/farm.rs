@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Parser;
 
-use crate::args::{Args, FarmArgs, RenderArgs, Scheduler, Switch};
+use crate::args::{Args, ClusterScheduler, FarmArgs, RenderArgs, Switch};
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::Format;
@@ -20,7 +20,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
     // A line break in a name could end a here-document. Other control characters are unsafe on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
-    if paths.contains(&None) || words.into_iter().any(|word| !is_printable_word(word)) {
+    if paths.contains(&None) || words.into_iter().any(|word| !has_only_visible_chars(word)) {
         return console.print_error(Exit::WRONG, "names cannot contain control characters");
     }
     if !args.scene.is_file() {
@@ -31,15 +31,15 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
         Err(message) => return console.print_error(Exit::WRONG, &format!("after `--`: {message}")),
     };
     console.print_trusted_text(&match args.engine {
-        Scheduler::Slurm => slurm_script(args),
-        Scheduler::Parallel => parallel_script(args),
-        Scheduler::Kubernetes => kubernetes_manifest(args, memory_request(args, &options, console)),
+        ClusterScheduler::Slurm => slurm_script(args),
+        ClusterScheduler::Parallel => parallel_script(args),
+        ClusterScheduler::Kubernetes => kubernetes_manifest(args, memory_request(args, &options, console)),
     });
     Exit::DONE
 }
 
 /// Whether a word is safe in scripts and on terminals: it has no control characters or invisible characters.
-fn is_printable_word(word: &str) -> bool {
+fn has_only_visible_chars(word: &str) -> bool {
     word.chars().all(is_terminal_safe)
 }
 
@@ -48,14 +48,14 @@ fn is_printable_word(word: &str) -> bool {
 /// # Errors
 /// An option is invalid or cannot be shared by all parts.
 fn parse_render_options(args: &FarmArgs) -> Result<RenderArgs, String> {
-    let (program, scene) = ("glimt".to_owned(), format_path_argument(&args.scene));
+    let (program, scene) = ("glimt".to_owned(), disambiguate_path_argument(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
     let render = match Args::try_parse_from(words) {
         Ok(Args { command: None, render }) => render,
         Ok(Args { command: Some(_), .. }) => {
             return Err("expected render options, not a command".to_owned());
         }
-        Err(error) => return Err(error_without_usage(&error)),
+        Err(error) => return Err(error_message_without_usage(&error)),
     };
     let photons_by_error =
         render.photons == Some(Switch::On) && render.error.is_some_and(|error| error > 0.0);
@@ -91,12 +91,12 @@ fn memory_request(args: &FarmArgs, options: &RenderArgs, console: &Console) -> O
             "the scene has errors".to_owned()
         }
     };
-    console.print_message(&format!("warning: the jobs have no memory request: {why}"));
+    console.print_line_to_stderr(&format!("warning: the jobs have no memory request: {why}"));
     None
 }
 
 /// Returns a clap error's message without the usage text.
-fn error_without_usage(error: &clap::Error) -> String {
+fn error_message_without_usage(error: &clap::Error) -> String {
     if !error.use_stderr() {
         return "expected render options, not --help or --version".to_owned();
     }
@@ -111,7 +111,7 @@ fn quote_word(text: &str) -> String {
 }
 
 /// Formats a path so that glimt does not mistake it for an option or a command.
-fn format_path_argument(path: &Path) -> String {
+fn disambiguate_path_argument(path: &Path) -> String {
     let text = path.to_string_lossy();
     let is_bare = text.starts_with('-') || !text.contains(['/', '.']);
     if is_bare { format!("./{text}") } else { text.into_owned() }
@@ -119,19 +119,19 @@ fn format_path_argument(path: &Path) -> String {
 
 /// Returns the command that renders one part. `index` is a shell expression for the part's number.
 fn render_command(args: &FarmArgs, index: &str) -> String {
-    let (scene, part) = (quote_word(&format_path_argument(&args.scene)), part_file_name(args, index));
+    let (scene, part) = (quote_word(&disambiguate_path_argument(&args.scene)), part_file_name(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", quote_word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
 /// Returns the file name for one part, quoted for the shell.
 fn part_file_name(args: &FarmArgs, index: &str) -> String {
-    format!("{}.{index}.part", quote_word(&format_path_argument(&args.output)))
+    format!("{}.{index}.part", quote_word(&disambiguate_path_argument(&args.output)))
 }
 
 /// Returns the command that merges the parts. It lists the parts with `seq`.
 fn merge_command(args: &FarmArgs, options: &str) -> String {
-    let (out, count) = (quote_word(&format_path_argument(&args.output)), args.shards);
+    let (out, count) = (quote_word(&disambiguate_path_argument(&args.output)), args.shards);
     format!(
         "seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}",
         quote_word(&escape_output_for_seq(args))
@@ -140,7 +140,7 @@ fn merge_command(args: &FarmArgs, options: &str) -> String {
 
 /// The output path, escaped for `seq`'s format string.
 fn escape_output_for_seq(args: &FarmArgs) -> String {
-    format_path_argument(&args.output).replace('%', "%%")
+    disambiguate_path_argument(&args.output).replace('%', "%%")
 }
 
 fn slurm_script(args: &FarmArgs) -> String {
@@ -265,10 +265,10 @@ mod tests {
     #[test]
     fn control_characters_are_rejected() {
         for word in ["a\nb", "\0", "\u{1b}]52;c;eA==\u{7}", "\u{9b}31m", "\u{202e}gnp.exr", "a\tb", "\r"] {
-            assert!(!is_printable_word(word), "{word:?}");
+            assert!(!has_only_visible_chars(word), "{word:?}");
         }
         for word in ["", "my scene.toml", "Würfel.exr", "$(x) `y` 'z'"] {
-            assert!(is_printable_word(word), "{word:?}");
+            assert!(has_only_visible_chars(word), "{word:?}");
         }
     }
 
@@ -385,7 +385,7 @@ mod tests {
             let line = format!("{} -o a.png --shards 8 --engine kubernetes", scene.display());
             let args = args(&format!("{line} -- {threads}"));
             let options = parse_render_options(&args).expect("valid options");
-            memory_request(&args, &options, &Console::new(crate::tui::ColorChoice::None))
+            memory_request(&args, &options, &Console::new(crate::tui::ColorDepthChoice::None))
         };
         assert_eq!(stated("--threads 0"), stated("--threads 64"));
         assert!(stated("--threads 0") > stated("--threads 2"), "{:?}", stated("--threads 0"));

@@ -23,7 +23,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let exit = convert(args, console, &token);
     let Some(number) = ended.signal_number() else { return exit };
     if let Some(signal) = signals::signal_name(number).filter(|_| exit != Exit::DONE) {
-        console.print_message(&format!("terminated by {signal}: nothing was written"));
+        console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::from_signal(number)
 }
@@ -62,7 +62,11 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     match write_all(&scene, &imported, token) {
         Ok(()) => {
             let files = format_count(imported.files.len() as u64, "file");
-            console.print_message(&format!("wrote {} and {files} in {}", scene.display(), beside.display()));
+            console.print_line_to_stderr(&format!(
+                "wrote {} and {files} in {}",
+                scene.display(),
+                beside.display()
+            ));
             Exit::DONE
         }
         Err(OutputError::Cancelled(_)) => Exit::FAILED,
@@ -86,7 +90,8 @@ fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     };
     console.print_diagnostics(&notes.iter().map(warning).collect::<Vec<_>>());
     if !notes.is_empty() {
-        console.print_message(&format!("{} in total", format_count(notes.len() as u64, "approximation")));
+        console
+            .print_line_to_stderr(&format!("{} in total", format_count(notes.len() as u64, "approximation")));
     }
 }
 

@@ -8,7 +8,7 @@ use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::json::to_pretty_text;
-use crate::output::settings::{ImageInfo, ImageInfoError, read_info};
+use crate::output::settings::{ImageInfo, ImageInfoReadError, read_image_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
 use crate::scene::detect_non_scene;
@@ -34,9 +34,9 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 ///
 /// # Errors
 /// Returns the same errors as [`read_info`].
-fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoError> {
-    read_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
-        (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
+fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+    read_image_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
+        (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
         _ => Err(error),

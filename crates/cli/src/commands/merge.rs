@@ -12,19 +12,19 @@ use serde_json::json;
 
 use self::inputs::{RenderInputFiles, possible_scene_paths};
 use crate::args::{MergeArgs, ProgressMode};
-use crate::console::{Console, stdout_columns};
+use crate::console::{Console, stdout_columns_or_default};
 use crate::control::{CancelToken, Cancelled};
 use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
-use crate::merge_block::TerminalBlock;
+use crate::merge_block::InPlaceTerminalBlock;
 use crate::output::part::{self, MergedParts, PartError, PartFile};
 use crate::output::write::{WritePolicy, atomic_with_policy};
 use crate::output::{
-    self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
+    self, AttributeLossPolicy, FilmEncodingSettings, Format, OutputError, is_same_file, scene_path,
 };
 use crate::progress::{bar_style_from_template, json_line};
-use crate::scene::sanitize::{escape_invisible_chars, shortened};
+use crate::scene::sanitize::{escape_and_truncate, escape_invisible_chars};
 use crate::signals;
 use crate::system::threads::core_pool;
 use crate::tui::{NamedImage, images_as_text};
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
 
 fn report_signal(number: i32, console: &Console) -> Exit {
     if let Some(signal) = signals::signal_name(number) {
-        console.print_message(&format!("terminated by {signal}: nothing was written"));
+        console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::from_signal(number)
 }
@@ -95,7 +95,7 @@ impl MergeCommand<'_> {
         }
         let format = Format::from_path(out)
             .map_err(|error| self.console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_image_target(out)
+        output::check_image_path(out)
             .map_err(|error| self.console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(format)
     }
@@ -128,7 +128,7 @@ impl MergeCommand<'_> {
                 Ok(part) => parts.push(part),
                 Err(error) if error.is_too_many_open_files() => {
                     bar.end();
-                    return Err(self.report_too_many_files(parts.len()));
+                    return Err(self.report_open_file_limit(parts.len()));
                 }
                 Err(PartError::Unreadable { source, .. })
                     if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
@@ -138,7 +138,7 @@ impl MergeCommand<'_> {
             bar.update(index + 1, self.args.parts.len());
         }
         bar.end();
-        wrong.iter().for_each(|error| self.console.print_message(&format!("error: {error}")));
+        wrong.iter().for_each(|error| self.console.print_line_to_stderr(&format!("error: {error}")));
         match (wrong.is_empty(), parts.is_empty()) {
             (false, _) => Err(Exit::WRONG),
             (true, true) => Err(self.console.print_error(Exit::WRONG, "none of the parts exist")),
@@ -147,7 +147,7 @@ impl MergeCommand<'_> {
     }
 
     /// Reports that no more parts can be opened because the limit on open files has been reached.
-    fn report_too_many_files(&self, opened: usize) -> Exit {
+    fn report_open_file_limit(&self, opened: usize) -> Exit {
         let all = self.args.parts.len();
         let message = format!(
             "too many open files: only {opened} of {all} parts could be opened; raise the limit (ulimit -n)"
@@ -160,13 +160,13 @@ impl MergeCommand<'_> {
         let mut parts: Vec<PartFile> = Vec::new();
         let mut waiting: Vec<AwaitedPart> = self.args.parts.iter().cloned().map(AwaitedPart::new).collect();
         let mut said = None;
-        let mut block = TerminalBlock::default();
+        let mut block = InPlaceTerminalBlock::default();
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
                 let looked =
                     awaited.try_open(self.token).map_err(|error| match error.is_too_many_open_files() {
-                        true => self.report_too_many_files(parts.len()),
+                        true => self.report_open_file_limit(parts.len()),
                         false => self.report_part_error(&error),
                     });
                 match looked? {
@@ -179,12 +179,12 @@ impl MergeCommand<'_> {
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
-                let words = self.describe_parts(parts.len(), &unfinished);
+                let words = self.describe_part_completeness(parts.len(), &unfinished);
                 if self.redraws_in_place() {
                     self.redraw_image(&parts, &words, &mut block)?;
                 } else if is_new {
                     // Report mismatched parts as soon as they appear.
-                    part::check(&parts).map_err(|error| self.report_part_error(&error))?;
+                    part::check_and_list_missing(&parts).map_err(|error| self.report_part_error(&error))?;
                 }
                 self.report_parts(parts.len(), &unfinished, &words);
                 said = Some(state);
@@ -208,7 +208,7 @@ impl MergeCommand<'_> {
     }
 
     /// Describes how many parts are complete, and names the incomplete parts.
-    fn describe_parts(&self, count: usize, unfinished: &[&Path]) -> String {
+    fn describe_part_completeness(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         let incomplete = match names.as_slice() {
             [] => String::new(),
@@ -228,7 +228,7 @@ impl MergeCommand<'_> {
                 json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
             }
             ProgressMode::Auto if self.redraws_in_place() && self.console.is_terminal => {}
-            ProgressMode::Auto | ProgressMode::Plain => self.console.print_message(words),
+            ProgressMode::Auto | ProgressMode::Plain => self.console.print_line_to_stderr(words),
         }
     }
 
@@ -243,26 +243,32 @@ impl MergeCommand<'_> {
     }
 
     /// Redraws the image merged from these parts, with a title.
-    fn redraw_image(&self, parts: &[PartFile], words: &str, block: &mut TerminalBlock) -> Result<(), Exit> {
+    fn redraw_image(
+        &self,
+        parts: &[PartFile],
+        words: &str,
+        block: &mut InPlaceTerminalBlock,
+    ) -> Result<(), Exit> {
         let words = escape_invisible_chars(words);
-        let columns = stdout_columns();
+        let columns = stdout_columns_or_default();
         let finish = parts.first().and_then(|part| part.head.picture.develop_settings());
         let lines = match finish {
             None => {
-                part::check(parts).map_err(|error| self.report_part_error(&error))?;
+                part::check_and_list_missing(parts).map_err(|error| self.report_part_error(&error))?;
                 String::new()
             }
             Some(finish) => {
                 let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
-                    let image = finish.extract_image(&merged.film);
+                    let image = finish.extract_radiance_image(&merged.film);
                     let picture = tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image));
                     images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
             }
         };
         // Narrow terminals do not show an image.
-        let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
+        let lines =
+            if lines.is_empty() { format!("{}\n", escape_and_truncate(&words, columns)) } else { lines };
         self.console.print_trusted_text(&block.redraw_to_string(&lines, columns));
         Ok(())
     }
@@ -275,7 +281,7 @@ impl MergeCommand<'_> {
     ) -> Result<MergedParts, Exit> {
         let mut bar = StepProgress::new(self.args.progress, self.console, what);
         let tell = |tile: usize, film: &Film| bar.update(tile, film.tile_count());
-        let merged = part::merge(parts, is_partial, self.token, tell);
+        let merged = part::merge_into_film(parts, is_partial, self.token, tell);
         bar.end();
         merged.map_err(|error| self.report_part_error(&error))
     }
@@ -300,7 +306,7 @@ impl MergeCommand<'_> {
     fn write_image(
         &self,
         format: Format,
-        mut finish: DevelopSettings,
+        mut finish: FilmEncodingSettings,
         merged: &MergedParts,
         (parts, inputs): (&[PartFile], &RenderInputFiles<'_>),
     ) -> Result<(), Exit> {
@@ -315,7 +321,7 @@ impl MergeCommand<'_> {
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
-        let tell = |warning| self.console.print_message(&format!("warning: {warning}"));
+        let tell = |warning| self.console.print_line_to_stderr(&format!("warning: {warning}"));
         let guard = WritePolicy {
             is_kept: &is_kept,
             may_replace: &may_replace,
@@ -323,7 +329,7 @@ impl MergeCommand<'_> {
             losses: AttributeLossPolicy::Report(&tell),
         };
         let bytes = self.pool.install(|| {
-            finish.encode_extracted_image(film, (&finish.extract_image(film), &[]), format, token)
+            finish.encode_film_image(film, (&finish.extract_radiance_image(film), &[]), format, token)
         });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
@@ -332,7 +338,7 @@ impl MergeCommand<'_> {
         })?;
         if self.args.progress != ProgressMode::None {
             let (width, height) = (film.width(), film.height());
-            self.console.print_message(&format!("wrote {} ({width}×{height})", out.display()));
+            self.console.print_line_to_stderr(&format!("wrote {} ({width}×{height})", out.display()));
         }
         Ok(())
     }
@@ -340,13 +346,13 @@ impl MergeCommand<'_> {
     fn report_missing_parts(&self, merged: &MergedParts) {
         if !merged.missing.is_empty() {
             let missing = part::missing_parts_message(&merged.missing, merged.count);
-            self.console.print_message(&format!("warning: {missing}; merged the others"));
+            self.console.print_line_to_stderr(&format!("warning: {missing}; merged the others"));
         }
     }
 }
 
 /// Records the scene's path relative to the output, as an unsharded render does.
-fn set_relative_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
+fn set_relative_scene_path(finish: &mut FilmEncodingSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     if let Some(path) = possible_scene_paths(parts, out).find(|path| path.is_file()) {
         *scene = scene_path::relative_to_image(&path, out);

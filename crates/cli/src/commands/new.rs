@@ -18,7 +18,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
-            console.print_message(&format!(
+            console.print_line_to_stderr(&format!(
                 "note: to create {name} next to the scene, run: glimt schema > {name}"
             ));
         }
@@ -33,7 +33,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let schema = file.with_file_name(schema::FILE);
     if with_schema && is_free {
         match write_schema(&schema) {
-            Ok(true) => console.print_message(&format!("wrote {}", schema.display())),
+            Ok(true) => console.print_line_to_stderr(&format!("wrote {}", schema.display())),
             Ok(false) => {}
             Err((exit, message)) => return console.print_error(exit, &message),
         }
@@ -41,9 +41,9 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let name = file.display();
     match write::create_new(file, text.as_bytes()) {
         Ok(()) => {
-            console.print_message(&format!("wrote {name}"));
+            console.print_line_to_stderr(&format!("wrote {name}"));
             if let Some(file) = quote_file_name(file) {
-                console.print_message(&format!(
+                console.print_line_to_stderr(&format!(
                     "now: glimt {file}    (edit and save it to update the image; ? for help)"
                 ));
             }

@@ -35,13 +35,13 @@ impl PlainReporter {
     }
 
     /// Whether the asset is loaded for the first time. A file with several meshes is loaded once per mesh.
-    fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
+    fn record_first_load(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
     fn print_progress(&mut self, progress: &RenderProgress) {
         if let Some(line) = self.due_progress_line(progress) {
-            self.console.print_message(&line);
+            self.console.print_line_to_stderr(&line);
         }
     }
 
@@ -66,11 +66,11 @@ impl Reporter for PlainReporter {
         if let Event::Stage { stage, .. } = event
             && stage.status != Status::Running
         {
-            self.console.print_message(&stage_status_line(stage));
+            self.console.print_line_to_stderr(&stage_status_line(stage));
         } else if let Event::Asset { progress, .. } = event
-            && self.is_newly_loaded(progress)
+            && self.record_first_load(progress)
         {
-            self.console.print_message(&format!("{:<8} {} 100%", "loaded", progress.name));
+            self.console.print_line_to_stderr(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
             self.print_progress(progress);
         }
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn lines_are_not_repeated() {
-        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorChoice::None));
+        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorDepthChoice::None));
         let progress = |fraction, samples| RenderProgress {
             fraction,
             elapsed_seconds: 1.0,
@@ -138,10 +138,10 @@ mod tests {
 
     #[test]
     fn files_with_several_meshes_are_listed_once() {
-        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorChoice::None));
+        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorDepthChoice::None));
         let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
         let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
-        assert_eq!(said.map(|progress| plain.is_newly_loaded(&progress)), [false, true, false, true]);
+        assert_eq!(said.map(|progress| plain.record_first_load(&progress)), [false, true, false, true]);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use std::path::Path;
 
 use super::{AssetError, FileHash, GkitOrbiterCamera, read};
 use crate::control::{CancelToken, ignore_progress};
-use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
+use crate::math::limits::{LARGEST, SHORTEST, is_nonzero_but_too_short};
 
 /// Maximum size of an orbiter file.
 const LIMIT: u64 = 1 << 20;
@@ -37,10 +37,10 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::read_text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
-    Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
+    Ok((parse_orbiter_camera(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 
-fn parse(path: &Path, text: &str) -> Result<GkitOrbiterCamera, AssetError> {
+fn parse_orbiter_camera(path: &Path, text: &str) -> Result<GkitOrbiterCamera, AssetError> {
     let (mut center, mut position, mut rotation, mut size, mut field) = (None, None, None, None, None);
     for (index, line) in text.lines().enumerate() {
         let wrong = |reason: String| AssetError::malformed(path, Some(index + 1), reason);
@@ -82,7 +82,7 @@ fn unknown_line_message(found: &str) -> String {
     format!("expected a line starting with c, p, r, s or f, found {found:?}")
 }
 
-fn wrong_count_message(letter: &str, count: usize) -> String {
+fn wrong_number_count_message(letter: &str, count: usize) -> String {
     format!("expected {count} finite numbers after `{letter}`")
 }
 
@@ -113,7 +113,7 @@ fn parse_numbers<'a, const N: usize>(
     let found: Option<Vec<f64>> =
         words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let exact: Option<[f64; N]> = found.and_then(|found| found.try_into().ok());
-    let numbers = exact.ok_or_else(|| wrong_count_message(letter, N))?;
+    let numbers = exact.ok_or_else(|| wrong_number_count_message(letter, N))?;
     match numbers.iter().find(|number| number.abs() > LARGEST) {
         Some(number) => Err(number_too_large_message(letter, *number)),
         None => Ok(numbers),
@@ -125,7 +125,7 @@ fn check_distance(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String>
     let [size, radius] = numbers?;
     match () {
         () if !(size > 0.0) => Err(distance_not_positive_message(size)),
-        () if is_too_short(size) => Err(distance_too_short_message(size)),
+        () if is_nonzero_but_too_short(size) => Err(distance_too_short_message(size)),
         () => Ok([size, radius]),
     }
 }
@@ -147,13 +147,13 @@ mod tests {
     use crate::assets::rejection;
 
     fn error(text: &str) -> (Option<usize>, String) {
-        rejection(parse(Path::new("cam.txt"), text))
+        rejection(parse_orbiter_camera(Path::new("cam.txt"), text))
     }
 
     #[test]
     fn every_number_is_read() {
         let text = "c -1 2 3\np 0.5 -0.25\nr 18 16\ns 4 5\nf 30 1024 640\n";
-        let camera = parse(Path::new("cam.txt"), text).expect("whole");
+        let camera = parse_orbiter_camera(Path::new("cam.txt"), text).expect("whole");
         assert_eq!(camera.center, [-1.0, 2.0, 3.0]);
         assert_eq!(camera.position, [0.5, -0.25]);
         assert_eq!(camera.rotation, [18.0, 16.0]);
@@ -163,7 +163,8 @@ mod tests {
 
     #[test]
     fn lines_with_a_default_are_optional() {
-        let camera = parse(Path::new("cam.txt"), "# old\r\ns 4 5\r\n\r\nc 0 0 0\r\n").expect("whole");
+        let camera =
+            parse_orbiter_camera(Path::new("cam.txt"), "# old\r\ns 4 5\r\n\r\nc 0 0 0\r\n").expect("whole");
         assert_eq!((camera.rotation, camera.fov), ([0.0, 0.0], 45.0));
         assert_eq!(error("c 0 0 0"), (None, missing_line_message("s size radius")));
         assert_eq!(error("s 1 1"), (None, missing_line_message("c x y z")));
@@ -172,9 +173,9 @@ mod tests {
     #[test]
     fn errors_include_line_and_reason() {
         for (text, line, reason) in [
-            ("c 0 0 0\np 1\n", 2, wrong_count_message("p", 2)),
-            ("c 0 nan 0", 1, wrong_count_message("c", 3)),
-            ("r 0 1 2", 1, wrong_count_message("r", 2)),
+            ("c 0 0 0\np 1\n", 2, wrong_number_count_message("p", 2)),
+            ("c 0 nan 0", 1, wrong_number_count_message("c", 3)),
+            ("r 0 1 2", 1, wrong_number_count_message("r", 2)),
             ("\ns 0 1", 2, distance_not_positive_message(0.0)),
             ("f 180 4 3", 1, invalid_fov_message(180.0)),
             ("f 40 4 0", 1, invalid_size_message(4.0, 0.0)),

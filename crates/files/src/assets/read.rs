@@ -35,7 +35,7 @@ impl Monitor<'_> {
     /// Reports progress, then polls the token.
     pub(crate) fn report_progress(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         (self.progress)(done as u64, total as u64);
-        self.token.check()
+        self.token.check_pause_and_cancel()
     }
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
 
 /// Opens a regular file with at most `limit` bytes. Returns the file and its length. Rejects pipes, devices
 /// and folders without opening them, because opening a pipe may block.
-pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
+pub(crate) fn open_regular_with_limit(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let refused = |kind: FileKind| AssetError::unreadable(path, not_regular_file_message(kind));
     let (mut file, found) = file::open_regular_file(path).map_err(unreadable)?.map_err(refused)?;
@@ -71,19 +71,19 @@ const START: usize = 1 << 12;
 /// Reads a text file. Rejects binary files based on their first [`START`] bytes.
 pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
-        refuse_utf16(path, start)?;
+        reject_utf16(path, start)?;
         reject_if_binary(path, start.contains(&0))
     })
 }
 
 /// Reads a text or binary file whose format starts with three letters.
-pub(crate) fn read_text_or_binary(
+pub(crate) fn read_with_text_magic(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
-        refuse_utf16(path, start)?;
+        reject_utf16(path, start)?;
         reject_if_binary(path, start[..start.len().min(3)].contains(&0))
     })
 }
@@ -111,7 +111,7 @@ fn reject_if_binary(path: &Path, is_binary: bool) -> Result<(), AssetError> {
 
 /// Rejects UTF-16 where a text file is expected. Do not call it for binary formats, because their 16-bit
 /// numbers can look like UTF-16.
-pub(crate) fn refuse_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
+pub(crate) fn reject_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), UTF16_TEXT);
     if is_utf16(start) { Err(refused()) } else { Ok(()) }
 }
@@ -135,7 +135,7 @@ fn read_if_start_accepted(
     monitor: Monitor<'_>,
     accept: impl Fn(&[u8]) -> Result<(), AssetError>,
 ) -> Result<Vec<u8>, AssetError> {
-    let (mut file, length) = open(path, limit)?;
+    let (mut file, length) = open_regular_with_limit(path, limit)?;
     let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let mut start = Vec::new();
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
@@ -199,13 +199,13 @@ mod tests {
         let path = folder.path().join("zeros");
         // A sparse 3 TiB file. Reading it completely would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [read_text, read_text_or_binary] {
+        for read in [read_text, read_with_text_magic] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
         assert!(read_text(&path, 100, monitor(&token)).is_err());
-        assert_eq!(read_text_or_binary(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
+        assert_eq!(read_with_text_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
         assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
     }
@@ -221,7 +221,7 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [read_text, read_text_or_binary] {
+                for read in [read_text, read_with_text_magic] {
                     let error = rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
@@ -250,7 +250,7 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_text_or_binary, read_unless_zeros_at_start, read_bytes] {
+        for read in [read_text, read_with_text_magic, read_unless_zeros_at_start, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }

@@ -7,7 +7,7 @@ use crate::film::RadianceImage;
 
 /// Returns |a − b| for each channel, in linear values.
 pub fn absolute_difference(pair: &Pair) -> RadianceImage {
-    let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels).map(|(a, b)| (*a - *b).abs());
+    let pixels = pair.a().pixels.par_iter().zip(&pair.reference().pixels).map(|(a, b)| (*a - *b).abs());
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels: pixels.collect() }
 }
 

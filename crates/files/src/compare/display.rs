@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::plane::{Plane, gaussian_kernel, normalized};
+use super::plane::{Plane, gaussian_kernel, normalized_taps};
 use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
@@ -44,7 +44,7 @@ impl DisplayErrorSums {
 
 pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
-    let window = normalized(&gaussian_kernel(SIGMA, RADIUS));
+    let window = normalized_taps(&gaussian_kernel(SIGMA, RADIUS));
     let band_sums = |band| {
         let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)
@@ -67,7 +67,8 @@ fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
         for (x, column) in columns.iter().enumerate() {
             let (Some(row), Some(column)) = (row, column) else { continue };
             let at = |plane: &Plane| plane.values[y * plane.width + x] / (row * column);
-            sums.ssim += ssim([at(&mean_a), at(&mean_b)], [at(&mean_aa), at(&mean_bb)], at(&mean_ab));
+            sums.ssim +=
+                ssim_from_moments([at(&mean_a), at(&mean_b)], [at(&mean_aa), at(&mean_bb)], at(&mean_ab));
             sums.windows += 1;
         }
     }
@@ -75,7 +76,7 @@ fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
 }
 
 /// SSIM (Wang et al., equation 13) computed from the means of a, b, a², b² and ab.
-fn ssim([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
+fn ssim_from_moments([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     let (variances, covariance) = (aa - a * a + (bb - b * b), ab - a * b);
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }

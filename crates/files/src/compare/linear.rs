@@ -33,7 +33,7 @@ struct LinearErrorSums {
 
 pub(super) fn measure(pair: &Pair) -> LinearErrors {
     let pixels = pair.a().pixels.len();
-    let rows = map_rows(pair, row_sums);
+    let rows = map_rows(pair, row_error_sums);
     let sums = rows.into_iter().enumerate().fold(LinearErrorSums::default(), |sums, (y, row)| {
         let (max, max_at) =
             if row.max > sums.max { (row.max, [row.max_at[0], y as u32]) } else { (sums.max, sums.max_at) };
@@ -61,10 +61,10 @@ pub(super) fn measure(pair: &Pair) -> LinearErrors {
 /// Applies `row` to each row and returns the results in order.
 fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.a().pixels.par_chunks(pair.width());
-    a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
+    a.zip(pair.reference().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
 
-fn row_sums(a: &[Vec3], b: &[Vec3]) -> LinearErrorSums {
+fn row_error_sums(a: &[Vec3], b: &[Vec3]) -> LinearErrorSums {
     let mut sums = LinearErrorSums::default();
     for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
         let difference = a.as_dvec3() - b.as_dvec3();
@@ -88,7 +88,7 @@ fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
 
 /// Mean of [`relative_squared_error`], excluding the largest values.
 fn trimmed_relmse(pair: &Pair, dropped: usize) -> f64 {
-    let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels);
+    let pixels = pair.a().pixels.par_iter().zip(&pair.reference().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
     let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);

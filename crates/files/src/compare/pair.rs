@@ -70,7 +70,7 @@ impl Pair {
     /// # Errors
     /// All errors found in the two images.
     pub fn load(a: &Path, b: &Path) -> Result<Self, Vec<CompareError>> {
-        match (read(a), read(b)) {
+        match (read_radiance_image(a), read_radiance_image(b)) {
             (Ok((first, mut warnings)), Ok((second, more))) => {
                 warnings.extend(more);
                 warnings.dedup();
@@ -88,7 +88,7 @@ impl Pair {
     }
 
     /// The reference.
-    pub fn b(&self) -> &RadianceImage {
+    pub fn reference(&self) -> &RadianceImage {
         &self.b
     }
 
@@ -115,7 +115,7 @@ impl Pair {
 }
 
 /// Reads an image and returns it with the warnings about its file.
-fn read(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
+fn read_radiance_image(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
     let image =
         load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;

@@ -75,7 +75,7 @@ pub(super) fn offsets(radius: usize) -> impl Iterator<Item = f64> {
 }
 
 /// Scales taps to a sum of 1.
-pub(super) fn normalized(taps: &[f64]) -> Vec<f64> {
+pub(super) fn normalized_taps(taps: &[f64]) -> Vec<f64> {
     let sum: f64 = taps.iter().sum();
     taps.iter().map(|tap| tap / sum).collect()
 }
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn gaussian_taps_match_known_values() {
-        let taps = normalized(&gaussian_kernel(1.5, 5));
+        let taps = normalized_taps(&gaussian_kernel(1.5, 5));
         assert_eq!(taps.len(), 11);
         assert!((taps[5] - 0.266_011_7).abs() < 1e-7 && (taps[0] - 0.001_028_4).abs() < 1e-7, "{taps:?}");
     }

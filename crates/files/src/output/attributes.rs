@@ -105,7 +105,7 @@ impl FileAttributes {
 
     /// Applies all attributes except the permissions to a new file. Until the permissions are applied, the
     /// file must be accessible only to its owner.
-    pub(super) fn carry_over(&self, new: &File) -> UncopiedAttributes {
+    pub(super) fn apply_except_permissions(&self, new: &File) -> UncopiedAttributes {
         let mut carried = UncopiedAttributes { lost: Vec::new(), mode: self.mode };
         // Set the flags before changing the owner, because only the owner may set them.
         #[cfg(target_os = "linux")]
@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn lost_attributes_are_reported() {
         let (attributes, new) = attributes(0o664, "nonsense.of.no.space");
-        let carried = attributes.carry_over(&new);
+        let carried = attributes.apply_except_permissions(&new);
         assert_eq!(
             carried,
             UncopiedAttributes { lost: vec!["its attribute nonsense.of.no.space".to_owned()], mode: 0o664 }
@@ -232,7 +232,7 @@ mod tests {
     fn losing_the_access_list_revokes_group_access() {
         // The value is not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
-        let carried = attributes.carry_over(&new);
+        let carried = attributes.apply_except_permissions(&new);
         assert_eq!(carried, UncopiedAttributes { lost: vec!["its access list".to_owned()], mode: 0o600 });
         carried.apply_mode(&new).expect("permitted");
         assert_eq!(new.metadata().expect("a file").mode() & 0o777, 0o600);

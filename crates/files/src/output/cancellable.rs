@@ -28,7 +28,7 @@ pub(super) fn tone_map_in_parts(
     mut take: impl FnMut(&[u8]) -> io::Result<()>,
 ) -> io::Result<()> {
     for pixels in image.pixels.chunks(PIXELS) {
-        token.check().map_err(io::Error::other)?;
+        token.check_pause_and_cancel().map_err(io::Error::other)?;
         let part = RadianceImage { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() };
         let bytes = match options.bit_depth {
             BitDepth::Eight => tone_map_to_8_bits(&part, &options.tone).pixels.into_flattened(),
@@ -38,7 +38,7 @@ pub(super) fn tone_map_in_parts(
             }
         };
         for bytes in bytes.chunks(BYTES) {
-            token.check().map_err(io::Error::other)?;
+            token.check_pause_and_cancel().map_err(io::Error::other)?;
             take(bytes)?;
         }
     }
@@ -79,7 +79,7 @@ impl<'a> CancellableBuffer<'a> {
 
 impl Write for CancellableBuffer<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.token.check().map_err(io::Error::other)?;
+        self.token.check_pause_and_cancel().map_err(io::Error::other)?;
         self.bytes.write(bytes)
     }
 
@@ -97,7 +97,7 @@ impl Seek for CancellableBuffer<'_> {
 /// Writes all bytes, polling the cancel token between parts.
 pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     for part in bytes.chunks(1 << 20) {
-        token.check().map_err(io::Error::other)?;
+        token.check_pause_and_cancel().map_err(io::Error::other)?;
         to.write_all(part)?;
     }
     Ok(())
@@ -126,7 +126,7 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
     /// Milliseconds between polls of the cancel token.
     const POLL_MS: u8 = 50;
     loop {
-        token.check().map_err(io::Error::other)?;
+        token.check_pause_and_cancel().map_err(io::Error::other)?;
         let mut ends = [PollFd::new(to.as_fd(), PollFlags::POLLOUT)];
         match poll(&mut ends, PollTimeout::from(POLL_MS)) {
             Ok(0) | Err(Errno::EINTR) => {}
@@ -138,7 +138,7 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
 
 /// Distinguishes cancelled writes from I/O errors. Checks the error instead of the token, because the token
 /// may have been cancelled after the write.
-pub(super) fn or_cancelled<T>(
+pub(super) fn map_cancelled_error<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
 ) -> Result<T, OutputError> {
@@ -182,7 +182,8 @@ mod tests {
     fn only_stopped_writes_count_as_cancelled() {
         let token = CancelToken::new();
         token.cancel();
-        let classify = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
+        let classify =
+            |result| map_cancelled_error(result, |error| OutputError::file("a.png".as_ref(), error));
         let stopped = write_all(Vec::new(), b"abc", &token);
         assert!(matches!(classify(stopped), Err(OutputError::Cancelled(_))));
         let full = io::Error::from(io::ErrorKind::StorageFull);

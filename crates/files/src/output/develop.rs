@@ -7,7 +7,7 @@ use crate::film::{Film, Quantity, RadianceImage, SampleCountStats};
 
 /// Settings for encoding a film as an image file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DevelopSettings {
+pub struct FilmEncodingSettings {
     /// Film quantity that the image shows.
     pub quantity: Quantity,
     /// Tone mapping. Its range has not been adapted to the image yet.
@@ -20,9 +20,9 @@ pub struct DevelopSettings {
     pub is_light: bool,
 }
 
-impl DevelopSettings {
+impl FilmEncodingSettings {
     /// Extracts the image from a film.
-    pub fn extract_image(&self, film: &Film) -> RadianceImage {
+    pub fn extract_radiance_image(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 
@@ -42,7 +42,7 @@ impl DevelopSettings {
     ///
     /// # Errors
     /// Same as [`encode`](super::encode).
-    pub fn encode_extracted_image(
+    pub fn encode_film_image(
         &self,
         film: &Film,
         (image, layers): (&RadianceImage, &[LayerImage]),

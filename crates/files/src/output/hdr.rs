@@ -25,7 +25,7 @@ pub(super) fn encode(
     header += &format!("FORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height, image.width);
     let mut bytes = header.into_bytes();
     for line in image.pixels.chunks_exact(image.width as usize) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         encode_scanline(line, &mut bytes);
     }
     Ok(bytes)

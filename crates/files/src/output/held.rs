@@ -60,7 +60,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A backup already exists, or a system call fails.
-    pub(super) fn move_new_to_backup_path(
+    pub(super) fn stage_at_backup_path(
         mut new: TemporaryFile,
         target: &'a Path,
         expected: &'a [u8],
@@ -89,7 +89,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn finish_or_restore(self) -> io::Result<Option<File>> {
+    pub(super) fn finish_if_old_text_matches(self) -> io::Result<Option<File>> {
         let text = fs::read(&self.held)?;
         if text == self.expected {
             // If this fails, the backup is handled at the next start.
@@ -149,7 +149,7 @@ impl<'a> StepwiseReplacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn place_new_or_restore_old(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
+    pub(super) fn place_new_if_old_unchanged(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
         if fs::read(&self.held)? != self.expected {
             return rename_no_replace(&self.held, self.target).map(|()| None);
         }
@@ -181,11 +181,11 @@ pub(super) fn replace_if_unchanged(
     target: &Path,
     expected: &[u8],
 ) -> io::Result<Option<File>> {
-    match Replacement::move_new_to_backup_path(new, target, expected)?.swap() {
-        Ok(replacement) => replacement.finish_or_restore(),
+    match Replacement::stage_at_backup_path(new, target, expected)?.swap() {
+        Ok(replacement) => replacement.finish_if_old_text_matches(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
-            StepwiseReplacement::move_old_to_backup_path(target, expected)?.place_new_or_restore_old(new)
+            StepwiseReplacement::move_old_to_backup_path(target, expected)?.place_new_if_old_unchanged(new)
         }
         Err((error, _)) => Err(error),
     }
@@ -304,12 +304,13 @@ mod tests {
         let scene = folder.scene();
         let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         assert!(
-            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_none()
+            steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_none()
                 && folder.has(NEWER)
         );
         let steps = StepwiseReplacement::move_old_to_backup_path(&scene, NEWER.as_bytes()).expect("taken");
         assert!(
-            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_some() && folder.has(NEW)
+            steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_some()
+                && folder.has(NEW)
         );
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
     }
@@ -335,7 +336,7 @@ mod tests {
                     std::mem::forget(new);
                 } else {
                     let mut replacement =
-                        Replacement::move_new_to_backup_path(new, &scene, OLD.as_bytes()).expect("begun");
+                        Replacement::stage_at_backup_path(new, &scene, OLD.as_bytes()).expect("begun");
                     save(1);
                     if steps == 2 {
                         replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
@@ -367,10 +368,10 @@ mod tests {
         let scene = folder.scene();
         folder.save("first");
         let replacement =
-            Replacement::move_new_to_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
+            Replacement::stage_at_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
         let replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
         folder.save("second");
-        assert!(replacement.finish_or_restore().expect("no error").is_none());
+        assert!(replacement.finish_if_old_text_matches().expect("no error").is_none());
         assert!(folder.has("second"));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1);
     }
@@ -397,7 +398,7 @@ mod tests {
         let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);
         assert!(
-            steps.place_new_or_restore_old(folder.new_text()).expect("no error").is_none()
+            steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_none()
                 && folder.has(NEWER)
         );
     }

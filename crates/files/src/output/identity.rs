@@ -58,7 +58,7 @@ impl FileIdentity {
 /// Properties that help to identify an existing file where [`FileIdentity`] is not sufficient. Some
 /// case-insensitive file systems, such as FAT and some network file systems, have no stable inode numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FileFingerprint {
+pub struct FallbackFileIdentity {
     real: PathBuf,
     /// Folder in lowercase.
     folder: PathBuf,
@@ -68,7 +68,7 @@ pub struct FileFingerprint {
     modified: (i64, i64),
 }
 
-impl FileFingerprint {
+impl FallbackFileIdentity {
     /// Returns the fingerprint of the file at a path. `None` if there is no regular file at the path.
     pub fn from_path(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
@@ -105,7 +105,8 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
 /// according to their [`FileFingerprint`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let Some(identity) = FileIdentity::from_path(a) else { return false };
-    let are_alike = || Some(FileFingerprint::from_path(a)?.may_equal(&FileFingerprint::from_path(b)?));
+    let are_alike =
+        || Some(FallbackFileIdentity::from_path(a)?.may_equal(&FallbackFileIdentity::from_path(b)?));
     FileIdentity::from_path(b) == Some(identity) || are_alike().unwrap_or(false)
 }
 

@@ -12,7 +12,7 @@ use crate::system::text::is_terminal_safe;
 /// # Errors
 /// The value cannot be serialized.
 pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
-    serde_json::to_string(value).map(escape_unsafe)
+    serde_json::to_string(value).map(escape_terminal_unsafe)
 }
 
 /// Formats a value for a file: indented, with a final line feed.
@@ -20,12 +20,12 @@ pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
 /// # Errors
 /// The value cannot be serialized.
 pub fn to_pretty_text(value: &impl Serialize) -> serde_json::Result<String> {
-    serde_json::to_string_pretty(value).map(|text| escape_unsafe(text) + "\n")
+    serde_json::to_string_pretty(value).map(|text| escape_terminal_unsafe(text) + "\n")
 }
 
 /// Escapes unsafe characters, which occur only inside strings. Line feeds occur only between tokens and are
 /// kept.
-fn escape_unsafe(text: String) -> String {
+fn escape_terminal_unsafe(text: String) -> String {
     let is_safe = |c: char| c == '\n' || is_terminal_safe(c);
     if text.chars().all(is_safe) {
         return text;

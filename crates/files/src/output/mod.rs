@@ -35,11 +35,11 @@ pub mod write;
 use std::path::Path;
 
 pub use attributes::{AttributeLossPolicy, WriteWarning};
-pub use develop::DevelopSettings;
+pub use develop::FilmEncodingSettings;
 pub use error::OutputError;
 pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
-pub use identity::{FileFingerprint, FileIdentity, is_same_file};
+pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
     ReplaceCheck, may_replace_image, may_replace_json, may_replace_plot, may_replace_table,
     scene_name_in_png, sign_plot,
@@ -118,7 +118,7 @@ pub(crate) fn encode_with_layers(
         Format::WebP => webp::encode(image, options, token),
     };
     // A cancelled encoder reports an error from its writer.
-    token.check()?;
+    token.check_pause_and_cancel()?;
     bytes
 }
 
@@ -128,7 +128,7 @@ pub(crate) fn encode_with_layers(
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
 /// directory or not writable.
-pub fn check_image_target(path: &Path) -> Result<Format, OutputError> {
+pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     resolve_path::check_writable(path)?;
     Ok(format)

@@ -10,7 +10,7 @@ use super::resolve_path::directory_of;
 /// scenes in any folder.
 pub fn relative_to_image(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
-    let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return file_name(scene) };
+    let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return lossy_file_name(scene) };
     let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(shared).map(|_| Component::ParentDir);
     let down = to.components().skip(shared);
@@ -20,9 +20,9 @@ pub fn relative_to_image(scene: &Path, image: &Path) -> String {
 }
 
 /// Whether the path `named` in an image's metadata refers to this scene.
-pub fn refers_to_scene(named: &str, scene: &Path, image: &Path) -> bool {
+pub fn metadata_path_refers_to_scene(named: &str, scene: &Path, image: &Path) -> bool {
     if !named.contains('/') {
-        return named == file_name(scene);
+        return named == lossy_file_name(scene);
     }
     let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative_to_image(scene, image) };
     // The image may be a link. It may have been written through the link's path or through the target's path.
@@ -34,7 +34,7 @@ pub fn refers_to_scene(named: &str, scene: &Path, image: &Path) -> bool {
 }
 
 /// File name without the folder.
-fn file_name(scene: &Path) -> String {
+fn lossy_file_name(scene: &Path) -> String {
     scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -68,8 +68,8 @@ mod tests {
             ("a/b/../b/../scene.png", "./scene.toml"),
         ] {
             assert_eq!(relative_to_image(&scene, &at(image)), expected, "{image}");
-            assert!(refers_to_scene(expected, &scene, &at(image)), "{image}");
-            assert!(!refers_to_scene(expected, &at("c/x"), &at(image)), "{image}");
+            assert!(metadata_path_refers_to_scene(expected, &scene, &at(image)), "{image}");
+            assert!(!metadata_path_refers_to_scene(expected, &at("c/x"), &at(image)), "{image}");
         }
         assert_eq!(
             relative_to_image(&scene, &at("none/scene.png")),
@@ -84,10 +84,17 @@ mod tests {
         let at = |path: &str| folder.path().join(path);
         let (one, other, image) = (at("a/scene.toml"), at("b/scene.toml"), at("scene.png"));
         let named = relative_to_image(&one, &image);
-        assert!(refers_to_scene(&named, &one, &image) && !refers_to_scene(&named, &other, &image));
-        assert!(refers_to_scene("scene.toml", &one, &image) && refers_to_scene("scene.toml", &other, &image));
         assert!(
-            !refers_to_scene("room.toml", &one, &image) && !refers_to_scene("./scene.toml", &one, &image)
+            metadata_path_refers_to_scene(&named, &one, &image)
+                && !metadata_path_refers_to_scene(&named, &other, &image)
+        );
+        assert!(
+            metadata_path_refers_to_scene("scene.toml", &one, &image)
+                && metadata_path_refers_to_scene("scene.toml", &other, &image)
+        );
+        assert!(
+            !metadata_path_refers_to_scene("room.toml", &one, &image)
+                && !metadata_path_refers_to_scene("./scene.toml", &one, &image)
         );
     }
 
@@ -99,25 +106,37 @@ mod tests {
         symlink(at("a"), at("link")).expect("a link");
         symlink(at("a/scene.toml"), at("other.toml")).expect("a link");
         let image = at("scene.png");
-        assert!(refers_to_scene(
+        assert!(metadata_path_refers_to_scene(
             &relative_to_image(&at("a/scene.toml"), &image),
             &at("link/scene.toml"),
             &image
         ));
-        assert!(refers_to_scene(&relative_to_image(&at("a/scene.toml"), &image), &at("other.toml"), &image));
-        assert!(refers_to_scene(&relative_to_image(&at("other.toml"), &image), &at("a/scene.toml"), &image));
+        assert!(metadata_path_refers_to_scene(
+            &relative_to_image(&at("a/scene.toml"), &image),
+            &at("other.toml"),
+            &image
+        ));
+        assert!(metadata_path_refers_to_scene(
+            &relative_to_image(&at("other.toml"), &image),
+            &at("a/scene.toml"),
+            &image
+        ));
         fs::write(at("big/scene.png"), "").expect("written");
         symlink(at("big/scene.png"), &image).expect("a link");
         let scene = at("a/scene.toml");
-        assert!(refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
-        assert!(refers_to_scene(&relative_to_image(&scene, &at("big/scene.png")), &scene, &image));
+        assert!(metadata_path_refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
+        assert!(metadata_path_refers_to_scene(
+            &relative_to_image(&scene, &at("big/scene.png")),
+            &scene,
+            &image
+        ));
         // Move both together, then only the scene.
         let named = relative_to_image(&scene, &at("a/scene.png"));
         fs::rename(at("a"), at("moved")).expect("moved");
-        assert!(refers_to_scene(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
+        assert!(metadata_path_refers_to_scene(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
         fs::create_dir(at("elsewhere")).expect("made");
         fs::rename(at("moved/scene.toml"), at("elsewhere/scene.toml")).expect("moved");
-        assert!(!refers_to_scene(&named, &at("elsewhere/scene.toml"), &at("moved/scene.png")));
+        assert!(!metadata_path_refers_to_scene(&named, &at("elsewhere/scene.toml"), &at("moved/scene.png")));
     }
 
     #[test]
@@ -128,6 +147,6 @@ mod tests {
         let scene = folder.path().join(OsStr::from_bytes(b"sc\xffne.toml"));
         fs::write(&scene, "").expect("written");
         let image = folder.path().join("a.png");
-        assert!(refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
+        assert!(metadata_path_refers_to_scene(&relative_to_image(&scene, &image), &scene, &image));
     }
 }

@@ -97,14 +97,14 @@ impl Drop for TemporaryFile {
 /// named file that is removed immediately. Some directories, such as /proc, reject files despite write
 /// permission.
 pub(super) fn check_can_create(directory: &Path) -> io::Result<()> {
-    if create_unnamed(directory).is_ok() {
+    if probe_unnamed_creation(directory).is_ok() {
         return Ok(());
     }
     TemporaryFile::create_locked(directory, OsStr::new("probe"), 0o600).map(drop)
 }
 
 #[cfg(target_os = "linux")]
-fn create_unnamed(directory: &Path) -> io::Result<()> {
+fn probe_unnamed_creation(directory: &Path) -> io::Result<()> {
     OpenOptions::new().write(true).mode(0o600).custom_flags(OFlag::O_TMPFILE.bits()).open(directory).map(drop)
 }
 

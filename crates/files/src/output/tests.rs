@@ -242,7 +242,7 @@ fn webp_has_the_same_pixels_and_settings_as_png() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.webp");
     std::fs::write(&path, &bytes).expect("written");
-    let made = super::settings::read_info(&path).expect("settings");
+    let made = super::settings::read_image_info(&path).expect("settings");
     assert_eq!((made.format.as_str(), made.size, made.is_written_by_glimt()), ("WebP", Some((37, 21)), true));
     assert!(
         made.settings.contains(&("scene".to_owned(), "a \"b\" <c> & d".to_owned())),

@@ -170,7 +170,7 @@ pub(super) fn write_atomically_or_in_place(
                     way_out: "edit a copy instead",
                 });
             }
-            cancellable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
+            cancellable::map_cancelled_error(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -201,8 +201,8 @@ pub(super) fn write_atomically_or_in_place(
         WriteTarget::InPlace(device) => {
             (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
-            cancellable::or_cancelled(content(&mut bytes), named)?;
-            cancellable::or_cancelled(write_in_place(&device, &bytes, token), named)?;
+            cancellable::map_cancelled_error(content(&mut bytes), named)?;
+            cancellable::map_cancelled_error(append_in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }
@@ -234,7 +234,7 @@ fn create_temporary(
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
     let new = TemporaryFile::create_locked(directory, name, mode)?;
     let old = target.existing.as_ref().map(|existing| FileAttributes::read(&target.path, existing));
-    let carried = old.map(|old| old.carry_over(&new.file));
+    let carried = old.map(|old| old.apply_except_permissions(&new.file));
     Ok((new, carried))
 }
 
@@ -265,7 +265,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
 }
 
 /// Writes in place. Appends to the target, so existing content in an open file is kept.
-fn write_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+fn append_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.
         io::stdout().flush()?;

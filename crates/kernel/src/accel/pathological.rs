@@ -87,6 +87,6 @@ pub fn difficult_rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
 }
 
 /// Bit patterns of a hit, for exact comparison.
-pub fn bits(hit: Option<ShapeHit>) -> Option<(u32, u32, u32, u32)> {
+pub fn hit_bits(hit: Option<ShapeHit>) -> Option<(u32, u32, u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
 }

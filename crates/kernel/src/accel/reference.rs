@@ -36,14 +36,14 @@ impl SimdBounds {
 
     /// Maximum corner.
     #[inline(always)]
-    pub fn max(&self) -> Vec4 {
+    pub fn max_corner(&self) -> Vec4 {
         -self.minus_max
     }
 
     /// Edge lengths.
     #[inline(always)]
     pub fn extent(&self) -> Vec4 {
-        self.max() - self.min
+        self.max_corner() - self.min
     }
 
     #[inline(always)]
@@ -61,12 +61,12 @@ impl SimdBounds {
 
     #[inline]
     pub fn aabb(&self) -> Aabb {
-        Aabb { min: self.min.truncate(), max: self.max().truncate() }
+        Aabb { min: self.min.truncate(), max: self.max_corner().truncate() }
     }
 
     /// Parts of the box below and above a plane.
     #[inline]
-    pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
+    pub fn split_at_plane(&self, axis: usize, at: f32) -> [Self; 2] {
         let (mut left, mut right) = (*self, *self);
         left.minus_max[axis] = -at;
         right.min[axis] = at;
@@ -99,7 +99,7 @@ impl TriangleReference {
     ) -> Result<Vec<Self>, Cancelled> {
         let mut references: Vec<Self> =
             (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
-        token.check()?;
+        token.check_pause_and_cancel()?;
         if !references.par_iter().all(Self::is_hittable_and_finite) {
             references.retain(Self::is_hittable_and_finite);
         }
@@ -156,7 +156,7 @@ impl TriangleReference {
             }
             before = corner;
         }
-        let [left, right] = self.bounds.halves(axis, at);
+        let [left, right] = self.bounds.split_at_plane(axis, at);
         [self.with_intersection_or_half(left, &parts[0]), self.with_intersection_or_half(right, &parts[1])]
     }
 
@@ -283,9 +283,9 @@ mod tests {
         let corners = [Vec3::ZERO, Vec3::new(3.0, 1.0, 0.1), Vec3::new(3.0, 1.0, 0.7)];
         let [left, right] = TriangleReference::new(0, corners).split(0, 1.0, corners);
         for (low, exact, high) in [
-            (right.bounds.min.y, 1.0 / 3.0, left.bounds.max().y),
+            (right.bounds.min.y, 1.0 / 3.0, left.bounds.max_corner().y),
             (right.bounds.min.z, f64::from(0.1_f32) / 3.0, f32::INFINITY),
-            (f32::NEG_INFINITY, f64::from(0.7_f32) / 3.0, left.bounds.max().z),
+            (f32::NEG_INFINITY, f64::from(0.7_f32) / 3.0, left.bounds.max_corner().z),
         ] {
             assert!(f64::from(low) <= exact && exact <= f64::from(high), "{low} {exact} {high}");
         }

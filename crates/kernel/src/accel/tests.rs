@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::pathological::{bits, closest_by_brute_force, difficult_meshes, difficult_rays};
+use super::pathological::{closest_by_brute_force, difficult_meshes, difficult_rays, hit_bits};
 use super::{KdTree, WideBvh};
 use crate::control::CancelToken;
 use crate::geometry::watertight::ShearedRay;
@@ -13,7 +13,7 @@ use crate::math::random::signed_generator as random;
 type TriangleSoup = Vec<[Vec3; 3]>;
 
 fn kd_tree(mesh: &[[Vec3; 3]]) -> KdTree {
-    let tree = KdTree::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
+    let tree = KdTree::from_triangles(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
     tree.expect("never canceled")
 }
 
@@ -130,7 +130,7 @@ fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<St
         let shadow = expected.is_some() && mesh.iter().zip(0..).any(is_hit);
         let found = [planes.closest_hit(&ray), boxes.closest_hit(&ray)];
         let shadows = [planes.any_hit(&ray, except), boxes.any_hit(&ray, except)];
-        if found.iter().any(|&found| bits(found) != bits(expected)) || shadows != [shadow; 2] {
+        if found.iter().any(|&found| hit_bits(found) != hit_bits(expected)) || shadows != [shadow; 2] {
             different += 1;
             first.get_or_insert_with(|| {
                 format!("{ray:?}: {expected:?} {shadow}, found {found:?} {shadows:?}")
@@ -170,7 +170,7 @@ fn kd_trees_are_valid_and_match_brute_force() {
             .unwrap_or_else(|fault| panic!("{number}: {fault}"));
         for ray in difficult_rays(&mesh).iter().step_by(if mesh.len() > 1000 { 8 } else { 1 }) {
             let expected = closest_by_brute_force(&mesh, ray);
-            assert_eq!(bits(tree.closest_hit(ray)), bits(expected), "mesh {number}, {ray:?}");
+            assert_eq!(hit_bits(tree.closest_hit(ray)), hit_bits(expected), "mesh {number}, {ray:?}");
             assert_eq!(tree.any_hit(ray, None), expected.is_some(), "mesh {number}, {ray:?}");
         }
     }
@@ -208,7 +208,7 @@ fn kd_tree_does_not_depend_on_thread_count() {
 fn builds_can_be_canceled() {
     let token = CancelToken::new();
     token.cancel();
-    assert!(KdTree::build(1, |_| [Vec3::ZERO, Vec3::X, Vec3::Y], &token).is_err());
+    assert!(KdTree::from_triangles(1, |_| [Vec3::ZERO, Vec3::X, Vec3::Y], &token).is_err());
 }
 
 #[test]

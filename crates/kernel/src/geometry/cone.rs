@@ -5,10 +5,10 @@ use std::f64::consts::{PI, TAU};
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
-    projected_area_of_normal_ring, radial_direction, sine_from_cosine, u_from_direction,
+    projected_area_of_normal_ring, radial_direction_toward, sine_from_cosine, u_from_direction,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// A cone with a round base, or only its side. The front is outside. Part 0 is the side and part 1 is the cap
@@ -35,7 +35,7 @@ impl SurfaceF64 for Cone {
         }
         let local = self.frame.point_to_local(point);
         self.side_point_from_slant_f64(
-            radial_direction(local.truncate()),
+            radial_direction_toward(local.truncate()),
             self.slant_direction_and_distance(local),
         )
     }
@@ -120,7 +120,7 @@ impl Cone {
             return self.base().closest_surface_point(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
-        let out = radial_direction(local.truncate());
+        let out = radial_direction_toward(local.truncate());
         let (down, along) = self.slant_direction_and_distance(local);
         let around = out.perp() * (-TAU * down.x * along);
         let SurfacePointF64 { point, normal, reach } = self.side_point_from_slant_f64(out, (down, along));
@@ -160,12 +160,15 @@ impl Cone {
             return self.base().uv_at(point);
         }
         let (_, along) = self.slant_direction_and_distance(local);
-        DVec2::new(u_from_direction(mirror_y(radial_direction(local.truncate()))), 1.0 - along / self.slant)
+        DVec2::new(
+            u_from_direction(mirror_y(radial_direction_toward(local.truncate()))),
+            1.0 - along / self.slant,
+        )
     }
 
     /// Mean curvature at a point on a part. The side curves only around the axis, and its curvature is
     /// unbounded at the tip.
-    pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
+    pub fn mean_curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.point_to_local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
@@ -194,12 +197,12 @@ impl Cone {
     }
 
     /// Samples a point uniformly over the area of a part.
-    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
         match part {
             0 => {
                 let (point, normal) =
                     self.side_point_and_normal(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
-                AreaPoint { point, normal }
+                SurfaceSample { point, normal }
             }
             _ => self.base().sample(0, u),
         }

@@ -1,22 +1,22 @@
 //! Oriented boxes in double precision.
 
 use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
-use super::surface::planar_tangents;
+use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 
 /// An oriented box. The front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cuboid {
+pub struct OrientedBox {
     center: DVec3,
     half: DVec3,
     /// Axes as columns of the local-to-world matrix.
     axes: DMat3,
 }
 
-impl Cuboid {
+impl OrientedBox {
     /// Creates a box from its center, its positive edge lengths, and its rotation in degrees about x, then y,
     /// then z.
     pub fn new(center: DVec3, size: DVec3, rotate_degrees: DVec3) -> Self {
@@ -109,7 +109,7 @@ impl Cuboid {
     }
 
     fn face_mapping(&self, face: u32) -> FaceMapping {
-        let (u, v) = planar_tangents(face_axis_and_normal(face).1);
+        let (u, v) = tangents_from_normal(face_axis_and_normal(face).1);
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
@@ -155,7 +155,7 @@ impl Cuboid {
     /// A face as a parallelogram (corner, u, v) whose front faces outward.
     pub fn face(&self, face: u32) -> (DVec3, DVec3, DVec3) {
         let (_, normal) = face_axis_and_normal(face);
-        let (u, v) = planar_tangents(normal);
+        let (u, v) = tangents_from_normal(normal);
         let corner = (normal - u - v) * self.half;
         (
             self.center + self.axes * corner,
@@ -181,10 +181,10 @@ impl Cuboid {
     }
 
     /// Samples a point uniformly over the area of a face.
-    pub fn sample(&self, face: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, face: u32, u: Vec2) -> SurfaceSample {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
-        AreaPoint { point, normal: self.axes * face_axis_and_normal(face).1 }
+        SurfaceSample { point, normal: self.axes * face_axis_and_normal(face).1 }
     }
 
     /// Centroid.
@@ -227,7 +227,7 @@ fn face_axis_and_normal(face: u32) -> (usize, DVec3) {
     (axis, normal)
 }
 
-impl SurfaceF64 for Cuboid {
+impl SurfaceF64 for OrientedBox {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (local, n) = (self.local_hit_point(ray, hit), branchless_face_normal(hit.primitive));
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn hits_have_the_normal_of_their_face() {
-        let cube = Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 4.0, 6.0), DVec3::ZERO);
+        let cube = OrientedBox::new(DVec3::ZERO, DVec3::new(2.0, 4.0, 6.0), DVec3::ZERO);
         for (direction, t) in [(Vec3::X, 1.0), (Vec3::Y, 2.0), (Vec3::NEG_Z, 3.0)] {
             let inside = Ray::new(Vec3::ZERO, direction).to_f64();
             let hit = cube.intersect(&inside).expect("a ray from inside should hit");
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn rotated_boxes_are_hit_at_their_edges() {
-        let cube = Cuboid::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
+        let cube = OrientedBox::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
         let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X).to_f64();
         let hit = cube.intersect(&ray).expect("the ray should hit the edge");
         assert!((f64::from(hit.t) - (5.0 - 2.0_f64.sqrt())).abs() < 1e-6);
@@ -277,8 +277,11 @@ mod tests {
 
     #[test]
     fn faces_are_outward_parallelograms() {
-        let cube =
-            Cuboid::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, 30.0));
+        let cube = OrientedBox::new(
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(10.0, 20.0, 30.0),
+        );
         for face in 0..6 {
             let (corner, u, v) = cube.face(face);
             let middle = corner + (u + v) * 0.5;

@@ -5,10 +5,10 @@ use std::f64::consts::{PI, TAU};
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
-    projected_area_of_normal_ring, radial_direction, sine_from_cosine, u_from_direction,
+    projected_area_of_normal_ring, radial_direction_toward, sine_from_cosine, u_from_direction,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// A solid cylinder between two end points, or an open tube. The front is outside. Part 0 is the side, part 1
@@ -27,9 +27,9 @@ pub struct Cylinder {
 
 impl SurfaceF64 for Cylinder {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let point = self.exact_hit_point(ray, hit);
+        let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).closest_point_f64(point, self.coordinate_bound());
+            return self.cap_disk(hit.primitive).closest_point_f64(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
         self.side_point_at_height_f64(out, z)
@@ -52,12 +52,12 @@ impl Cylinder {
         let line = self.frame.line_to_local(ray);
         let end = if self.capped { self.half_length } else { self.half_length * (1.0 + BORDER) };
         let ends = LineInterval::between_heights(&line, (-end, 1), (end, 2))?;
-        let starts_on = |part| self.starts_on(ray, part);
+        let starts_on = |part| self.starts_on_part(ray, part);
         surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
 
     /// Whether a ray starts on a part, within rounding error.
-    fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
+    fn starts_on_part(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.point_to_local(ray.origin);
         let distance = match part {
             0 => local.truncate().length() - self.radius,
@@ -87,7 +87,7 @@ impl Cylinder {
     }
 
     /// Hit point before rounding.
-    fn exact_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn unrounded_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line_to_local(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
         let crossings = match hit.primitive {
@@ -99,9 +99,9 @@ impl Cylinder {
 
     /// Surface point at a hit.
     pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = self.exact_hit_point(ray, hit);
+        let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).closest_surface_point(point, self.coordinate_bound());
+            return self.cap_disk(hit.primitive).closest_surface_point(point, self.coordinate_bound());
         }
         let (out, z) = self.closest_on_side(point);
         let SurfacePointF64 { point, normal, reach } = self.side_point_at_height_f64(out, z);
@@ -118,7 +118,7 @@ impl Cylinder {
     /// The point on the side that is closest to `point`, as a direction from the axis and a height.
     fn closest_on_side(&self, point: DVec3) -> (DVec2, f64) {
         let local = self.frame.point_to_local(point);
-        (radial_direction(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
+        (radial_direction_toward(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
 
     /// Computes the point on the side from a height and a direction perpendicular to the axis.
@@ -140,13 +140,13 @@ impl Cylinder {
         let local = self.frame.point_to_local(point);
         let (inwards, below) = (self.radius - local.truncate().length(), self.half_length - local.z.abs());
         if self.capped && below.abs() < inwards.abs() {
-            return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
+            return self.cap_disk(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
         }
-        DVec2::new(u_from_direction(radial_direction(local.truncate())), self.height_to_v(local.z))
+        DVec2::new(u_from_direction(radial_direction_toward(local.truncate())), self.height_to_v(local.z))
     }
 
     /// Mean curvature of a part.
-    pub fn curvature(&self, part: u32) -> f64 {
+    pub fn mean_curvature(&self, part: u32) -> f64 {
         if part == 0 { 0.5 / self.radius } else { 0.0 }
     }
 
@@ -164,7 +164,7 @@ impl Cylinder {
     }
 
     /// The cap with index 1 or 2, facing outward.
-    pub fn cap(&self, number: u32) -> Disk {
+    pub fn cap_disk(&self, number: u32) -> Disk {
         let side = if number == 1 { -1.0 } else { 1.0 };
         let center = self.frame.point_to_world(DVec3::Z * (side * self.half_length));
         Disk::new(center, self.frame.axis() * side, self.radius)
@@ -177,13 +177,13 @@ impl Cylinder {
     }
 
     /// Samples a point uniformly over the area of a part.
-    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
         match part {
             0 => {
                 let (point, normal) = self.side_point_and_normal(f64::from(u.x), f64::from(u.y));
-                AreaPoint { point, normal }
+                SurfaceSample { point, normal }
             }
-            cap => self.cap(cap).sample(0, u),
+            cap => self.cap_disk(cap).sample(0, u),
         }
     }
 
@@ -307,7 +307,7 @@ mod tests {
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-            self.exact_hit_point(ray, hit)
+            self.unrounded_hit_point(ray, hit)
         }
     }
 

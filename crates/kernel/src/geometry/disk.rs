@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
 use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
@@ -124,8 +124,8 @@ impl Disk {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
-        AreaPoint { point: self.point_from_unit_disk(warp::disk(u).as_dvec2()), normal: self.normal() }
+    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+        SurfaceSample { point: self.point_from_unit_disk(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
     /// Distance from a point to the disk.
@@ -135,9 +135,9 @@ impl Disk {
     }
 
     /// Local geometry of the disk near a point, for density estimation.
-    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
+    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
-        let extent = SurfaceExtent::Flat(self.radius - from.length());
+        let extent = LocalSurfaceShape::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
         LocalGeometry::Surface { distance: self.distance(point), ground: Some(ground) }
     }

@@ -30,12 +30,12 @@ pub struct NearestSurface {
     /// Height of the point above or below the surface.
     pub height: f64,
     /// Extent of the surface around the closest point.
-    pub extent: SurfaceExtent,
+    pub extent: LocalSurfaceShape,
 }
 
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SurfaceExtent {
+pub enum LocalSurfaceShape {
     /// A plane that extends at least up to this distance.
     Flat(f64),
     /// A sphere of this radius.
@@ -44,7 +44,7 @@ pub enum SurfaceExtent {
 
 /// A parallelogram with a corner c and edges u and v.
 #[inline]
-pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
+pub(super) fn parallelogram_polygon((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 

@@ -27,15 +27,15 @@ pub mod watertight_packet;
 pub use aabb::Aabb;
 pub use local_geometry::LocalGeometry;
 pub use ray::{Ray, RayF64};
-pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
+pub use surface::{ShapeHit, SurfacePoint, SurfaceRequest, SurfaceSample};
 
 use crate::math::lanes::Simd;
 use crate::math::{DVec2, DVec3, Vec2};
 use cone::Cone;
-use cuboid::Cuboid;
+use cuboid::OrientedBox;
 use cylinder::Cylinder;
 use disk::Disk;
-use local_geometry::{FlatPolygon, parallelogram};
+use local_geometry::{FlatPolygon, parallelogram_polygon};
 use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
@@ -54,7 +54,7 @@ pub enum Shape {
     /// An infinite plane.
     Plane(Plane),
     /// An oriented box.
-    Box(Cuboid),
+    Box(OrientedBox),
     /// A single triangle.
     Triangle(Triangle),
     /// A disk.
@@ -115,7 +115,7 @@ impl Shape {
 
     #[inline(never)]
     fn intersect_each(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
-        for lane in packet::lane_indices(met) {
+        for lane in packet::set_bit_lanes(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.set(lane, &hit);
             }
@@ -217,7 +217,7 @@ impl Shape {
     }
 
     /// Samples a point uniformly over the area of a part. `u` is uniform in [0, 1)².
-    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
         for_shape!(self, it => it.sample(part, u))
     }
 
@@ -245,12 +245,12 @@ impl Shape {
     /// Whether a point is inside, or behind a plane. `None` if the shape encloses no volume.
     #[inline]
     pub fn encloses_point(&self, point: DVec3) -> Option<bool> {
-        self.encloses_points([point]).map(|[is_inside]| is_inside)
+        self.encloses_each_point([point]).map(|[is_inside]| is_inside)
     }
 
     /// [`Shape::encloses_point`] for several points.
     #[inline]
-    pub fn encloses_points<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
+    pub fn encloses_each_point<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {
             Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
             Self::Sphere(_)
@@ -273,25 +273,25 @@ impl Shape {
 
     /// Mean curvature at a point on a part. Positive if the front is convex.
     #[inline]
-    pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
+    pub fn mean_curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
             Self::Quad(_) | Self::Plane(_) | Self::Box(_) | Self::Triangle(_) | Self::Disk(_) => 0.0,
             Self::Sphere(sphere) => 1.0 / sphere.radius,
-            Self::Cylinder(cylinder) => cylinder.curvature(part),
-            Self::Cone(cone) => cone.curvature(part, point),
+            Self::Cylinder(cylinder) => cylinder.mean_curvature(part),
+            Self::Cone(cone) => cone.mean_curvature(part, point),
             Self::Torus(torus) => torus.mean_curvature(point),
         }
     }
 
     /// Local geometry of the shape near a point, for density estimation.
     #[inline]
-    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
+    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         match self {
             Self::Quad(_) | Self::Triangle(_) => LocalGeometry::Polygons(1),
             Self::Box(_) => LocalGeometry::Polygons(6),
-            Self::Sphere(sphere) => sphere.local_geometry(point),
-            Self::Plane(plane) => plane.local_geometry(point),
-            Self::Disk(disk) => disk.local_geometry(point),
+            Self::Sphere(sphere) => sphere.geometry_near(point),
+            Self::Plane(plane) => plane.geometry_near(point),
+            Self::Disk(disk) => disk.geometry_near(point),
             Self::Cylinder(cylinder) => LocalGeometry::curved_at_distance(cylinder.distance(point)),
             Self::Cone(cone) => LocalGeometry::curved_at_distance(cone.distance(point)),
             Self::Torus(torus) => LocalGeometry::curved_at_distance(torus.distance(point)),
@@ -301,13 +301,13 @@ impl Shape {
     /// Flat polygon with the given index. `None` if the index is out of range or the shape is not made of
     /// flat polygons.
     #[inline]
-    pub fn flat_polygon(&self, number: u32) -> Option<FlatPolygon> {
+    pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         match self {
-            Self::Quad(quad) => (number < 1).then(|| parallelogram((quad.corner, quad.u, quad.v))),
+            Self::Quad(quad) => (number < 1).then(|| parallelogram_polygon((quad.corner, quad.u, quad.v))),
             Self::Triangle(triangle) => {
                 (number < 1).then(|| [triangle.a, triangle.b, triangle.c].into_iter().collect())
             }
-            Self::Box(cuboid) => (number < 6).then(|| parallelogram(cuboid.face(number))),
+            Self::Box(cuboid) => (number < 6).then(|| parallelogram_polygon(cuboid.face(number))),
             Self::Sphere(_)
             | Self::Plane(_)
             | Self::Disk(_)
@@ -320,7 +320,7 @@ impl Shape {
     /// Whether a ray that crosses the surface at a point must travel farther than `distance` before it can
     /// hit the shape again. False if unknown.
     #[inline]
-    pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
+    pub fn is_locally_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         match self {
             Self::Sphere(sphere) => sphere.radius > distance,
             Self::Box(cuboid) => cuboid.is_near_only_one_face(point, distance),
@@ -350,7 +350,7 @@ mod tests {
         [
             Shape::Sphere(Sphere { center: p, radius: 0.7 }),
             Shape::Quad(Parallelogram::new(p, DVec3::X, q)),
-            Shape::Box(Cuboid::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
+            Shape::Box(OrientedBox::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
             Shape::Triangle(Triangle { a: p, b: q, c: DVec3::Y }),
             Shape::Disk(Disk::new(p, q, 0.6)),
             Shape::Cylinder(Cylinder::new(p, q, 0.5, true)),
@@ -365,7 +365,7 @@ mod tests {
     const SIDE: u32 = 400;
 
     /// Integrates a function over the surface.
-    fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
+    fn integral(shape: &Shape, asked: impl Fn(&SurfaceSample) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
             let sum: f64 = (0..SIDE * SIDE).map(|i| asked(&shape.sample(part, grid(i)))).sum();
@@ -455,7 +455,7 @@ mod tests {
 
     #[test]
     fn distance_is_to_the_nearest_point() {
-        let distance = |shape: &Shape, point: DVec3| match shape.local_geometry(point) {
+        let distance = |shape: &Shape, point: DVec3| match shape.geometry_near(point) {
             LocalGeometry::Surface { distance, .. } => Some(distance),
             LocalGeometry::Polygons(_) => None,
         };
@@ -559,7 +559,7 @@ mod tests {
                 let (a, b) = normal.any_orthonormal_pair();
                 let along = |e: DVec3| Some((normal_at(e)? - normal_at(-e)?).dot(e) / (2.0 * step));
                 let Some(divergence) = along(a).zip(along(b)).map(|(a, b)| a + b) else { continue };
-                let curvature = shape.curvature(hit.primitive, point);
+                let curvature = shape.mean_curvature(hit.primitive, point);
                 let allowed = 0.02 * curvature.abs() + 2e-3;
                 // The finite-difference steps are too long near the tip of a cone.
                 let is_tip = matches!(shape, Shape::Cone(_)) && curvature > 6.0;

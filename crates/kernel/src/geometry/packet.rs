@@ -17,7 +17,7 @@ pub fn nonnegative_end_mask(ends: &F32x16, simd: impl Simd) -> u32 {
 }
 
 /// Lane indices of a mask's set bits.
-pub fn lane_indices(mut bits: u32) -> impl Iterator<Item = usize> {
+pub fn set_bit_lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;
         (bits != 0).then(|| {

@@ -2,7 +2,7 @@
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -48,7 +48,8 @@ impl Parallelogram {
         let accepted = ray.round_if_in_range(t)?;
         let from_corner = ray.direction * t - to_corner;
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-        (is_in_unit_interval(s) && is_in_unit_interval(t)).then(|| ShapeHit::from_t(accepted))
+        (is_in_unit_interval_with_margin(s) && is_in_unit_interval_with_margin(t))
+            .then(|| ShapeHit::from_t(accepted))
     }
 
     /// [`Parallelogram::intersect`] for a packet.
@@ -70,7 +71,7 @@ impl Parallelogram {
             let t = above[lane] / along[lane];
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
-            let is_inside = is_in_unit_interval(s) & is_in_unit_interval(r);
+            let is_inside = is_in_unit_interval_with_margin(s) & is_in_unit_interval_with_margin(r);
             let accepted = round_if_in_range(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
@@ -79,7 +80,7 @@ impl Parallelogram {
     /// Surface point at a hit.
     pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
-        SurfacePoint::from_f64(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
+        SurfacePoint::from_f64(point, normal, self.uv_at_hit(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
     /// Coordinates of a hit along the edges, in [0, 1].
@@ -116,9 +117,9 @@ impl Parallelogram {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
         let point = self.corner + self.u * f64::from(u.x) + self.v * f64::from(u.y);
-        AreaPoint { point, normal: self.normal.normalize() }
+        SurfaceSample { point, normal: self.normal.normalize() }
     }
 
     /// Centroid.
@@ -149,7 +150,7 @@ impl SurfaceF64 for Parallelogram {
 
 impl UvMapped for Parallelogram {
     #[inline(always)]
-    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
+    fn uv_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
         let [s, t] = self.hit_coordinates(ray, hit);
         Vec2::new(s as f32, t as f32).as_dvec2()
     }
@@ -157,7 +158,7 @@ impl UvMapped for Parallelogram {
 
 /// Whether an edge coordinate is in [0, 1], up to the border margin.
 #[inline(always)]
-fn is_in_unit_interval(x: f64) -> bool {
+fn is_in_unit_interval_with_margin(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)
 }
 

@@ -1,10 +1,10 @@
 //! Infinite planes in double precision.
 
-use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
-use super::surface::planar_tangents;
+use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
-use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -23,7 +23,7 @@ impl Plane {
     /// Creates a plane from a point and a nonzero normal.
     pub fn new(point: DVec3, normal: DVec3) -> Self {
         let normal = normal.normalize();
-        let (u, v) = planar_tangents(normal);
+        let (u, v) = tangents_from_normal(normal);
         Self { point, normal, u, v }
     }
 
@@ -57,7 +57,7 @@ impl Plane {
     /// Surface point at a hit. Each texture tile has an edge length of 1.
     pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
-        let uv = self.uv(ray, hit);
+        let uv = self.uv_at_hit(ray, hit);
         SurfacePoint { uv, ..SurfacePoint::from_f64(point, normal, uv.as_vec2(), self.u, self.v, reach) }
     }
 
@@ -84,8 +84,8 @@ impl Plane {
     }
 
     /// Returns the plane's reference point because an infinite area cannot be sampled uniformly.
-    pub fn sample(&self, _: u32, _: Vec2) -> AreaPoint {
-        AreaPoint { point: self.point, normal: self.normal }
+    pub fn sample(&self, _: u32, _: Vec2) -> SurfaceSample {
+        SurfaceSample { point: self.point, normal: self.normal }
     }
 
     /// The plane's reference point.
@@ -104,12 +104,12 @@ impl Plane {
     }
 
     /// Local geometry of the plane near a point, for density estimation.
-    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
+    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let distance = self.unsigned_distance(point);
         let ground = NearestSurface {
             normal: self.normal,
             height: distance,
-            extent: SurfaceExtent::Flat(f64::INFINITY),
+            extent: LocalSurfaceShape::Flat(f64::INFINITY),
         };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
@@ -141,7 +141,7 @@ impl SurfaceF64 for Plane {
 
 impl UvMapped for Plane {
     #[inline(always)]
-    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
+    fn uv_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
         DVec2::from_array(self.hit_coordinates(ray, hit))
     }
 }

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, NearestSurface, SurfaceExtent};
+use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -98,13 +98,13 @@ impl Sphere {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         let height = 1.0 - 2.0 * x;
         let across = (1.0 - height * height).max(0.0).sqrt();
         let (sin, cos) = libm::sincos(2.0 * PI * y);
         let normal = DVec3::new(across * cos, height, across * sin);
-        AreaPoint { point: self.center + normal * self.radius, normal }
+        SurfaceSample { point: self.center + normal * self.radius, normal }
     }
 
     /// Centroid.
@@ -118,10 +118,10 @@ impl Sphere {
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
-    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
+    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground =
-            NearestSurface { normal: out, height: distance, extent: SurfaceExtent::Round(self.radius) };
+            NearestSurface { normal: out, height: distance, extent: LocalSurfaceShape::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 

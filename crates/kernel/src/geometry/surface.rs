@@ -63,7 +63,7 @@ impl SurfaceRequest {
 
 /// A point on an emitting surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AreaPoint {
+pub struct SurfaceSample {
     /// The point.
     pub point: DVec3,
     /// Unit normal on the front side.
@@ -113,7 +113,7 @@ pub fn doubled_point_rounding_error(point: Vec3) -> Vec3 {
 
 /// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n. v points up on vertical
 /// surfaces, and toward −z on horizontal surfaces that face up.
-pub fn planar_tangents(n: DVec3) -> (DVec3, DVec3) {
+pub fn tangents_from_normal(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
     let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };
     let u = u.normalize();
@@ -128,11 +128,11 @@ mod tests {
     fn tangents_are_perpendicular_near_vertical() {
         for tilt in [0.0, 1e-9, 9e-7, 1.1e-6, 0.3, 1.0] {
             for n in [DVec3::new(tilt, 1.0, 0.0), DVec3::new(-tilt, -1.0, tilt)].map(DVec3::normalize) {
-                let (u, v) = planar_tangents(n);
+                let (u, v) = tangents_from_normal(n);
                 let off = [u.dot(n), v.dot(n), u.dot(v), u.length() - 1.0, u.cross(v).dot(n) - 1.0];
                 assert!(off.iter().all(|off| off.abs() < 1e-15), "{n}: {off:?}");
             }
         }
-        assert_eq!(planar_tangents(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
+        assert_eq!(tangents_from_normal(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
     }
 }

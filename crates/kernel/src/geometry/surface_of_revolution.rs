@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::surface::planar_tangents;
+use super::surface::tangents_from_normal;
 use super::{Aabb, RayF64, ShapeHit};
 use crate::math::{DMat3, DVec2, DVec3};
 
@@ -19,7 +19,7 @@ impl AxialFrame {
     /// Creates a frame from an origin and a nonzero axis.
     pub fn new(origin: DVec3, axis: DVec3) -> Self {
         let n = axis.normalize();
-        let (u, v) = planar_tangents(n);
+        let (u, v) = tangents_from_normal(n);
         Self { origin, axes: DMat3::from_cols(u, v, n) }
     }
 
@@ -62,12 +62,12 @@ impl AxialFrame {
 
     /// Bounding box of a circle around the axis at a given height.
     pub fn circle_bounds(&self, height: f64, radius: f64) -> Aabb {
-        self.swept_sphere_bounds(height, radius, 0.0)
+        self.sphere_swept_circle_bounds(height, radius, 0.0)
     }
 
     /// Bounding box of all balls with radius `ball` with centers on a circle around the axis. Expanded to
     /// account for rounding.
-    pub fn swept_sphere_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
+    pub fn sphere_swept_circle_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point_to_world(DVec3::new(0.0, 0.0, height));
         let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
         let extent = DVec3::new(across(0), across(1), across(2));
@@ -226,7 +226,7 @@ pub fn unrounded_hit_point(
 }
 
 /// Unit vector from the origin of the plane toward a point. The x axis if the point is the origin.
-pub fn radial_direction(p: DVec2) -> DVec2 {
+pub fn radial_direction_toward(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }
 

@@ -1,6 +1,6 @@
 //! Packets of surface points, with SIMD loops for the most common shapes.
 
-use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lane_indices};
+use super::packet::{HitPacket, PACKET_SIZE, RayPacket, set_bit_lanes};
 use super::surface::point_error_bound;
 use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
@@ -52,7 +52,7 @@ pub trait SurfaceF64 {
 /// A shape with a branchless texture coordinate computation.
 pub trait UvMapped {
     /// Texture coordinates at a hit.
-    fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
+    fn uv_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
 }
 
 impl Default for SurfacePacket {
@@ -76,7 +76,13 @@ impl SurfacePacket {
     /// Computes the surface points of the hits selected by `of`, which must be on the same shape. Returns
     /// false if the shape has no SIMD loop.
     #[inline(always)]
-    pub fn fill(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
+    pub fn compute_surface_points(
+        &mut self,
+        shape: &Shape,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+    ) -> bool {
         shape.try_fill_surfaces(self, rays, hits, of)
     }
 
@@ -86,7 +92,7 @@ impl SurfacePacket {
         if shape.try_fill_uvs(self, rays, hits, of) {
             return;
         }
-        for lane in lane_indices(of) {
+        for lane in set_bit_lanes(of) {
             let Some(hit) = hits.get(lane) else { continue };
             let uv = shape.surface_point(&rays.ray_f64(lane), &hit).uv;
             (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
@@ -103,7 +109,7 @@ impl SurfacePacket {
         of: u32,
     ) {
         for lane in 0..PACKET_SIZE {
-            let uv = shape.uv(&rays.ray_f64(lane), &ShapeHit::from_t(hits.t[lane]));
+            let uv = shape.uv_at_hit(&rays.ray_f64(lane), &ShapeHit::from_t(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
             self.uv[0][lane] = if is_own { uv.x } else { self.uv[0][lane] };
             self.uv[1][lane] = if is_own { uv.y } else { self.uv[1][lane] };

@@ -2,7 +2,7 @@
 
 use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
+use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
@@ -92,9 +92,9 @@ impl Triangle {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
         let w = warp::triangle(u).as_dvec3();
-        AreaPoint {
+        SurfaceSample {
             point: self.a * w.x + self.b * w.y + self.c * w.z,
             normal: self.unnormalized_normal().normalize(),
         }

@@ -303,7 +303,7 @@ impl TriangleList {
             }
         }
         let [a, b, c] = &corners;
-        let hits = ShearedPacket::new(rays).intersect_triangle_per_ray(&candidates.number, [a, b, c], ends);
+        let hits = ShearedPacket::new(rays).intersect_triangles_per_ray(&candidates.number, [a, b, c], ends);
         let (mut hit, mut undecided) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let is_any = candidates.near[i] < f32::INFINITY;

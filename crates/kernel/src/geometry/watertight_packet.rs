@@ -1,7 +1,7 @@
 //! Watertight intersection of mesh triangles with packets of rays in arbitrary directions. Performs the
 //! operations of [`ShearedRay::intersect`] in the same order, so the results are bit-identical.
 
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, lane_indices};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, set_bit_lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
 use crate::math::Vec3;
 use crate::math::float::gamma;
@@ -102,7 +102,7 @@ impl<'a> ShearedPacket<'a> {
         found: &mut HitPacket,
         simd: impl Simd,
     ) {
-        let hits = self.intersect_triangle_per_ray(&[number; PACKET_SIZE], *corners, ends);
+        let hits = self.intersect_triangles_per_ray(&[number; PACKET_SIZE], *corners, ends);
         let mut is_nearer = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // A hit at the end of a ray counts, unless an earlier triangle was hit at the same t.
@@ -129,7 +129,7 @@ impl<'a> ShearedPacket<'a> {
         ends: &F32x16,
         simd: impl Simd,
     ) -> u32 {
-        let hits = self.intersect_triangle_per_ray(&[number; PACKET_SIZE], *corners, ends);
+        let hits = self.intersect_triangles_per_ray(&[number; PACKET_SIZE], *corners, ends);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         let hit = simd.movemask(&hits.hit) & met;
         if doubtful == 0 { hit } else { hit | self.hit_mask_scalar(doubtful, corners, ends) }
@@ -145,7 +145,7 @@ impl<'a> ShearedPacket<'a> {
         ends: &mut F32x16,
         found: &mut HitPacket,
     ) {
-        for i in lane_indices(these) {
+        for i in set_bit_lanes(these) {
             let Some(hit) = self.intersect_lane(i, corners, ends[i]) else { continue };
             if found.t[i].is_nan() || hit.t < found.t[i] {
                 found.set(i, &super::ShapeHit { primitive: number, ..hit });
@@ -158,7 +158,7 @@ impl<'a> ShearedPacket<'a> {
     #[cold]
     #[inline(never)]
     fn hit_mask_scalar(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
-        lane_indices(these)
+        set_bit_lanes(these)
             .filter(|&i| self.intersect_lane(i, corners, ends[i]).is_some())
             .fold(0, |hit, i| hit | 1 << i)
     }
@@ -207,7 +207,7 @@ impl<'a> ShearedPacket<'a> {
     /// [`ShearedRay::intersect`] for a packet in which each ray has its own triangle. Rays that start on
     /// their triangle do not hit it.
     #[inline(always)]
-    pub(super) fn intersect_triangle_per_ray(
+    pub(super) fn intersect_triangles_per_ray(
         &self,
         numbers: &[u32; PACKET_SIZE],
         corners: [impl Corner; 3],

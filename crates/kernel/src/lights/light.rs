@@ -174,7 +174,9 @@ impl Light {
             LightFamily::Infinite(light) => {
                 (LightCenter::Towards(light.direction_to_center()?), LightGeometry::Nothing)
             }
-            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.scene_object()),
+            LightFamily::Area(light) => {
+                (LightCenter::At(light.area_centroid().as_vec3()), light.light_geometry())
+            }
         })
     }
 

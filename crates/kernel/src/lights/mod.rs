@@ -45,16 +45,16 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, EmissionTexture, Emitter, EmittingPart, MeshEmitter, Side, UvMapping, UvTriangle,
-    back_area_light, front_area_light, see_through_side_area_light,
+    AreaLight, EmissionTexture, Emitter, EmittingTriangleSelection, MeshEmitter, Side, TriangleWithUvs,
+    UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
 };
 pub use light::{Light, LightFamily};
 pub use packet::{LightGeometryPacket, LightSamplePacket};
 pub use photon_emission::{
-    BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
+    BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSampleCounts, LightSampler, LightSamplingEffort, LightSamplingMode, Lights};
+pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ impl LightGeometryPacket {
     /// A packet with the same source in all lanes.
     #[inline(always)]
     pub fn splat(source: LightGeometry) -> Self {
-        let (object, part) = encode_object_and_part(source);
+        let (object, part) = object_and_part_codes(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
 
@@ -69,13 +69,13 @@ impl LightGeometryPacket {
     /// Sets a lane's light source geometry.
     #[inline(always)]
     pub fn set_geometry(&mut self, lane: usize, source: LightGeometry) {
-        (self.object[lane], self.part[lane]) = encode_object_and_part(source);
+        (self.object[lane], self.part[lane]) = object_and_part_codes(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn encode_object_and_part(source: LightGeometry) -> (u32, u32) {
+fn object_and_part_codes(source: LightGeometry) -> (u32, u32) {
     match source {
         LightGeometry::Nothing => (LightGeometryPacket::NONE, LightGeometryPacket::NONE),
         LightGeometry::Object(object) => (object, LightGeometryPacket::NONE),

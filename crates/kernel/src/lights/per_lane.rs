@@ -9,7 +9,7 @@ use super::delta::DeltaLight;
 use super::packet::{LightSamplePacket, packet_of};
 use super::sample::LightGeometry;
 use super::{Light, Lights};
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
@@ -69,8 +69,8 @@ impl Lights {
                     }
                 }
                 row
-            } else if let Some(filler) = as_area_sampled_light(lights[first]) {
-                let all = gather_lights_of_kind((&lights, left), &mut of, as_area_sampled_light, filler);
+            } else if let Some(filler) = as_area_sampled_mesh_light(lights[first]) {
+                let all = gather_lights_of_kind((&lights, left), &mut of, as_area_sampled_mesh_light, filler);
                 triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
             } else {
                 of = 1 << first;
@@ -93,7 +93,7 @@ impl Lights {
         }
         // Apply the emission textures. They do not affect the pdfs.
         let mut lookups = 0;
-        for i in lane_indices(used) {
+        for i in set_bit_lanes(used) {
             let weight = lane(&row.weights, i);
             if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
                 let (target, direction) = (lane(&row.targets, i), lane(&row.directions, i));
@@ -119,7 +119,7 @@ fn as_quad_light(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
 }
 
 #[inline(always)]
-fn as_area_sampled_light(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
+fn as_area_sampled_mesh_light(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     let light = light.as_area()?;
     light.shape.as_mesh().and_then(MeshEmitter::as_area_sampled).map(|facets| (facets, light))
 }

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, EmittingPart, MeshEmitter, Side};
+use super::area::{AreaLight, EmittingTriangleSelection, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightSamplingMode {
+pub enum LightSamplingPurpose {
     /// Only direct lighting. Light sampling is the only source of noise.
     Eye,
     /// Path tracing. The image also has noise from other sources.
@@ -74,9 +74,9 @@ impl LightSamplingEffort {
 }
 
 /// Expected number of samples that each light gets at a vertex, per requested sample.
-pub struct ExpectedSampleCounts<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
+pub struct ExpectedSamplesPerLight<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
-impl ExpectedSampleCounts<'_> {
+impl ExpectedSamplesPerLight<'_> {
     /// Expected number of samples for a light.
     #[inline]
     pub fn for_light(&self, number: u32) -> f32 {
@@ -108,7 +108,7 @@ impl Lights {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
-                lights.register_area_light(number, light);
+                lights.index_light_by_object(number, light);
             } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
                 lights.suns.push((number, *sun));
             } else if let Some(light) = light.as_environment() {
@@ -135,14 +135,14 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
-    pub fn sampler_for_mode(&self, receivers: LightSamplingMode) -> Option<LightSampler<'_>> {
+    pub fn sampler_for_mode(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
-            LightSamplingMode::Eye => {
+            LightSamplingPurpose::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            LightSamplingMode::Paths => {
+            LightSamplingPurpose::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -155,15 +155,15 @@ impl Lights {
     #[inline]
     pub fn expected_sample_counts(
         &self,
-        receivers: LightSamplingMode,
+        receivers: LightSamplingPurpose,
         point: Vec3,
         normal: Vec3,
-    ) -> ExpectedSampleCounts<'_> {
+    ) -> ExpectedSamplesPerLight<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler_for_mode(receivers) else { return ExpectedSampleCounts(None) };
+        let Some(sampler) = self.sampler_for_mode(receivers) else { return ExpectedSamplesPerLight(None) };
         let mut cut = sampler.picks.new_tree_cut(sampler.tree);
         cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
-        ExpectedSampleCounts(Some((sampler, cut)))
+        ExpectedSamplesPerLight(Some((sampler, cut)))
     }
 
     /// Memory used by the trees over lights and over the triangles of mesh lights, in bytes.
@@ -177,7 +177,7 @@ impl Lights {
         trees.iter().map(|tree| tree.memory_bytes()).chain(self.all.iter().map(of_mesh)).sum()
     }
 
-    fn register_area_light(&mut self, number: u32, light: &AreaLight) {
+    fn index_light_by_object(&mut self, number: u32, light: &AreaLight) {
         let by_object = match light.side {
             Side::Front => &mut self.by_object,
             Side::Back => &mut self.by_back,
@@ -193,11 +193,16 @@ impl Lights {
             }
         };
         match light.part {
-            EmittingPart::Whole => {
+            EmittingTriangleSelection::Whole => {
                 by_object.insert(light.object, ObjectLights::Whole(number));
             }
-            EmittingPart::Listed => {
-                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(index_light);
+            EmittingTriangleSelection::Listed => {
+                light
+                    .shape
+                    .as_mesh()
+                    .into_iter()
+                    .flat_map(MeshEmitter::primitive_indices)
+                    .for_each(index_light);
             }
         }
     }
@@ -250,11 +255,11 @@ impl Lights {
     /// its light-sampling pdf in sr⁻¹.
     pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
-        self.radiance_from_infinity_with_sky(sky, direction, share)
+        self.radiance_from_infinity_with_precomputed_sky(sky, direction, share)
     }
 
     /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::radiance_and_pdf`].
-    pub fn radiance_from_infinity_with_sky(
+    pub fn radiance_from_infinity_with_precomputed_sky(
         &self,
         sky: Option<(Vec3, f32)>,
         direction: Vec3,
@@ -275,7 +280,7 @@ impl Lights {
 
     /// The light on one side of an object's primitive, and its index.
     #[inline]
-    pub fn light_at(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
+    pub fn light_on_primitive(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
         let by_object = match side {
             Side::Front => &self.by_object,
             Side::Back => &self.by_back,

@@ -3,7 +3,7 @@
 use super::*;
 use crate::control::CancelToken;
 use crate::geometry::cone::Cone;
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -26,7 +26,7 @@ fn shapes() -> Vec<Shape> {
         Shape::Quad(Parallelogram::new(p, DVec3::X, DVec3::new(0.0, 1.0, -0.5))),
         Shape::Quad(Parallelogram::new(p, DVec3::X * 0.01, DVec3::Y * 0.01)),
         Shape::Quad(Parallelogram::new(p, DVec3::X, q)),
-        Shape::Box(Cuboid::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
+        Shape::Box(OrientedBox::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
         Shape::Triangle(Triangle { a: p, b: q, c: DVec3::Y }),
         Shape::Disk(Disk::new(p, q, 0.6)),
         Shape::Cylinder(Cylinder::new(p, q, 0.5, true)),
@@ -160,8 +160,9 @@ fn sample_pdf_equals_pdf_of_hit() {
                         hidden += 1;
                         continue;
                     }
-                    let (found, light_at) =
-                        lights.light_at(OBJECT, hit.primitive, Side::Front).expect("expected a light");
+                    let (found, light_at) = lights
+                        .light_on_primitive(OBJECT, hit.primitive, Side::Front)
+                        .expect("expected a light");
                     assert_eq!(found, number, "{shape:?}");
                     let product = light_at.pdf(from, Vec3::Y, &light_hit) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
@@ -204,7 +205,9 @@ fn two_sided_samples_cover_the_visible_shape() {
                 let direction = around.direction(i, n);
                 let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
                 let side = if light_hit.normal.dot(direction) < 0.0 { Side::Front } else { Side::Back };
-                let Some((_, light)) = lights.light_at(OBJECT, hit.primitive, side) else { continue };
+                let Some((_, light)) = lights.light_on_primitive(OBJECT, hit.primitive, side) else {
+                    continue;
+                };
                 let part = f64::from(around.solid_angle()) / f64::from(n);
                 seen += part;
                 sum += if light.pdf(from, Vec3::Y, &light_hit) > 0.0 { part } else { 0.0 };
@@ -268,7 +271,8 @@ fn pdfs_integrate_to_one_over_the_light() {
             for i in 0..n {
                 let direction = cone.direction(i, n);
                 let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
-                let Some((number, light)) = lights.light_at(OBJECT, hit.primitive, Side::Front) else {
+                let Some((number, light)) = lights.light_on_primitive(OBJECT, hit.primitive, Side::Front)
+                else {
                     continue;
                 };
                 sums[number as usize] +=
@@ -327,22 +331,23 @@ fn mesh_triangles_map_to_their_lights() {
             radiance: Vec3::splat(radiance),
             texture: None,
             object: 3,
-            part: EmittingPart::Listed,
+            part: EmittingTriangleSelection::Listed,
             side: Side::Front,
         })
     };
     let lights =
         Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)], &CancelToken::new())
             .expect("never canceled");
-    let light_at =
-        |object, primitive| lights.light_at(object, primitive, Side::Front).map(|(number, _)| number);
+    let light_at = |object, primitive| {
+        lights.light_on_primitive(object, primitive, Side::Front).map(|(number, _)| number)
+    };
     assert_eq!(
         [0, 1, 2, 3, 4, 5].map(|triangle| light_at(3, triangle)),
         [Some(0), None, Some(2), None, Some(0), None]
     );
     assert_eq!(light_at(4, 0), None);
     let light_hit = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
-    let (_, light) = lights.light_at(3, 2, Side::Front).expect("a light");
+    let (_, light) = lights.light_on_primitive(3, 2, Side::Front).expect("a light");
     // d²/(A·cos) = 4/½.
     assert!((light.pdf(Vec3::ZERO, Vec3::Z, &light_hit) - 8.0).abs() < 1e-5);
     assert_eq!(
@@ -359,7 +364,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("never canceled").expect("an area");
     let bounds = mesh.light_bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    let (side, part) = (Side::Front, EmittingPart::Listed);
+    let (side, part) = (Side::Front, EmittingTriangleSelection::Listed);
     AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }
 }
 

@@ -7,7 +7,7 @@ use super::tests::light_hit;
 use super::*;
 use crate::geometry::Shape;
 use crate::geometry::cone::Cone;
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -75,7 +75,7 @@ fn named_light_shapes(gap: f64) -> Vec<(&'static str, Shape)> {
             Shape::Triangle(Triangle { a: at(-0.3, 0.0), b: at(0.6, 0.1), c: at(0.0, 0.4) - DVec3::Z }),
         ),
         ("quad", Shape::Quad(Parallelogram::new(at(-0.3, 0.0) - DVec3::Z * 0.4, DVec3::X, DVec3::Z))),
-        ("box", Shape::Box(Cuboid::new(at(0.1, 0.5), DVec3::new(1.0, 1.0, 0.6), DVec3::ZERO))),
+        ("box", Shape::Box(OrientedBox::new(at(0.1, 0.5), DVec3::new(1.0, 1.0, 0.6), DVec3::ZERO))),
     ]
 }
 
@@ -370,7 +370,7 @@ fn irradiance_matches_closed_forms() {
         let half = Triangle { a: at(0.0, 0.0), b: at(1.0, 0.0), c: at(1.0, 1.0) };
         assert_irradiance(&Shape::Triangle(half), 0.5 * exact, error);
         let center = DVec3::Y * (height + 0.5);
-        assert_irradiance(&Shape::Box(Cuboid::new(center, DVec3::ONE, DVec3::ZERO)), exact, error);
+        assert_irradiance(&Shape::Box(OrientedBox::new(center, DVec3::ONE, DVec3::ZERO)), exact, error);
     }
     // The irradiance from a distant convex body is its radiance times its projected area: 2·R·h for a
     // cylinder seen from the side, and R·h for a cone.

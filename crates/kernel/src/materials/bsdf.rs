@@ -9,7 +9,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::lookup::ParameterLookup;
-use super::texture::ColorParameter;
+use super::texture::ColorOrTexture;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Vec3x16};
 
@@ -167,7 +167,7 @@ pub trait BxdfMaterial {
 
     /// The color that can be looked up for packets and set with
     /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color). `None` if there is no such color.
-    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
+    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
         None
     }
 

@@ -71,7 +71,7 @@ impl LobeValue {
 
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceDirections {
+pub struct ShadingGeometry {
     /// Unit shading normal on the lit side, rotated by [`facing_normal`]. Except for transmitted light, this
     /// is the side of the viewer.
     pub normal: Vec3,
@@ -131,7 +131,7 @@ pub trait Bxdf: Soa + Default {
     }
 
     /// Computes the values that depend on the view direction. `any` are the flags of the packet.
-    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> Self::View;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, any: BxdfFlags) -> Self::View;
 
     /// Value of the wide lobes.
     #[inline(always)]
@@ -172,22 +172,22 @@ pub trait Bxdf: Soa + Default {
     /// Exponent of the narrow lobe if it is approximated as a power of a cosine. Light samples are
     /// inefficient for large exponents. 0 for kinds whose narrow lobes send rays.
     #[inline(always)]
-    fn exponent(&self) -> f32 {
+    fn narrow_lobe_exponent(&self) -> f32 {
         0.0
     }
 }
 
 /// Chooses one of two vectors without a branch.
 #[inline(always)]
-pub(super) fn select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
+pub(super) fn branchless_select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
     let pick = |yes: f32, no: f32| if condition { yes } else { no };
     Vec3::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
 }
 
 /// Computes the lobes' shading normal from a normal on the lit side and the direction to the viewer.
 #[inline(always)]
-pub fn facing_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
-    use super::microfacet::rotate_single_toward_viewer as turn;
+pub fn lobe_shading_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
+    use super::microfacet::rotate_single_normal_to_viewer as turn;
     match (B::TURNS_NORMALS, B::IS_TRANSMISSION) {
         (false, _) => normal,
         (true, false) => turn(normal, wo),

@@ -1,7 +1,7 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
 use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes, UvPacket};
-use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
+use super::bxdf::{Bxdf, BxdfFlags, ShadingGeometry};
 use super::microfacet::rotate_normal_to_viewer;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
@@ -64,7 +64,7 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
 
 /// Flags in which the compiler knows the value of [`BxdfFlags::NARROW`], so it can remove code from loops.
 #[inline(always)]
-fn specialize_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
+fn with_known_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
     if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
 }
 
@@ -77,13 +77,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Sets a surface.
     #[inline(always)]
-    pub fn set_bsdf(
-        &mut self,
-        i: usize,
-        point: &B::Point,
-        shown: LobeFilter,
-        directions: &SurfaceDirections,
-    ) {
+    pub fn set_bsdf(&mut self, i: usize, point: &B::Point, shown: LobeFilter, directions: &ShadingGeometry) {
         let bsdf = B::new(point, directions.tangent);
         self.any = self.any.union(bsdf.flags());
         self.shows_all &= shown == LobeFilter::ALL;
@@ -158,7 +152,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         let mut view = B::View::default().splat();
         for i in 0..PACKET_SIZE {
             let (normal, wo) = (lane(normals, i), -lane(directions, i));
-            let directions = SurfaceDirections { normal, wo, tangent: Vec3::X };
+            let directions = ShadingGeometry { normal, wo, tangent: Vec3::X };
             B::get(&self.bsdf, i).compute_view_terms(&directions, self.any).set(&mut view, i);
         }
         match of {
@@ -169,13 +163,13 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Whether any surface may have a narrow lobe. If not, [`BxdfPacket::sample`] ignores `choices`.
     #[inline(always)]
-    pub fn has_narrow_lobes(&self) -> bool {
+    pub fn any_has_narrow_lobe(&self) -> bool {
         B::ALWAYS.contains(BxdfFlags::NARROW) || self.any.contains(BxdfFlags::NARROW)
     }
 
     /// Whether any surface may have wide lobes.
     #[inline(always)]
-    pub fn has_wide_lobes(&self) -> bool {
+    pub fn any_has_wide_lobe(&self) -> bool {
         B::ALWAYS.contains(BxdfFlags::WIDE) || self.any.contains(BxdfFlags::WIDE)
     }
 
@@ -183,7 +177,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub fn f(&self, wi: &Vec3x16) -> BsdfValues {
         let mut values = BsdfValues::ZERO;
-        if self.has_wide_lobes() {
+        if self.any_has_wide_lobe() {
             for i in 0..PACKET_SIZE {
                 let bsdf = B::get(&self.bsdf, i);
                 let value = bsdf.wide_lobe_value(&B::View::get(&self.view, i), lane(wi, i), self.any);
@@ -191,7 +185,7 @@ impl<B: Bxdf> BxdfPacket<B> {
                 values.max[i] = value.max;
             }
         }
-        if self.has_narrow_lobes() {
+        if self.any_has_narrow_lobe() {
             if self.any.contains(B::SPLITS_NARROW) {
                 self.add_narrow_lobes(wi, &mut values, self.any.union(B::SPLITS_NARROW));
             } else {
@@ -226,7 +220,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// the result of [`BxdfPacket::f`].
     #[inline(always)]
     pub fn pdf(&self, lobes: SampledLobes, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
-        if self.has_narrow_lobes() {
+        if self.any_has_narrow_lobe() {
             self.pdf_specialized_by_narrow_flag::<true>(lobes, normals, wi, values)
         } else {
             self.pdf_specialized_by_narrow_flag::<false>(lobes, normals, wi, values)
@@ -241,7 +235,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         wi: &Vec3x16,
         values: &BsdfValues,
     ) -> F32x16 {
-        let any = specialize_narrow_flag::<NARROW>(self.any);
+        let any = with_known_narrow_flag::<NARROW>(self.any);
         let mut pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -261,7 +255,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
-        if self.has_narrow_lobes() {
+        if self.any_has_narrow_lobe() {
             self.sample_lanes::<true>(lobes, normals, choices, u)
         } else {
             self.sample_lanes::<false>(lobes, normals, choices, u)
@@ -276,7 +270,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
-        let any = specialize_narrow_flag::<NARROW>(self.any);
+        let any = with_known_narrow_flag::<NARROW>(self.any);
         let mut wi = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -318,7 +312,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     pub fn mask_narrower_than(&self, of: u32, exponent: f32) -> u32 {
         let mut narrow = 0;
         for i in 0..PACKET_SIZE {
-            narrow |= u32::from(B::get(&self.bsdf, i).exponent() >= exponent) << i;
+            narrow |= u32::from(B::get(&self.bsdf, i).narrow_lobe_exponent() >= exponent) << i;
         }
         narrow & self.narrow_lobe_mask() & of
     }
@@ -382,7 +376,7 @@ impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
 impl<B: Bxdf> BxdfPacket<B> {
     /// [`BxdfPacket::f`].
     #[inline(always)]
-    pub(super) fn dispatch_f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
+    pub(super) fn f_out_of_line(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
         if B::IS_INLINED { self.f(wi) } else { simd.call_out_of_line(EvaluationKernel { packet: self, wi }) }
     }
 
@@ -405,7 +399,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// [`BxdfPacket::sample`].
     #[inline(always)]
-    pub(super) fn dispatch_sample(
+    pub(super) fn sample_outlined(
         &self,
         lobes: SampledLobes,
         normals: &Vec3x16,
@@ -424,7 +418,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
     /// [`BxdfPacket::sample_either_side`].
     #[inline(always)]
-    pub(super) fn dispatch_sample_either_side(
+    pub(super) fn sample_either_side_outlined(
         &self,
         choices: &F32x16,
         u: &[F32x16; 2],

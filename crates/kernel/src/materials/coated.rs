@@ -6,14 +6,14 @@ use std::sync::Arc;
 use super::bxdfs::NonSpecular;
 use super::footprint::TexturePoint;
 use super::fresnel::dielectric;
-use super::texture::{ColorParameter, Texture};
+use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
 /// A smooth dielectric coat over a base. The base's lobes already account for the coat's transmittance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
     /// Factor applied to the coat's reflection.
-    pub specular: ColorParameter,
+    pub specular: ColorOrTexture,
     /// Index of refraction of the coat. At least 1.
     pub ior: f32,
     /// The surface under the coat.

@@ -50,7 +50,7 @@ impl Dielectric {
 
     /// Transmittance over `distance` inside the shape (Beer–Lambert law).
     #[inline]
-    pub fn transmittance(&self, distance: f32) -> Vec3 {
+    pub fn interior_transmittance(&self, distance: f32) -> Vec3 {
         if self.density == Vec3::ZERO {
             Vec3::ONE
         } else {
@@ -66,8 +66,8 @@ mod tests {
     #[test]
     fn absorption_is_multiplicative_over_distance() {
         let glass = Dielectric::new(1.5, DVec3::new(0.5, 1.0, 0.0));
-        assert_eq!(glass.transmittance(0.0), Vec3::ONE);
-        assert!((glass.transmittance(2.0) - Vec3::new(0.25, 1.0, 0.0)).length() < 1e-6);
+        assert_eq!(glass.interior_transmittance(0.0), Vec3::ONE);
+        assert!((glass.interior_transmittance(2.0) - Vec3::new(0.25, 1.0, 0.0)).length() < 1e-6);
     }
 
     #[test]
@@ -76,7 +76,7 @@ mod tests {
         for thickness in [0.01, 1.0, 1e3, 1e6, 1e9] {
             let part = |through: f64| libm::exp(libm::log(through) / thickness);
             let tint = DVec3::new(part(through.x), part(through.y), part(through.z));
-            let found = Dielectric::new(1.5, tint).transmittance(thickness as f32).as_dvec3();
+            let found = Dielectric::new(1.5, tint).interior_transmittance(thickness as f32).as_dvec3();
             assert!((found - through).abs().max_element() < 2e-6, "{thickness}: {found}");
         }
     }

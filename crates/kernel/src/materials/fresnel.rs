@@ -23,20 +23,24 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
 /// [`dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
 pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
-    dielectric_from_cos2(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
+    dielectric_from_transmitted_cos2(
+        cos_incident,
+        eta,
+        (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident,
+    )
 }
 
 /// [`dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
 #[inline(always)]
 pub fn dielectric_from_either_side(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
-    dielectric_from_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
+    dielectric_from_transmitted_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
 /// Computes the reflectance of a dielectric boundary from η² times the squared cosine of the transmitted
 /// direction.
 #[inline(always)]
-fn dielectric_from_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
+fn dielectric_from_transmitted_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
     // Both cosines are multiplied by η. The `max` avoids 0/0 at grazing angles for η = 1.

@@ -21,18 +21,18 @@ const TABLE_SIZE: usize = 80;
 
 /// The directional albedo of one lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LobeAlbedo {
+pub struct LobeAlbedoPolynomial {
     /// Coefficients of the powers of 2t − 1.
     pub terms: [f32; TERMS],
     /// The cosine-weighted mean over all directions, 2 ∫ E(μ) μ dμ.
     pub mean: f32,
 }
 
-impl LobeAlbedo {
+impl LobeAlbedoPolynomial {
     /// Evaluates the albedo at μ ≥ 0.
     #[inline]
-    pub fn evaluate(&self, cosine: f32) -> f32 {
-        evaluate_polynomial(cosine, |number| self.terms[number])
+    pub fn at_cosine(&self, cosine: f32) -> f32 {
+        evaluate_albedo_fit(cosine, |number| self.terms[number])
     }
 
     /// Computes the albedo of a lobe with an isotropic α. `reflectance` maps a cosine to the reflectance of a
@@ -76,8 +76,8 @@ impl LobeAlbedo {
             .filter(|(cosine, _)| *cosine > 0.03)
             .map(|(cosine, value)| value - chebyshev_sum(&terms, *cosine));
         terms[0] += missing.fold(0.0, f64::max);
-        let fit = Self { terms: to_power_basis(&terms).map(|term| term as f32), mean: 0.0 };
-        Self { mean: cosine_weighted_mean(|cosine| fit.evaluate(cosine as f32).into()) as f32, ..fit }
+        let fit = Self { terms: chebyshev_to_power_basis(&terms).map(|term| term as f32), mean: 0.0 };
+        Self { mean: cosine_weighted_mean(|cosine| fit.at_cosine(cosine as f32).into()) as f32, ..fit }
     }
 
     /// Interpolates linearly between two albedos.
@@ -94,13 +94,14 @@ impl LobeAlbedo {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlbedoTable {
     /// Albedos at evenly spaced roughness values from 0 to 1, or a single albedo.
-    rows: Vec<LobeAlbedo>,
+    rows: Vec<LobeAlbedoPolynomial>,
 }
 
 impl AlbedoTable {
     /// A table for lobes with α = `alpha(roughness)`. It has a single entry if the roughness is constant.
     pub fn new(roughness: Option<f32>, alpha: impl Fn(f32) -> f32, reflectance: impl Fn(f64) -> f64) -> Self {
-        let row = |roughness: f32| LobeAlbedo::for_microfacet_lobe(alpha(roughness).into(), &reflectance);
+        let row =
+            |roughness: f32| LobeAlbedoPolynomial::for_microfacet_lobe(alpha(roughness).into(), &reflectance);
         let rows = match roughness {
             Some(one) => vec![row(one)],
             None => (0..TABLE_SIZE).map(|i| row(i as f32 / (TABLE_SIZE - 1) as f32)).collect(),
@@ -109,12 +110,12 @@ impl AlbedoTable {
     }
 
     /// A table with a single entry.
-    pub fn from_single_albedo(albedo: LobeAlbedo) -> Self {
+    pub fn from_single_albedo(albedo: LobeAlbedoPolynomial) -> Self {
         Self { rows: vec![albedo] }
     }
 
     /// The albedo for a given roughness in [0, 1].
-    pub fn lookup(&self, roughness: f32) -> LobeAlbedo {
+    pub fn lobe_at_roughness(&self, roughness: f32) -> LobeAlbedoPolynomial {
         let place = roughness.clamp(0.0, 1.0) * (self.rows.len() - 1) as f32;
         let number = (place as usize).min(self.rows.len().saturating_sub(2));
         let next = self.rows.get(number + 1).unwrap_or(&self.rows[number]);
@@ -124,7 +125,7 @@ impl AlbedoTable {
 
 /// Evaluates the albedo at μ ≥ 0. A function returns the coefficients.
 #[inline(always)]
-pub fn evaluate_polynomial(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
+pub fn evaluate_albedo_fit(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
     let x = 2.0 * t - 1.0;
     let mut sum = term(TERMS - 1);
@@ -186,7 +187,7 @@ fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
 }
 
 /// Converts Chebyshev coefficients to power-basis coefficients.
-fn to_power_basis(terms: &[f64; TERMS]) -> [f64; TERMS] {
+fn chebyshev_to_power_basis(terms: &[f64; TERMS]) -> [f64; TERMS] {
     let (mut before, mut own) = ([0.0; TERMS], [0.0; TERMS]);
     (before[0], own[1]) = (1.0, 1.0);
     let mut sums = [0.0; TERMS];
@@ -226,7 +227,7 @@ fn gauss_legendre(count: usize) -> impl Iterator<Item = (f64, f64)> {
 
 /// The facets that are visible from a direction, parameterized by a point (x, b) on the unit disk. The x axis
 /// is perpendicular to the plane of incidence, and the b axis is in this plane.
-struct VisibleFacets {
+struct VisibleNormalDistribution {
     alpha: f64,
     to_eye: DVec3,
     /// The stretched view direction, and the direction of the b axis.
@@ -236,7 +237,7 @@ struct VisibleFacets {
     masked: f64,
 }
 
-impl VisibleFacets {
+impl VisibleNormalDistribution {
     fn new(cosine: f64, alpha: f64) -> Self {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let view = DVec3::new(alpha * sine, 0.0, cosine).normalize();
@@ -246,7 +247,7 @@ impl VisibleFacets {
 
     /// Cosine between a facet and the view direction, and cosine between the reflected direction and the
     /// surface normal.
-    fn reflection_cosines(&self, x: f64, b: f64) -> [f64; 2] {
+    fn facet_and_reflected_cosines(&self, x: f64, b: f64) -> [f64; 2] {
         let Self { alpha, to_eye, view, second, .. } = self;
         let part = 0.5 * (1.0 + view.z);
         let y = (1.0 - part) * (1.0 - x * x).sqrt() + part * b;
@@ -259,23 +260,23 @@ impl VisibleFacets {
 
     /// Height of the reflected direction for a point on the chord at x. `part` is the point's position
     /// relative to the chord's center, in units of half the chord's length.
-    fn reflected_height(&self, x: f64, part: f64) -> f64 {
-        self.reflection_cosines(x, (1.0 - x * x).sqrt() * part)[1]
+    fn reflected_direction_height(&self, x: f64, part: f64) -> f64 {
+        self.facet_and_reflected_cosines(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
     /// A point on the chord at x whose facet reflects light above the surface. `None` if there is no such
     /// point.
-    fn find_any_lit_point(&self, x: f64) -> Option<f64> {
+    fn find_upward_reflecting_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
-        let heights = parts.map(|part| (part, self.reflected_height(x, part)));
+        let heights = parts.map(|part| (part, self.reflected_direction_height(x, part)));
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
     /// The ends of the interval around `lit` on the chord in which facets reflect light above the surface.
     /// Both are relative to the chord's center, in units of half the chord's length.
     fn lit_interval(&self, x: f64, lit: f64) -> [f64; 2] {
-        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.reflected_height(x, part) > 0.0))
+        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.reflected_direction_height(x, part) > 0.0))
     }
 }
 
@@ -311,17 +312,19 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     alpha: f64,
     reflectance: &impl Fn(f64) -> f64,
 ) -> f64 {
-    let facets = VisibleFacets::new(cosine, alpha);
+    let facets = VisibleNormalDistribution::new(cosine, alpha);
     // Half of the disk is enough because the integrand is symmetric.
-    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.find_any_lit_point(libm::sin(turn)).is_some());
+    let widest =
+        last_true(0.0, 0.25 * TAU, |turn| facets.find_upward_reflecting_point(libm::sin(turn)).is_some());
     let along = quadrature_dense_at_ends(ALONG);
     let mut sum = 0.0;
     for (turn, by_turn) in quadrature_dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
-        let Some(lit) = facets.find_any_lit_point(x) else { continue };
+        let Some(lit) = facets.find_upward_reflecting_point(x) else { continue };
         let [from, to] = facets.lit_interval(x, lit);
         for &(part, by_part) in &along {
-            let [between, mirrored] = facets.reflection_cosines(x, chord * (from + (to - from) * part));
+            let [between, mirrored] =
+                facets.facet_and_reflected_cosines(x, chord * (from + (to - from) * part));
             let left =
                 (1.0 + facets.masked) / (1.0 + facets.masked + smith_lambda(mirrored.max(1e-12), alpha));
             let area = widest * by_turn * chord * chord * (to - from) * by_part;
@@ -359,11 +362,11 @@ mod tests {
         for (reflectance, eta) in exact.into_iter().chain([(grazing, 0.0), (normal, 0.0)]) {
             let reflectance = |cosine: f64| reflectance(cosine, eta);
             for alpha in [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0] {
-                let fit = LobeAlbedo::for_microfacet_lobe(alpha, reflectance);
+                let fit = LobeAlbedoPolynomial::for_microfacet_lobe(alpha, reflectance);
                 for step in (5..=100_u32).step_by(5) {
                     let cosine = f64::from(step) / 100.0;
                     let exact = integrate_albedo::<24, 48>(cosine, alpha, &reflectance);
-                    let missing = f64::from(fit.evaluate(cosine as f32)) - exact;
+                    let missing = f64::from(fit.at_cosine(cosine as f32)) - exact;
                     assert!((-1e-4..8e-4).contains(&missing), "η {eta}, α {alpha}, μ {cosine}: {missing}");
                 }
             }
@@ -374,13 +377,13 @@ mod tests {
     /// separately.
     fn plain_quadrature(cosine: f64, alpha: f64, reflectance: impl Fn(f64) -> f64) -> f64 {
         const STEPS: i32 = 600;
-        let facets = VisibleFacets::new(cosine, alpha);
+        let facets = VisibleNormalDistribution::new(cosine, alpha);
         let place = |i: i32| (f64::from(i) + 0.5) / f64::from(STEPS);
         let (mut sum, count) = (0.0, f64::from(STEPS * STEPS));
         for i in 0..STEPS * STEPS {
             let (radius, turn) = (place(i / STEPS).sqrt(), TAU * place(i % STEPS));
             let (sin, cos) = libm::sincos(turn);
-            let [between, mirrored] = facets.reflection_cosines(radius * cos, radius * sin);
+            let [between, mirrored] = facets.facet_and_reflected_cosines(radius * cos, radius * sin);
             if mirrored > 0.0 {
                 let left = (1.0 + facets.masked) / (1.0 + facets.masked + smith_lambda(mirrored, alpha));
                 sum += reflectance(between) * left;
@@ -408,9 +411,10 @@ mod tests {
     #[test]
     fn smooth_lobes_match_fresnel() {
         // The expected mean is 2 ∫ F(μ) μ dμ for η = 1.5.
-        let smooth = LobeAlbedo::fit_with_exact_mean(|cosine| dielectric_reflectance(cosine, 1.5));
+        let smooth = LobeAlbedoPolynomial::fit_with_exact_mean(|cosine| dielectric_reflectance(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
-        let narrow = LobeAlbedo::for_microfacet_lobe(0.001, |cosine| dielectric_reflectance(cosine, 1.5));
+        let narrow =
+            LobeAlbedoPolynomial::for_microfacet_lobe(0.001, |cosine| dielectric_reflectance(cosine, 1.5));
         assert!((narrow.mean - smooth.mean).abs() < 1e-3, "{}", narrow.mean);
     }
 
@@ -420,11 +424,11 @@ mod tests {
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
         let table = AlbedoTable::new(None, alpha, fresnel);
         for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {
-            let single = AlbedoTable::new(Some(roughness), alpha, fresnel).lookup(roughness);
-            let lerp = table.lookup(roughness);
+            let single = AlbedoTable::new(Some(roughness), alpha, fresnel).lobe_at_roughness(roughness);
+            let lerp = table.lobe_at_roughness(roughness);
             assert!((lerp.mean - single.mean).abs() < 5e-4);
             for cosine in [0.05, 0.1, 0.3, 0.6, 1.0] {
-                let (one, other) = (lerp.evaluate(cosine), single.evaluate(cosine));
+                let (one, other) = (lerp.at_cosine(cosine), single.at_cosine(cosine));
                 assert!(
                     (one - other).abs() < 2e-3,
                     "roughness {roughness}, μ {cosine}: {one} instead of {other}"

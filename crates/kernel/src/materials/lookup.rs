@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use super::footprint::TexturePoint;
 use super::scalar::ScalarParameter;
-use super::texture::{ColorParameter, Texture};
+use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
 /// A source of parameter values for materials that live for `'m`.
 pub trait ParameterLookup<'m> {
     /// The value of a color.
-    fn color(&mut self, color: &'m ColorParameter) -> Vec3;
+    fn color(&mut self, color: &'m ColorOrTexture) -> Vec3;
 
     /// The value of a number.
     fn number(&mut self, number: &'m ScalarParameter) -> f32;
@@ -26,7 +26,7 @@ pub trait ParameterLookup<'m> {
 
     /// The value of a color that is used only for ambient light.
     #[inline(always)]
-    fn ambient(&mut self, color: &'m ColorParameter) -> Vec3 {
+    fn ambient(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.color(color)
     }
 }
@@ -41,7 +41,7 @@ pub struct PointLookup<'a> {
 
 impl ParameterLookup<'_> for PointLookup<'_> {
     #[inline(always)]
-    fn color(&mut self, color: &ColorParameter) -> Vec3 {
+    fn color(&mut self, color: &ColorOrTexture) -> Vec3 {
         color.evaluate(self.point, self.lookups)
     }
 
@@ -56,7 +56,7 @@ pub struct WhiteLookup;
 
 impl ParameterLookup<'_> for WhiteLookup {
     #[inline(always)]
-    fn color(&mut self, color: &ColorParameter) -> Vec3 {
+    fn color(&mut self, color: &ColorOrTexture) -> Vec3 {
         color.as_constant().unwrap_or(Vec3::ONE)
     }
 
@@ -73,15 +73,15 @@ impl ParameterLookup<'_> for WhiteLookup {
 
 /// Collects a material's textures. The values are those of [`WhiteLookup`].
 #[derive(Default)]
-pub struct TextureCollector<'m> {
+pub struct MaterialTextureCollector<'m> {
     /// Textures of parameters that affect how the surface scatters light.
     pub scattering: Vec<&'m Arc<Texture>>,
     /// Textures that are used only for ambient light.
     pub ambient: Vec<&'m Arc<Texture>>,
 }
 
-impl<'m> ParameterLookup<'m> for TextureCollector<'m> {
-    fn color(&mut self, color: &'m ColorParameter) -> Vec3 {
+impl<'m> ParameterLookup<'m> for MaterialTextureCollector<'m> {
+    fn color(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.scattering.extend(color.texture());
         WhiteLookup.color(color)
     }
@@ -96,7 +96,7 @@ impl<'m> ParameterLookup<'m> for TextureCollector<'m> {
         WhiteLookup.number_neutral_at_zero(number)
     }
 
-    fn ambient(&mut self, color: &'m ColorParameter) -> Vec3 {
+    fn ambient(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.ambient.extend(color.texture());
         WhiteLookup.color(color)
     }

@@ -45,13 +45,13 @@ pub fn rotate_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
 
 /// [`rotate_normal_to_viewer`] for a single normal. Optimized for normals that do not need rotation.
 #[inline(always)]
-pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn rotate_single_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_normal_to_viewer(normal, to_eye) } else { normal }
 }
 
 /// The unnormalized half vector of two unit directions.
 #[derive(Clone, Copy)]
-pub struct HalfVector {
+pub struct UnnormalizedHalfVector {
     /// Squared length. For a reflection, this is (2 cosθ)², where θ is the angle between the half vector and
     /// either direction.
     pub squared: f32,
@@ -61,7 +61,7 @@ pub struct HalfVector {
     pub across: Vec3,
 }
 
-impl HalfVector {
+impl UnnormalizedHalfVector {
     /// The half vector of a reflection.
     #[inline(always)]
     pub fn from_reflection(normal: Vec3, one: Vec3, other: Vec3) -> Self {
@@ -91,22 +91,22 @@ impl HalfVector {
 
     /// Isotropic D in sr⁻¹.
     #[inline(always)]
-    pub fn isotropic_ggx(&self, alpha: f32) -> f32 {
+    pub fn evaluate_isotropic_ggx(&self, alpha: f32) -> f32 {
         let squared = alpha * alpha;
-        self.ggx_from_stretched(self.across.length_squared() / squared, squared)
+        self.ggx_ndf_from_stretched(self.across.length_squared() / squared, squared)
     }
 
     /// Anisotropic D in sr⁻¹, with a separate α along each tangent of a frame.
     #[inline(always)]
-    pub fn anisotropic_ggx(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
+    pub fn anisotropic_ggx_d(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
-        self.ggx_from_stretched(x * x + y * y, u * v)
+        self.ggx_ndf_from_stretched(x * x + y * y, u * v)
     }
 
     /// Computes D from two values: the squared perpendicular component divided by α², and the product of both
     /// α values.
     #[inline(always)]
-    fn ggx_from_stretched(&self, stretched: f32, product: f32) -> f32 {
+    fn ggx_ndf_from_stretched(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
         self.squared * self.squared * FRAC_1_PI / (product * slope * slope)
     }
@@ -147,7 +147,7 @@ impl SmithTerms {
 
     /// Computes D·G/(4 cosθᵢ cosθₒ) in sr⁻¹ from D. 0 if either direction is below the surface.
     #[inline(always)]
-    pub fn reflection_term(&self, other: &Self, distribution: f32) -> f32 {
+    pub fn torrance_sparrow_without_fresnel(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
         if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
     }
@@ -155,7 +155,7 @@ impl SmithTerms {
     /// Computes the pdf in sr⁻¹ of a direction from D. The direction is sampled by [`sample_reflection`] for
     /// this view direction.
     #[inline(always)]
-    pub fn pdf(&self, distribution: f32) -> f32 {
+    pub fn reflection_pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
         if self.is_above_surface() { pdf } else { 0.0 }
     }

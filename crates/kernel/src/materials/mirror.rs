@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use super::conductor::ConductorFresnel;
 use super::footprint::TexturePoint;
-use super::lookup::{ParameterLookup, PointLookup, TextureCollector, WhiteLookup};
-use super::texture::{ColorParameter, Texture};
+use super::lookup::{MaterialTextureCollector, ParameterLookup, PointLookup, WhiteLookup};
+use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
 /// A perfect mirror.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mirror {
     /// The same reflectance at all angles.
-    Constant(ColorParameter),
+    Constant(ColorOrTexture),
     /// A smooth conductor.
     Conductor(ConductorFresnel),
 }
@@ -41,7 +41,7 @@ impl Mirror {
 
     /// All textures of the mirror.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let mut textures = TextureCollector::default();
+        let mut textures = MaterialTextureCollector::default();
         match self {
             Self::Constant(color) => {
                 textures.color(color);
@@ -68,7 +68,7 @@ mod tests {
     fn tint_scales_schlick_metals_but_not_eta_k() {
         let (at, half) = (TexturePoint::from_uv(DVec2::ZERO), Some(Vec3::splat(0.5)));
         let gray = |mirror: &Mirror, cosine: f32, tint| mirror.reflectance(cosine, tint, &at, &mut 0).x;
-        let color = |reflectance: f32| ColorParameter::Constant(Vec3::splat(reflectance));
+        let color = |reflectance: f32| ColorOrTexture::Constant(Vec3::splat(reflectance));
         let even = Mirror::Constant(color(0.8));
         assert_eq!([gray(&even, 0.1, None), gray(&even, 0.1, half)], [0.8, 0.4]);
         // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ with F0 = 0.4.
@@ -82,7 +82,7 @@ mod tests {
     fn extreme_metal_indices_conserve_energy() {
         let at = TexturePoint::from_uv(DVec2::ZERO);
         for (eta, k) in [(1e-30_f32, 0.0_f32), (1e30, 0.0), (0.0, 1e38), (f32::MAX, f32::MAX), (5e9, 5e9)] {
-            let [eta, k] = [eta, k].map(|part| ColorParameter::Constant(Vec3::splat(part)));
+            let [eta, k] = [eta, k].map(|part| ColorOrTexture::Constant(Vec3::splat(part)));
             let metal = Mirror::Conductor(ConductorFresnel::Index { eta, k });
             for cosine in [0.01, 0.5, 1.0] {
                 let part = metal.reflectance(cosine, None, &at, &mut 0).x;

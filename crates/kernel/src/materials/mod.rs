@@ -55,7 +55,7 @@ pub struct Material {
 
 impl Material {
     /// Whether any material property depends on texture coordinates or tangents.
-    pub fn is_textured(&self) -> bool {
+    pub fn needs_uvs_or_tangents(&self) -> bool {
         self.normal_perturbation.is_some() || self.bsdf.is_anisotropic() || !self.textures().is_empty()
     }
 

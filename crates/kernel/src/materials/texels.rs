@@ -114,7 +114,7 @@ impl Texels {
     /// Linear values at packets of texel indices. Writes them in place because compilers handle large return
     /// values poorly.
     #[inline(always)]
-    pub fn write_color_packets_at_indices(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
+    pub fn read_color_packets_into(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
         for (places, values) in places.iter().zip(values) {
             self.for_each_color_at(places, |i, value| set_lane(values, i, value));
         }
@@ -169,11 +169,11 @@ impl Texels {
             let sum: DVec4 = (0..self.len()).map(|place| self.premultiplied_texel(place).as_dvec4()).sum();
             return unpremultiply((sum / self.len() as f64).as_vec4());
         }
-        self.mean_of(|texel| texel)
+        self.mean_of_function(|texel| texel)
     }
 
     /// Mean of a function of the texels.
-    pub fn mean_of(&self, function: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    pub fn mean_of_function(&self, function: impl Fn(Vec3) -> Vec3) -> Vec3 {
         let places = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
         let sum: DVec3 = places.map(|(x, y)| function(self.get(x, y)).as_dvec3()).sum();
         (sum / self.len() as f64).as_vec3()
@@ -192,7 +192,7 @@ impl Texels {
     }
 
     /// Whether red, green, and blue are equal in all texels.
-    pub fn is_gray(&self) -> bool {
+    pub fn are_all_gray(&self) -> bool {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => {
                 bytes.iter().all(|[r, g, b]| r == g && g == b)

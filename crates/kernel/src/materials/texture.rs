@@ -52,19 +52,19 @@ pub struct Texture {
     pub moved: Option<Box<UvTransform>>,
     /// Scale and offset applied to looked-up values. `None` for the identity. Does not affect heights and
     /// their slopes.
-    pub factor: Option<ScaleAndOffset>,
+    pub factor: Option<ValueScaleAndOffset>,
 }
 
 /// Scale and offset applied to looked-up values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScaleAndOffset {
+pub struct ValueScaleAndOffset {
     /// The scale.
     pub gain: Vec3,
     /// The offset, added after scaling.
     pub base: Vec3,
 }
 
-impl ScaleAndOffset {
+impl ValueScaleAndOffset {
     /// Leaves values as they are.
     pub const IDENTITY: Self = Self { gain: Vec3::ONE, base: Vec3::ZERO };
 
@@ -111,7 +111,7 @@ impl UvTransform {
 
     /// The point in the second UV set, if the transform applies to that set.
     #[inline]
-    fn second_uv_point<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
+    fn second_uv_set_point<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
             UvSet::First => None,
             UvSet::Second => at.second.as_deref(),
@@ -151,14 +151,14 @@ impl UvTransform {
 
 /// A color parameter, constant or textured.
 #[derive(Clone, Debug, PartialEq)]
-pub enum ColorParameter {
+pub enum ColorOrTexture {
     /// A constant color.
     Constant(Vec3),
     /// A color texture.
     Texture(Arc<Texture>),
 }
 
-impl ColorParameter {
+impl ColorOrTexture {
     /// The constant color, or `None` for a texture.
     pub fn as_constant(&self) -> Option<Vec3> {
         match self {
@@ -191,7 +191,7 @@ impl Texture {
     /// The linear value at the given texture coordinates. v = 0 is the bottom row. Non-finite coordinates are
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tiles = self.tile_coordinates(at);
+        let tiles = self.transformed_uv(at);
         let value = self.lookup_in_tiles(tiles, || self.mip_level(at));
         self.factor.map_or(value, |factor| factor.apply(value))
     }
@@ -210,10 +210,10 @@ impl Texture {
 
     /// Repeated and transformed coordinates, in units of the image size.
     #[inline]
-    fn tile_coordinates(&self, at: &TexturePoint) -> DVec2 {
+    fn transformed_uv(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
-        moved.transform_point(moved.second_uv_point(at).map_or(at.uv, |second| second.uv) * repeat)
+        moved.transform_point(moved.second_uv_set_point(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
     /// The UV set used for lookups.
@@ -226,14 +226,14 @@ impl Texture {
     /// set.
     #[inline]
     pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
-        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_point(at));
+        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_set_point(at));
         second.map_or(first, |second| second.tangents)
     }
 
     /// Slopes of the red channel along u and v. They are central differences over one texel of the image or,
     /// with mip levels, over one texel of the level chosen by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
-        let tiles = self.tile_coordinates(at);
+        let tiles = self.transformed_uv(at);
         let level = match (self.filter, &self.mipmaps) {
             (TextureFilter::Mipmap, Some(mipmaps)) => self.mip_level(at).min(mipmaps.count() as f32),
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
@@ -256,7 +256,7 @@ impl Texture {
         if self.wrap != Wrap::Mirror {
             return slopes;
         }
-        let tiles = self.tile_coordinates(at);
+        let tiles = self.transformed_uv(at);
         slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirror_sign(tile) as f32))
     }
 
@@ -324,16 +324,16 @@ impl Texture {
         }
         let columns = self.wrap.wrap_index_packet(&first[0], 0, extent[0]);
         let rows = self.wrap.wrap_index_packet(&first[1], 0, extent[1]);
-        let mut around = [texel_indices(&columns, &rows, extent); 4];
+        let mut around = [texel_index_packet(&columns, &rows, extent); 4];
         if count == 4 {
             let right = self.wrap.wrap_index_packet(&first[0], 1, extent[0]);
             let upper = self.wrap.wrap_index_packet(&first[1], 1, extent[1]);
-            around[1] = texel_indices(&right, &rows, extent);
-            around[2] = texel_indices(&columns, &upper, extent);
-            around[3] = texel_indices(&right, &upper, extent);
+            around[1] = texel_index_packet(&right, &rows, extent);
+            around[2] = texel_index_packet(&columns, &upper, extent);
+            around[3] = texel_index_packet(&right, &upper, extent);
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        texels.write_color_packets_at_indices(&around[..count], &mut corners);
+        texels.read_color_packets_into(&around[..count], &mut corners);
         if count == 1 {
             return corners[0];
         }
@@ -360,7 +360,7 @@ impl Texture {
         match self.factor {
             // Texels below 0 are clamped before they are averaged.
             Some(factor) if factor.base.min_element() < 0.0 || factor.gain.min_element() < 0.0 => {
-                self.texels.mean_of(|texel| factor.apply(texel))
+                self.texels.mean_of_function(|texel| factor.apply(texel))
             }
             Some(factor) => factor.apply(mean),
             None => mean,
@@ -373,7 +373,8 @@ impl Texture {
             None => at.footprint.major_axis_texels(float_size(&self.texels) * self.repeat),
             Some(moved) => {
                 let size = float_size(&self.texels);
-                let footprint = moved.second_uv_point(at).map_or(&at.footprint, |second| &second.footprint);
+                let footprint =
+                    moved.second_uv_set_point(at).map_or(&at.footprint, |second| &second.footprint);
                 footprint.transformed_major_axis_length(|axis| {
                     moved.transform_vector((axis * self.repeat).as_dvec2()).as_vec2() * size
                 })
@@ -418,7 +419,7 @@ impl Texture {
     /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
     /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold_red_channel`].
     pub fn coverage_above_cutoff(&self, at: &TexturePoint, cutoff: f32) -> f32 {
-        let tiles = self.tile_coordinates(at);
+        let tiles = self.transformed_uv(at);
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));
@@ -494,7 +495,7 @@ fn texel_index(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
 
 /// [`texel_index`] for a packet of texels.
 #[inline(always)]
-fn texel_indices(
+fn texel_index_packet(
     columns: &[i32; PACKET_SIZE],
     rows: &[i32; PACKET_SIZE],
     extent: [i32; 2],
@@ -685,7 +686,7 @@ mod tests {
     fn factor_scales_values_and_mean_but_not_slopes() {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
-        let texture = Texture { factor: ScaleAndOffset::from_scale(factor), ..plain.clone() };
+        let texture = Texture { factor: ValueScaleAndOffset::from_scale(factor), ..plain.clone() };
         let at = TexturePoint::from_uv(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
@@ -701,7 +702,7 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.texels = texels;
         for (base, gain, expected) in [(-0.5, 1.0, 0.25), (1.0, -2.0, 0.5), (-2.0, 1.0, 0.0)] {
-            texture.factor = ScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base));
+            texture.factor = ValueScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base));
             assert_eq!(texture.mean(), Vec3::splat(expected), "{base} {gain}");
             let at = TexturePoint::from_uv(DVec2::new(0.1, 0.5));
             assert_eq!(texture.lookup(&at), Vec3::splat(f32::max(base, 0.0)), "{base} {gain}");
@@ -709,7 +710,7 @@ mod tests {
         let black = TexelData::Float(vec![Vec3::ZERO; 2]);
         texture.texels = Arc::new(Texels { width: 2, height: 1, data: black, unusable: 0 });
         for (base, is_black) in [(-0.5, true), (0.0, true), (1.0, false)] {
-            texture.factor = ScaleAndOffset::from_scale_and_offset(Vec3::ONE, Vec3::splat(base));
+            texture.factor = ValueScaleAndOffset::from_scale_and_offset(Vec3::ONE, Vec3::splat(base));
             assert_eq!(texture.is_black(), is_black, "{base}");
         }
     }

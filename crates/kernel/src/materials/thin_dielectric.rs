@@ -1,7 +1,7 @@
 //! Thin panes: two parallel glass surfaces that are infinitely close together.
 
 use super::fresnel::dielectric;
-use super::texture::ColorParameter;
+use super::texture::ColorOrTexture;
 
 /// An infinitely thin pane. Light passes undeflected unless it is reflected.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,7 +9,7 @@ pub struct ThinDielectric {
     /// Index of refraction of the glass relative to the outside.
     pub ior: f32,
     /// Transmittance of the glass at all angles.
-    pub tint: ColorParameter,
+    pub tint: ColorOrTexture,
 }
 
 impl ThinDielectric {
@@ -29,7 +29,7 @@ mod tests {
 
     #[test]
     fn pane_reflectance_sums_all_internal_bounces() {
-        let pane = ThinDielectric { ior: 1.5, tint: ColorParameter::Constant(Vec3::ONE) };
+        let pane = ThinDielectric { ior: 1.5, tint: ColorOrTexture::Constant(Vec3::ONE) };
         for degrees in [0.0_f32, 30.0, 60.0, 80.0, 89.0] {
             let cosine = degrees.to_radians().cos();
             let r = f64::from(dielectric(cosine, 1.5).0);

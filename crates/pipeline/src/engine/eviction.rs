@@ -8,11 +8,11 @@ const MAX_SPARE_BYTES: usize = 256 << 20;
 
 impl Engine {
     /// Ends a request. If it succeeded, values that it did not use become eviction candidates.
-    pub(super) fn end_request(&mut self, success: bool) {
+    pub(super) fn record_request_usage(&mut self, success: bool) {
         self.requests += 1;
-        self.meshes.end_request(success, self.requests);
-        self.textures.end_request(success, self.requests);
-        self.accel.end_request(success, self.requests);
+        self.meshes.record_request_usage(success, self.requests);
+        self.textures.record_request_usage(success, self.requests);
+        self.accel.record_request_usage(success, self.requests);
         let meshes = self.meshes.eviction_candidates();
         let candidates =
             meshes.chain(self.textures.eviction_candidates()).chain(self.accel.eviction_candidates());

@@ -19,62 +19,63 @@ use std::sync::Arc;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
-use self::outcome::RequestOutcome;
+use self::outcome::CompletedRequest;
 pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
-use self::own::{SavedSceneImage, combined_texture_needs, saved_scene_plan};
+use self::own::{SavedSceneImage, saved_scene_plan, texture_needs_with_saved_scene};
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{Memo, NamedCache};
 use super::inputs::ProtectedInputs;
 use super::keys;
 use super::memory::MemoryEstimate;
-use super::model::ModelView;
+use super::model::ModelViewOptions;
 use super::plan::{OutputNameSource, RenderPlan, resolve_plan, thread_count};
-use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
+use super::protocol::{Event, Failure, MaxPreviewSize, Report, Request, Stage, Status};
 use super::queries::{QueryContext, QueryOrEdit};
 use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::CoarseImageRenderer;
-use super::render::preview::PreviewTarget;
+use super::render::preview::PreviewSender;
 use super::render::scheduler::RenderStageInputs;
 use super::render::share::Shard;
 use super::report::finish::{RequestResults, make_report};
-use super::settings::{AdjustableSettings, Overrides, ViewMode};
+use super::settings::{KeyboardSettings, Overrides, ViewMode};
 use super::sink::EventSink;
 use super::stages::accel::{AccelCache, build_accel_structures};
 use super::stages::containers::GltfContainers;
 use super::stages::coplanar::warn_about_coplanar_lights;
 use super::stages::glass::find_glass_solids;
-use super::stages::lights::{SkyMemo, collect_lights};
-use super::stages::meshes::{CachedMesh, MeshName, Meshes, load_meshes};
+use super::stages::lights::{EnvironmentMapMemo, collect_lights};
+use super::stages::meshes::{CachedMesh, MeshPathAndPart, Meshes, load_meshes};
 use super::stages::parse::{ParsedScene, SceneParseRequest, parse};
 use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, trace_first_photons};
 use super::stages::render::render;
 use super::stages::textures::{
-    NeededTextures, TextureCache, Textures, add_check_only_textures, find_needed_textures, load_textures,
+    NeededTextures, TextureCache, Textures, add_check_only_textures, find_textures_needed_for_view,
+    load_textures,
 };
 use super::stages::write::{
-    ImageWriteContext, TurntableFrames, WrittenImages, check_targets, write_on_request,
+    ImageWriteContext, RenderedTurntableFrames, WrittenImages, check_targets, write_on_request,
 };
-use super::stages::{FileReadContext, Findings, StageResult, StopReason};
-use super::stopwatch::PauseExcludingStopwatch;
+use super::stages::{AbortReason, FileReadContext, Findings, StageResult};
+use super::stopwatch::PausableStopwatch;
 use super::table::StageRunner;
-use super::targets::conflicts;
+use super::targets::output_conflicts;
 use super::trace::{TileKernel, Tracer};
 use super::warnings::settings_warnings;
-use super::watch::content::{FileHashCache, FileRead, Snapshot};
+use super::watch::content::{FileHashCache, FileRead, RequestFileSnapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::messages::NO_IMAGE;
-use crate::scene::description::CameraChange;
+use crate::scene::description::CameraOverrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 use crate::system::priority;
-use crate::system::threads::{check_stack_space, core_count, describe_start_failure};
+use crate::system::threads::{check_thread_stack_memory, describe_start_failure, logical_cpu_count};
 use crate::world::{CoplanarLight, GlassSolids, NeededTextureRoleSet, World};
 
 /// Engine configuration, which tests override.
@@ -98,7 +99,7 @@ pub(super) struct Engine {
     config: EngineConfig,
     contents: Arc<FileHashCache>,
     parsed: Memo<Arc<ParsedScene>>,
-    meshes: NamedCache<MeshName, CachedMesh>,
+    meshes: NamedCache<MeshPathAndPart, CachedMesh>,
     bodies: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<CoplanarLight>>,
     textures: TextureCache,
@@ -106,7 +107,7 @@ pub(super) struct Engine {
     /// Number of finished requests.
     requests: u64,
     lights: Memo<Arc<Lights>>,
-    sky: SkyMemo,
+    sky: EnvironmentMapMemo,
     world: Memo<Arc<World>>,
     photons: PhotonCache,
     films: FilmCache,
@@ -121,7 +122,7 @@ pub(super) struct Engine {
     /// Report of the newest request, if it has finished.
     report: Option<Report>,
     /// Finished frames of a turntable.
-    frames: TurntableFrames,
+    frames: RenderedTurntableFrames,
     /// Plan of the current film.
     plan: Option<RenderPlan>,
     query_context: Option<QueryContext>,
@@ -173,7 +174,7 @@ impl Engine {
             accel: AccelCache::default(),
             requests: 0,
             lights: Memo::default(),
-            sky: SkyMemo::default(),
+            sky: EnvironmentMapMemo::default(),
             world: Memo::default(),
             photons: PhotonCache::default(),
             films: FilmCache::default(),
@@ -183,7 +184,7 @@ impl Engine {
             pins_own: true,
             is_own: true,
             report: None,
-            frames: TurntableFrames::default(),
+            frames: RenderedTurntableFrames::default(),
             plan: None,
             query_context: None,
             good: None,
@@ -205,17 +206,17 @@ impl Engine {
     ) {
         let generation = request.generation;
         let outcome = self.run_request(request, sink, context);
-        let is_broken = matches!(outcome, Err(StopReason::Failed(Failure::Scene(_))));
+        let is_broken = matches!(outcome, Err(AbortReason::Failed(Failure::Scene(_))));
         sink.send(match outcome {
-            Ok(RequestOutcome { report, conflicts, warnings, unchanged }) => {
+            Ok(CompletedRequest { report, conflicts, warnings, unchanged }) => {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
-            Err(StopReason::Cancelled) => Event::Cancelled { generation },
-            Err(StopReason::Failed(failure)) => Event::Failed { generation, failure },
+            Err(AbortReason::Cancelled) => Event::Cancelled { generation },
+            Err(AbortReason::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {
-            self.try_last_valid_scene(request, sink, context);
+            self.render_and_write_last_valid_scene(request, sink, context);
         }
     }
 
@@ -225,21 +226,21 @@ impl Engine {
         request: &Request,
         sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<RequestOutcome, StopReason> {
+    ) -> Result<CompletedRequest, AbortReason> {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
         let before = self.current_image_key_and_view();
         let outcome = self.run_stages(request, sink, context, &mut findings);
-        if let Err(StopReason::Failed(Failure::Scene(diagnostics))) = &outcome {
+        if let Err(AbortReason::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
         }
         // Watched files must not be written.
         self.inputs.add_read(&findings.files);
         match &outcome {
             Ok(_) => self.is_broken = false,
-            Err(StopReason::Failed(Failure::Scene(_))) => self.is_broken = true,
-            Err(StopReason::Failed(Failure::Work(_)) | StopReason::Cancelled) => {}
+            Err(AbortReason::Failed(Failure::Scene(_))) => self.is_broken = true,
+            Err(AbortReason::Failed(Failure::Work(_)) | AbortReason::Cancelled) => {}
         }
         if let Ok(report) = &outcome {
             self.report = Some(report.clone());
@@ -251,13 +252,13 @@ impl Engine {
         self.report_read_files(&findings, sink);
         // Even if the render was stopped, keep completely read files for later requests.
         let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
-        self.end_request(outcome.is_ok() || is_read);
+        self.record_request_usage(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
         let unchanged =
             self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
-        Ok(RequestOutcome { report, conflicts, warnings, unchanged })
+        Ok(CompletedRequest { report, conflicts, warnings, unchanged })
     }
 
     /// Returns the current image's key and view.
@@ -269,12 +270,12 @@ impl Engine {
     /// Sends a preview of the current image in another size, outside of a request.
     pub(super) fn send_resized_preview(
         &mut self,
-        bounds: Option<PreviewSize>,
+        bounds: Option<MaxPreviewSize>,
         sink: &EventSink,
         token: &CancelToken,
     ) {
         if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
-            PreviewTarget { bounds, plan, sink }.show(state, pool, token);
+            PreviewSender { bounds, plan, sink }.send_film_preview(state, pool, token);
         }
     }
 
@@ -292,23 +293,23 @@ impl Engine {
         sink: &EventSink,
         context: &RequestContext<'_>,
         findings: &mut Findings,
-    ) -> Result<Report, StopReason> {
-        let watch = PauseExcludingStopwatch::start(context.token);
+    ) -> Result<Report, AbortReason> {
+        let watch = PausableStopwatch::start(context.token);
         let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: false };
         // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
         let mut ready = self.prepare_consistent_scene(request, &mut table, context.token, findings)?;
-        let photons = self.trace_photons(request, &ready, &mut table, sink, context)?;
+        let photons = self.make_current_and_trace_photons(request, &ready, &mut table, sink, context)?;
         let share = self.assigned_shard(&ready.plan, photons);
         // A share may render fewer samples than the whole image.
         if let Some(share) = &share {
             ready.plan.settings.render.samples = share.samples_per_pixel();
         }
         ready.share = share;
-        self.record_saved_scene_shard(request, &ready);
-        self.report_saved_scene_image(request, ready.film, sink);
+        self.record_scene_image_shard(request, &ready);
+        self.report_saved_scene_image_state(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
         // Symbolic links and files may have changed during the render.
         self.check_conflicts(request, &ready.plan, findings, sink)?;
@@ -317,7 +318,7 @@ impl Engine {
             self.run_write_stage(request, &ready.plan, findings, sink, context.writing)
         });
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
-        self.report_saved_scene_image(request, ready.film, sink);
+        self.report_saved_scene_image_state(request, ready.film, sink);
         let film = own::should_write_saved_scene_image(request).then_some(ready.film);
         let interruption = || context.orders.interruption();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
@@ -328,7 +329,7 @@ impl Engine {
         let is_written = written?;
         let pool = self.thread_pool(ready.plan.threads)?;
         let Some(state) = self.films.current() else {
-            return Err(StopReason::work_failure("the film is missing"));
+            return Err(AbortReason::work_failure("the film is missing"));
         };
         let finished = RequestResults {
             scene: &ready.parsed.loaded.path,
@@ -355,21 +356,22 @@ impl Engine {
     }
 
     /// Traces photons and makes `ready` the current image. Returns the key of its photons.
-    fn trace_photons(
+    fn make_current_and_trace_photons(
         &mut self,
         request: &Request,
         ready: &ReadyScene,
         table: &mut StageRunner<'_>,
         sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Option<Fingerprint>, StopReason> {
+    ) -> Result<Option<Fingerprint>, AbortReason> {
         let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = PhotonContext { world, plan, pool: &pool, token: context.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
             |of_photons| keys::photons_key(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
-        let own = RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraChange::default()).viewpoint();
+        let own =
+            RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraOverrides::default()).viewpoint();
         let query_context = QueryContext {
             own,
             parsed: ready.parsed.clone(),
@@ -379,7 +381,7 @@ impl Engine {
         };
         let (store, inputs) = (&mut self.photons, &self.inputs);
         let hear = || {
-            context.report_postponed_write(sink);
+            context.report_write_awaiting_samples(sink);
             context.answer_query(&query_context, None, inputs, sink);
         };
         // Show the scene while the first photons are traced.
@@ -390,7 +392,7 @@ impl Engine {
             is_moved: request.overrides.camera.has_changes(),
             rate: &self.coarse_rate,
         };
-        let screen = PreviewTarget { bounds: request.preview, plan, sink };
+        let screen = PreviewSender { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
         table.run(Stage::Photons, || trace_first_photons(asked, key, store, sending, hear, before))?;
         let photons_key = plan
@@ -412,7 +414,7 @@ impl Engine {
         table: &mut StageRunner<'_>,
         token: &CancelToken,
         findings: &mut Findings,
-    ) -> Result<ReadyScene, StopReason> {
+    ) -> Result<ReadyScene, AbortReason> {
         self.read_consistently(token, findings, |engine, contents, findings| {
             table.stages.clear();
             engine.prepare(request, table, (contents, token), findings)
@@ -425,10 +427,10 @@ impl Engine {
         &mut self,
         token: &CancelToken,
         findings: &mut Findings,
-        mut read: impl FnMut(&mut Self, &Snapshot, &mut Findings) -> Result<T, StopReason>,
-    ) -> Result<T, StopReason> {
+        mut read: impl FnMut(&mut Self, &RequestFileSnapshot, &mut Findings) -> Result<T, AbortReason>,
+    ) -> Result<T, AbortReason> {
         for _ in 0..MAX_READS {
-            let contents = Snapshot::new(Arc::clone(&self.contents));
+            let contents = RequestFileSnapshot::new(Arc::clone(&self.contents));
             let result = read(self, &contents, findings);
             if result.is_err() && !token.is_cancelled() {
                 contents.recheck_seen_files(token)?;
@@ -438,7 +440,7 @@ impl Engine {
             }
             findings.reset();
         }
-        Err(StopReason::work_failure(
+        Err(AbortReason::work_failure(
             "the scene's files keep changing while they are being read; try again once they are complete",
         ))
     }
@@ -448,11 +450,11 @@ impl Engine {
         &mut self,
         request: &Request,
         table: &mut StageRunner<'_>,
-        (contents, token): (&Snapshot, &CancelToken),
+        (contents, token): (&RequestFileSnapshot, &CancelToken),
         findings: &mut Findings,
-    ) -> Result<ReadyScene, StopReason> {
+    ) -> Result<ReadyScene, AbortReason> {
         let containers = GltfContainers::default();
-        let show = ModelView::from_overrides(&request.overrides);
+        let show = ModelViewOptions::from_overrides(&request.overrides);
         // Create the thread pool before parsing, because reading a model uses all threads. The thread count
         // does not depend on the scene.
         let pool = self.thread_pool(thread_count(&request.overrides))?;
@@ -463,20 +465,20 @@ impl Engine {
         let text = parsed.loaded.source.shared_file_text();
         table.sink.send(Event::Text { generation: request.generation, text });
         let plan = resolve_plan(&parsed.loaded.scene, &request.scene, &request.overrides)
-            .map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))?;
+            .map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))?;
         let own_image_plan = saved_scene_plan(request, &parsed)?;
         self.check_memory(&MemoryEstimate::for_image(&plan), request, (&plan, own_image_plan.as_ref()))?;
         let settings_warnings =
             settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(settings_warnings);
-        let own = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        let own = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraOverrides::default());
         let scene = &parsed.loaded.scene;
         table.sink.send(Event::Settings {
             generation: request.generation,
             settings: Box::new(plan.effective.clone()),
             camera: own.viewpoint(),
             exposure: scene.render.exposure,
-            own: AdjustableSettings {
+            own: KeyboardSettings {
                 integrator: scene.render.integrator,
                 shadows: scene.render.shadows,
                 photons: scene.photons.enabled,
@@ -494,7 +496,7 @@ impl Engine {
         let reading =
             FileReadContext { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
-        let lookups = combined_texture_needs(&plan, own_image_plan.as_ref());
+        let lookups = texture_needs_with_saved_scene(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) =
             self.load_assets(&parsed, lookups, findings, table, &reading)?;
         // Parts that were rendered from a half-written file could be merged.
@@ -523,7 +525,7 @@ impl Engine {
         (plan, own): (RenderPlan, Option<RenderPlan>),
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
-    ) -> Result<ReadyScene, StopReason> {
+    ) -> Result<ReadyScene, AbortReason> {
         let LastValidScene { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
         let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera)
@@ -532,7 +534,7 @@ impl Engine {
         // The orbiter camera is small, so include it in the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
-        let origin = eye.coordinate_origin();
+        let origin = eye.origin_near_camera();
         let build = || build_accel_structures(scene, (&of, origin), meshes, &mut self.accel, reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
@@ -548,7 +550,7 @@ impl Engine {
         let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).rotated_for_turntable(own.turn);
         let own =
             SavedSceneImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
-        self.set_saved_scene_image(own);
+        self.pin_saved_scene_image(own);
         Ok(ReadyScene {
             parsed: parsed.clone(),
             plan,
@@ -565,7 +567,7 @@ impl Engine {
     /// Returns the share of the image that this process renders. `None` for the whole image.
     fn assigned_shard(&self, plan: &RenderPlan, photons: Option<Fingerprint>) -> Option<Shard> {
         let emits_photons =
-            photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::emits_photons);
+            photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::has_lit_caustic_casters);
         plan.shard.map(|shard| Shard::new(shard, emits_photons, plan.settings.render.samples))
     }
 
@@ -577,11 +579,11 @@ impl Engine {
         findings: &mut Findings,
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
-    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), StopReason> {
+    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), AbortReason> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || load_meshes(loaded, mesh_cache, findings, reading))?;
-        let needed = find_needed_textures(loaded, &found, lookups, cache);
+        let needed = find_textures_needed_for_view(loaded, &found, lookups, cache);
         let texels =
             table.run(Stage::Textures, || load_textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
@@ -594,7 +596,7 @@ impl Engine {
             table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, bodies, texels, needed))
         } else {
-            Err(StopReason::Failed(findings.take_failure()))
+            Err(AbortReason::Failed(findings.take_as_failure()))
         }
     }
 
@@ -605,11 +607,11 @@ impl Engine {
         photons: Option<Fingerprint>,
         sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<StageResult<RayCounters>, StopReason> {
+    ) -> Result<StageResult<RayCounters>, AbortReason> {
         let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
-        let watch = PauseExcludingStopwatch::start(context.token);
+        let watch = PausableStopwatch::start(context.token);
         // Borrow the state that the stage modifies separately from the state that it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
@@ -617,7 +619,7 @@ impl Engine {
         let to = ImageWriteContext { plan, inputs: &self.inputs, contents: &self.contents, is_own, sink };
         let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
-                context.report_postponed_write(sink);
+                context.report_write_awaiting_samples(sink);
             } else if orders.take_write() && write_on_request(state, to, &mut written.borrow_mut()) {
                 remove_outdated_report(plan, to.inputs, sink);
             }
@@ -660,7 +662,7 @@ impl Engine {
     }
 
     /// Returns the thread pool for a render with `--threads` or the default thread count.
-    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, StopReason> {
+    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, AbortReason> {
         self.thread_pool_for(threads, true)
     }
 
@@ -669,7 +671,7 @@ impl Engine {
         &mut self,
         threads: usize,
         has_threads_option: bool,
-    ) -> Result<Arc<ThreadPool>, StopReason> {
+    ) -> Result<Arc<ThreadPool>, AbortReason> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
         }
@@ -678,9 +680,9 @@ impl Engine {
         let nice = self.config.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| {
-            StopReason::work_failure(describe_start_failure(threads, has_threads_option, &error))
+            AbortReason::work_failure(describe_start_failure(threads, has_threads_option, &error))
         };
-        check_stack_space(threads).map_err(|error| failed(&error))?;
+        check_thread_stack_memory(threads).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
         let pool = builder.build().map_err(|error| failed(&error))?;
         Ok(self.pool.insert(Arc::new(pool)).clone())
@@ -694,7 +696,7 @@ impl Engine {
     }
 
     /// Loads the scene and all files it references, needed or not, for `check`.
-    pub(super) fn load_all_assets(
+    pub(super) fn load_scene_and_all_assets(
         &mut self,
         path: &Path,
         sets: &[String],
@@ -704,15 +706,15 @@ impl Engine {
         let mut findings = Findings::default();
         let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
             let containers = GltfContainers::default();
-            let origin = SceneParseRequest { path, sets, show: ModelView::default() };
-            let pool = engine.thread_pool_for(core_count(), false)?;
+            let origin = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
+            let pool = engine.thread_pool_for(logical_cpu_count(), false)?;
             let read = || parse(origin, (contents, &containers), &mut engine.parsed, findings, token);
             let parsed = pool.install(read)?.value;
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
             let mut wanted =
-                find_needed_textures(loaded, &found, NeededTextureRoleSet::ALL, &engine.textures);
+                find_textures_needed_for_view(loaded, &found, NeededTextureRoleSet::ALL, &engine.textures);
             add_check_only_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
@@ -721,22 +723,22 @@ impl Engine {
             warn_about_coplanar_lights(&parsed, &found, &mut engine.coplanar, findings);
             let overrides = Overrides::default();
             let plan = resolve_plan(&loaded.scene, path, &overrides)
-                .map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))?;
+                .map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))?;
             findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == OutputNameSource::Scene {
                 let inputs = collect_protected_inputs(&parsed, &found, findings);
-                findings.errors.extend(conflicts(&plan, &inputs));
+                findings.errors.extend(output_conflicts(&plan, &inputs));
             }
             Ok((parsed, found, texels))
         });
-        self.end_request(all.is_ok());
+        self.record_request_usage(all.is_ok());
         match all {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
                 Ok((parsed, found, texels, findings.warnings))
             }
-            Ok(_) => Err(findings.take_failure()),
-            Err(StopReason::Failed(failure)) => Err(failure),
-            Err(StopReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
+            Ok(_) => Err(findings.take_as_failure()),
+            Err(AbortReason::Failed(failure)) => Err(failure),
+            Err(AbortReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
     }
 }
@@ -745,11 +747,11 @@ impl Engine {
 ///
 /// # Errors
 /// A file has changed, or the token is cancelled.
-fn verify_files_unchanged(contents: &Snapshot, token: &CancelToken) -> Result<(), StopReason> {
+fn verify_files_unchanged(contents: &RequestFileSnapshot, token: &CancelToken) -> Result<(), AbortReason> {
     contents.recheck_seen_files(token)?;
     let changed =
         contents.changed_file().map(|path| format!("{} changed while it was being read", path.display()));
-    changed.map_or(Ok(()), |message| Err(StopReason::work_failure(message)))
+    changed.map_or(Ok(()), |message| Err(AbortReason::work_failure(message)))
 }
 
 /// Creates a tracer for a scene, without photons.
@@ -774,7 +776,7 @@ fn make_tracer<'a>(
 /// Collects the files referenced by the scene and all other files that were read.
 fn collect_protected_inputs(parsed: &ParsedScene, meshes: &Meshes, findings: &Findings) -> ProtectedInputs {
     let mut inputs = ProtectedInputs::from_scene(parsed);
-    inputs.add_meshes(&parsed.loaded, meshes);
+    inputs.add_mesh_dependencies(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);
     inputs
 }

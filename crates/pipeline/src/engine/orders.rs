@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use crate::control::CancelToken;
 use crate::inputs::ProtectedInputs;
-use crate::protocol::{Event, PreviewSize};
+use crate::protocol::{Event, MaxPreviewSize};
 use crate::queries::{QueryContext, QueryOrEdit};
 use crate::render::film_state::FilmState;
 use crate::sink::EventSink;
@@ -27,7 +27,7 @@ pub(crate) trait PendingCommands {
     /// Like [`Self::wants_write`], but clears the order.
     fn take_write(&self) -> bool;
     /// Takes the pending preview size change.
-    fn take_preview_resize(&self) -> Option<Option<PreviewSize>>;
+    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>>;
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<QueryOrEdit>;
     /// Returns the reason for interrupting the render.
@@ -54,7 +54,7 @@ impl<'a> RequestContext<'a> {
     }
 
     /// Reports, once, that a write order is postponed until every pixel has a sample.
-    pub(super) fn report_postponed_write(&self, sink: &EventSink) {
+    pub(super) fn report_write_awaiting_samples(&self, sink: &EventSink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::super::protocol::{Failure, Report, Request};
 use super::super::sink::EventSink;
-use super::super::stages::StopReason;
+use super::super::stages::AbortReason;
 use super::{Engine, RequestContext};
 use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
@@ -53,7 +53,7 @@ impl Error for RenderFailure {}
 const COLUMNS: usize = 120;
 
 /// Outcome of a finished request.
-pub(super) struct RequestOutcome {
+pub(super) struct CompletedRequest {
     pub(super) report: Report,
     /// Reasons why the image is not written.
     pub(super) conflicts: Vec<Diagnostic>,
@@ -76,15 +76,15 @@ impl Engine {
     ) -> Result<RenderedImage, RenderFailure> {
         match self.run_request(request, sink, context) {
             // An in-memory image is not written, so there are no conflicts.
-            Ok(RequestOutcome { report, conflicts: _, warnings, unchanged: _ }) => {
+            Ok(CompletedRequest { report, conflicts: _, warnings, unchanged: _ }) => {
                 let state = self.films.current();
                 let gone = || RenderFailure::Failed(Failure::Work("the film is missing".to_owned()));
                 let state = state.ok_or_else(gone)?;
                 let image = state.film.image(Quantity::Radiance);
                 Ok(RenderedImage { image, report: Box::new(report), warnings, key: state.key })
             }
-            Err(StopReason::Failed(failure)) => Err(RenderFailure::Failed(failure)),
-            Err(StopReason::Cancelled) => Err(RenderFailure::Cancelled),
+            Err(AbortReason::Failed(failure)) => Err(RenderFailure::Failed(failure)),
+            Err(AbortReason::Cancelled) => Err(RenderFailure::Cancelled),
         }
     }
 

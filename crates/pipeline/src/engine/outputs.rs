@@ -2,15 +2,15 @@
 
 use super::super::inputs::ProtectedInputs;
 use super::super::plan::RenderPlan;
-use super::super::protocol::{ImageReport, Report, Request, WriteMode, reasons};
+use super::super::protocol::{ImageReport, Report, Request, WriteRequirement, reasons};
 use super::super::render::film_state::FilmState;
-use super::super::report::finish::{remove_report, write_report};
+use super::super::report::finish::{remove_stale_report, write_report};
 use super::super::sink::EventSink;
 use super::super::stages::write::{
     ImageWriteContext, add_animation_frame, write_if_wanted, write_on_request,
 };
-use super::super::stages::{Findings, StageResult, StopReason};
-use super::super::targets::conflicts;
+use super::super::stages::{AbortReason, Findings, StageResult};
+use super::super::targets::output_conflicts;
 use super::Engine;
 use crate::control::CancelToken;
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCENE_HAS_ERRORS};
@@ -18,7 +18,7 @@ use crate::output::OutputError;
 
 /// Removes an existing report that does not describe the plan's image files.
 pub(super) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) {
-    if let Err(error) = remove_report(plan, inputs, sink) {
+    if let Err(error) = remove_stale_report(plan, inputs, sink) {
         sink.send_write_failed(None, format!("the report describes an earlier image: {error}"));
     }
 }
@@ -62,7 +62,7 @@ impl Engine {
         let is_finished = state.is_finished(plan);
         self.record_saved_scene_image_written(is_written && is_finished && self.is_own);
         if is_written {
-            self.update_report_after_write(sink);
+            self.write_or_remove_report(sink);
         }
         if self.is_saved_scene_image_written() {
             self.remove_saved_scene_checkpoint(sink);
@@ -80,15 +80,15 @@ impl Engine {
         plan: &RenderPlan,
         findings: &mut Findings,
         sink: &EventSink,
-    ) -> Result<(), StopReason> {
-        let found = conflicts(plan, &self.inputs);
+    ) -> Result<(), AbortReason> {
+        let found = output_conflicts(plan, &self.inputs);
         if found.is_empty() {
             findings.conflicts = found;
             return Ok(());
         }
-        if request.write == WriteMode::Must {
+        if request.write == WriteRequirement::Must {
             findings.errors.extend(found);
-            return Err(StopReason::Failed(findings.take_failure()));
+            return Err(AbortReason::Failed(findings.take_as_failure()));
         }
         if found != findings.conflicts {
             sink.send_write_conflicts(found.clone());
@@ -99,7 +99,7 @@ impl Engine {
 
     /// Writes the report for an image that was written at the user's request. If the render is unfinished,
     /// removes the outdated report instead.
-    fn update_report_after_write(&self, sink: &EventSink) {
+    fn write_or_remove_report(&self, sink: &EventSink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return remove_outdated_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
@@ -128,19 +128,19 @@ impl Engine {
         findings: &Findings,
         sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<StageResult<bool>, StopReason> {
+    ) -> Result<StageResult<bool>, AbortReason> {
         if let Some(conflict) = findings.conflicts.first() {
             return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
-            return self.write_saved_scene_image(sink, token);
+            return self.write_image_without_overrides(sink, token);
         }
         if self.written.has_user_written_image(&self.contents) {
             return Ok(StageResult::skipped(false, reasons::OTHER_IMAGE_WRITTEN));
         }
         let pool = self.thread_pool(plan.threads)?;
         let Some(state) = self.films.current() else {
-            return Err(StopReason::work_failure("the film is missing"));
+            return Err(AbortReason::work_failure("the film is missing"));
         };
         let to =
             ImageWriteContext { plan, inputs: &self.inputs, contents: &self.contents, is_own: true, sink };

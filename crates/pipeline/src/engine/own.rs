@@ -10,19 +10,19 @@ use crate::control::CancelToken;
 use crate::identity::ImageDependencies;
 use crate::keys;
 use crate::memory::MemoryEstimate;
-use crate::output::part::Dependency;
+use crate::output::part::RenderInput;
 use crate::plan::{RenderPlan, resolve_plan};
-use crate::protocol::{Failure, Request, SavedSceneImageState, Status, WriteMode, reasons};
+use crate::protocol::{Failure, Request, SavedSceneImageState, Status, WriteRequirement, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
 use crate::render::film_state::FilmState;
 use crate::render::share::Shard;
-use crate::scene::description::CameraChange;
+use crate::scene::description::CameraOverrides;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::parse::ParsedScene;
 use crate::stages::write::{ImageWriteContext, develop_settings, write_if_wanted};
-use crate::stages::{StageResult, StopReason};
+use crate::stages::{AbortReason, StageResult};
 use crate::watch::content::FileRead;
 use crate::world::NeededTextureRoleSet;
 
@@ -34,7 +34,7 @@ pub(super) struct SavedSceneImage {
     pub(super) image: Fingerprint,
     parsed: Arc<ParsedScene>,
     pub(super) plan: RenderPlan,
-    camera: CameraChange,
+    camera: CameraOverrides,
     /// Files that the image depends on.
     files: Vec<FileRead>,
     /// Share of the image that this process renders. `None` for the whole image.
@@ -47,7 +47,7 @@ impl SavedSceneImage {
     pub(super) fn new(
         (parsed, plan, eye): (&Arc<ParsedScene>, RenderPlan, &RequestCamera),
         (surfaces, meshes): (&Fingerprint, &[Fingerprint]),
-        (camera, files): (CameraChange, &[FileRead]),
+        (camera, files): (CameraOverrides, &[FileRead]),
     ) -> Self {
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
@@ -58,7 +58,7 @@ impl SavedSceneImage {
     }
 
     /// Returns the names and values of everything that affects the image.
-    pub(super) fn dependencies(&self) -> Vec<Dependency> {
+    pub(super) fn dependencies(&self) -> Vec<RenderInput> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
         ImageDependencies { parsed, plan, camera, files, divided }.names_and_values()
@@ -80,7 +80,7 @@ fn written_image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 
 impl Engine {
     /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn set_saved_scene_image(&mut self, mut own: SavedSceneImage) {
+    pub(super) fn pin_saved_scene_image(&mut self, mut own: SavedSceneImage) {
         if self.pins_own {
             self.films.pin(own.film);
         }
@@ -101,8 +101,8 @@ impl Engine {
         estimate: &MemoryEstimate,
         request: &Request,
         plans: (&RenderPlan, Option<&RenderPlan>),
-    ) -> Result<(), StopReason> {
-        let (plan, bytes) = (plans.0, self.saved_scene_film_bytes(request, plans));
+    ) -> Result<(), AbortReason> {
+        let (plan, bytes) = (plans.0, self.additional_scene_film_bytes(request, plans));
         let all = estimate.clone().with_saved_scene_film(bytes).check(plan);
         self.pins_own = all.is_ok() || !self.is_saved_scene_image_written();
         let room = if self.pins_own { all? } else { estimate.check(plan)? };
@@ -114,7 +114,7 @@ impl Engine {
     }
 
     /// Returns the size of the scene's own film in bytes if it is kept in addition to the request's film.
-    fn saved_scene_film_bytes(
+    fn additional_scene_film_bytes(
         &self,
         request: &Request,
         (plan, own_image_plan): (&RenderPlan, Option<&RenderPlan>),
@@ -136,14 +136,19 @@ impl Engine {
     }
 
     /// If the scene's own image is being rendered, records which share of it this process renders.
-    pub(super) fn record_saved_scene_shard(&mut self, request: &Request, ready: &ReadyScene) {
+    pub(super) fn record_scene_image_shard(&mut self, request: &Request, ready: &ReadyScene) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
         }
     }
 
     /// Reports the state of the scene's own image while another one is shown.
-    pub(super) fn report_saved_scene_image(&self, request: &Request, film: Fingerprint, sink: &EventSink) {
+    pub(super) fn report_saved_scene_image_state(
+        &self,
+        request: &Request,
+        film: Fingerprint,
+        sink: &EventSink,
+    ) {
         let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
         sink.send_saved_scene_image_state(match self.films.get(own.film) {
             _ if self.is_saved_scene_image_written() => SavedSceneImageState::Written,
@@ -169,11 +174,11 @@ impl Engine {
     ///
     /// # Errors
     /// Returns [`StopReason::Cancelled`] if the token is cancelled.
-    pub(super) fn write_saved_scene_image(
+    pub(super) fn write_image_without_overrides(
         &mut self,
         sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<StageResult<bool>, StopReason> {
+    ) -> Result<StageResult<bool>, AbortReason> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         if self.is_saved_scene_image_written() || self.written.has_user_written_image(&self.contents) {
             return only_shown();
@@ -193,7 +198,7 @@ impl Engine {
             sink,
         };
         let written = &mut self.written;
-        let wrote = pool.install(|| write_if_wanted(WriteMode::Try, state, to, written, token))?;
+        let wrote = pool.install(|| write_if_wanted(WriteRequirement::Try, state, to, written, token))?;
         written.own = wrote.value.then_some(own.image);
         Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
@@ -229,7 +234,7 @@ impl Engine {
         let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
-                checkpointer.record_whether_already_saved(state);
+                checkpointer.detect_own_checkpoint(state);
                 checkpointer.finish(state, state.traced, true);
             }
         });
@@ -241,7 +246,7 @@ impl Engine {
         let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
         self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
-                checkpointer.record_whether_already_saved(state);
+                checkpointer.detect_own_checkpoint(state);
                 checkpointer.save_if_cancelled(state, state.traced, state.render_seconds);
             }
         });
@@ -264,15 +269,18 @@ fn uses_checkpoints(plan: &RenderPlan) -> bool {
 pub(super) fn saved_scene_plan(
     request: &Request,
     parsed: &ParsedScene,
-) -> Result<Option<RenderPlan>, StopReason> {
+) -> Result<Option<RenderPlan>, AbortReason> {
     let plan = |own: &Overrides| resolve_plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
-    own.map_err(|error| StopReason::Failed(Failure::Scene(vec![*error])))
+    own.map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))
 }
 
 /// Returns the textures that a request needs. These include the textures for the scene's own image, because
 /// its film key depends on them.
-pub(super) fn combined_texture_needs(plan: &RenderPlan, own: Option<&RenderPlan>) -> NeededTextureRoleSet {
+pub(super) fn texture_needs_with_saved_scene(
+    plan: &RenderPlan,
+    own: Option<&RenderPlan>,
+) -> NeededTextureRoleSet {
     let shown = plan.settings.texture_needs();
     own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }
@@ -284,5 +292,5 @@ pub(super) fn saved_scene_overrides(request: &Request) -> &Overrides {
 
 /// Whether the scene's own image should be written.
 pub(super) fn should_write_saved_scene_image(request: &Request) -> bool {
-    request.own.is_some() || request.write != WriteMode::No
+    request.own.is_some() || request.write != WriteRequirement::No
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::mpsc;
 
 use super::*;
-use crate::protocol::{PreviewSlot, WriteMode};
+use crate::protocol::{PreviewSlot, WriteRequirement};
 use crate::session::NoPendingCommands;
 use crate::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
@@ -47,7 +47,7 @@ impl EngineFixture {
             scene,
             overrides: Default::default(),
             preview: None,
-            write: WriteMode::No,
+            write: WriteRequirement::No,
             own: None,
             saves: 0,
             force: false,
@@ -198,7 +198,7 @@ fn check_never_mixes_file_versions() {
         fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
         let events = mpsc::channel().0;
         let sink = EventSink { generation: 1, events, previews: PreviewSlot::default() };
-        let read = fixture.engine.load_all_assets(&scene, &[], &sink, &CancelToken::new());
+        let read = fixture.engine.load_scene_and_all_assets(&scene, &[], &sink, &CancelToken::new());
         let (parsed, ..) = read.expect("a valid scene");
         assert_eq!(parsed.loaded.source.file_text(), renamed);
     }

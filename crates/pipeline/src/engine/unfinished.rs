@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::outputs::remove_outdated_report;
-use super::own::{combined_texture_needs, saved_scene_plan};
+use super::own::{saved_scene_plan, texture_needs_with_saved_scene};
 use super::{Engine, RequestContext};
 use crate::control::Cancelled;
 use crate::memory::MemoryEstimate;
@@ -14,10 +14,10 @@ use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
 use crate::stages::meshes::Meshes;
 use crate::stages::parse::ParsedScene;
-use crate::stages::textures::{NeededTextures, Textures, find_needed_textures, load_textures};
-use crate::stages::{FileReadContext, Findings, StopReason};
+use crate::stages::textures::{NeededTextures, Textures, find_textures_needed_for_view, load_textures};
+use crate::stages::{AbortReason, FileReadContext, Findings};
 use crate::table::StageRunner;
-use crate::watch::content::{FileRead, Snapshot};
+use crate::watch::content::{FileRead, RequestFileSnapshot};
 use crate::world::{GlassSolids, NeededTextureRoleSet};
 
 /// A valid scene and all files needed for its image.
@@ -42,7 +42,7 @@ impl LastValidScene {
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
         for FileRead { path, content } in &self.files {
             let is_scene_file = *path == loaded.path && !is_mesh(path);
-            if !is_scene_file && reading.contents.read_content_id(path, reading.token)? != *content {
+            if !is_scene_file && reading.contents.first_seen_content_id(path, reading.token)? != *content {
                 return Ok(true);
             }
         }
@@ -53,7 +53,7 @@ impl LastValidScene {
 impl Engine {
     /// Renders and writes the last valid scene with the overrides from the newest request, whose own scene
     /// cannot be loaded. Does not overwrite files that the broken scene might reference.
-    pub(super) fn try_last_valid_scene(
+    pub(super) fn render_and_write_last_valid_scene(
         &mut self,
         newest: &Request,
         sink: &EventSink,
@@ -77,7 +77,7 @@ impl Engine {
         newest: &Request,
         sink: &EventSink,
         context: &RequestContext<'_>,
-    ) -> Result<Option<bool>, StopReason> {
+    ) -> Result<Option<bool>, AbortReason> {
         let is_it = |good: &&LastValidScene| good.parsed.loaded.path == newest.scene;
         let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(None) };
         let request = Request { force: false, ..newest.clone() };
@@ -87,12 +87,12 @@ impl Engine {
         let own = saved_scene_plan(&request, &good.parsed)?;
         // Load the textures needed for another view if their files are still valid.
         let pool = self.thread_pool(plan.threads)?;
-        let snapshot = Snapshot::new(Arc::clone(&self.contents));
+        let snapshot = RequestFileSnapshot::new(Arc::clone(&self.contents));
         let containers = GltfContainers::default();
         let token = context.token;
         let reading =
             FileReadContext { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
-        let lookups = combined_texture_needs(&plan, own.as_ref());
+        let lookups = texture_needs_with_saved_scene(&plan, own.as_ref());
         let Some(good) = self.load_missing_textures(good, lookups, &reading)? else { return Ok(None) };
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
         let estimate = MemoryEstimate::for_image_and_scene(&plan, &plan.scene, meshes, texture_bytes);
@@ -100,7 +100,7 @@ impl Engine {
         // Prepare the scene, reusing unchanged values.
         let mut table = StageRunner { sink, token: context.token, stages: Vec::new(), is_silent: true };
         let ready = self.build_world(&request, &good, (plan, own), &mut table, &reading)?;
-        let photons = self.trace_photons(&request, &ready, &mut table, sink, context)?;
+        let photons = self.make_current_and_trace_photons(&request, &ready, &mut table, sink, context)?;
         // Render and write.
         let rendered = self.render(&request, &ready, photons, sink, context)?;
         let mut is_written_now = false;
@@ -124,9 +124,9 @@ impl Engine {
         good: LastValidScene,
         lookups: NeededTextureRoleSet,
         reading: &FileReadContext<'_>,
-    ) -> Result<Option<LastValidScene>, StopReason> {
+    ) -> Result<Option<LastValidScene>, AbortReason> {
         let loaded = &good.parsed.loaded;
-        let needed = find_needed_textures(loaded, &good.meshes, lookups, &self.textures);
+        let needed = find_textures_needed_for_view(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);
         if needed.textures.iter().all(is_there) {
             return Ok(Some(good));

@@ -5,11 +5,11 @@ use std::io::Read;
 use std::path::Path;
 
 use super::frame::{frame_model, round_to_decimal_step};
-use super::materials::{MaterialWriter, TextureFile};
+use super::materials::{MaterialWriter, TextureFileReference};
 use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
 use super::{
-    CameraPose, FOV, GeneratedScene, Lighting, ModelView, ROUGH, SIZE, UniqueNames, file_name, write_camera,
-    write_ground, write_lights, write_render_settings,
+    CameraPose, FOV, GeneratedScene, Lighting, ModelViewOptions, ROUGH, SIZE, UniqueNames, file_name,
+    write_camera, write_ground, write_render_settings, write_sky_and_key_light,
 };
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
@@ -40,12 +40,12 @@ pub(crate) struct ExportedFile {
     /// Path relative to the scene.
     pub(crate) name: String,
     /// Source of the file's content.
-    pub(crate) content: ExportSource,
+    pub(crate) content: ExportedFileContent,
 }
 
 /// Source of an exported file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum ExportSource {
+pub(crate) enum ExportedFileContent {
     /// A mesh part, written as PLY.
     Part(usize),
     /// An image, copied unchanged.
@@ -55,7 +55,7 @@ pub(crate) enum ExportSource {
 /// Converts a glTF file to scene text.
 pub(super) fn scene_text(
     path: &Path,
-    (show, naming): (ModelView, &ExportStorage),
+    (show, naming): (ModelViewOptions, &ExportStorage),
     containers: &GltfContainers,
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
@@ -100,7 +100,7 @@ struct SceneWriter<'a> {
     /// File names already used in the folder.
     files: UniqueNames,
     assets: Vec<ExportedFile>,
-    names: HashMap<ExportSource, String>,
+    names: HashMap<ExportedFileContent, String>,
     /// Images that materials use.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
@@ -109,7 +109,7 @@ struct SceneWriter<'a> {
 }
 
 impl SceneWriter<'_> {
-    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: ModelView) {
+    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: ModelViewOptions) {
         // Describe the model and its approximations.
         self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
@@ -143,14 +143,14 @@ impl SceneWriter<'_> {
                 eye
             }
         };
-        write_lights(&mut self.toml, &eye, lighting);
+        write_sky_and_key_light(&mut self.toml, &eye, lighting);
         if !scene.lights.is_empty() {
             self.toml.section_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.write_light(light));
         // Write the materials, then the meshes that use them.
         let mut names = UniqueNames::default();
-        let materials = MaterialWriter::write_all_and_return_names(scene, &mut names, self);
+        let materials = MaterialWriter::write_all(scene, &mut names, self);
         let mut shapes = UniqueNames::default();
         for instance in &scene.instances {
             self.write_mesh(instance, &materials[instance.material], &mut shapes);
@@ -198,7 +198,7 @@ impl SceneWriter<'_> {
                 self.toml.key("part", instance.part.to_string());
             }
             ExportStorage::Folder(_) => {
-                let name = self.add_asset(ExportSource::Part(instance.part), base, "ply");
+                let name = self.add_asset(ExportedFileContent::Part(instance.part), base, "ply");
                 self.toml.key("file", quote_toml_string(&name));
             }
         }
@@ -235,7 +235,7 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the file name for `content`. Adds a file if the content is new.
-    fn add_asset(&mut self, content: ExportSource, wanted: &str, ending: &str) -> String {
+    fn add_asset(&mut self, content: ExportedFileContent, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
@@ -254,7 +254,7 @@ impl SceneWriter<'_> {
 }
 
 impl super::materials::SceneExport for SceneWriter<'_> {
-    fn toml(&mut self) -> &mut TomlWriter {
+    fn toml_writer(&mut self) -> &mut TomlWriter {
         &mut self.toml
     }
 
@@ -267,7 +267,7 @@ impl super::materials::SceneExport for SceneWriter<'_> {
         name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
     }
 
-    fn image_file(&mut self, image: usize) -> TextureFile {
+    fn image_file(&mut self, image: usize) -> TextureFileReference {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {
@@ -276,7 +276,7 @@ impl super::materials::SceneExport for SceneWriter<'_> {
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
-                TextureFile { file: name.to_string_lossy().into_owned(), image: None }
+                TextureFileReference { file: name.to_string_lossy().into_owned(), image: None }
             }
             // A file without an image extension is read through the glTF file, so that its format is detected
             // from its content. A missing file is watched until it appears.
@@ -284,21 +284,25 @@ impl super::materials::SceneExport for SceneWriter<'_> {
                 if let Ok(ImageLocation::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None, stamp: None });
                 }
-                TextureFile { file: file_name(self.path), image: Some(image) }
+                TextureFileReference { file: file_name(self.path), image: Some(image) }
             }
             (ExportStorage::Folder(_), bytes) => {
                 let ending = match &bytes {
-                    Ok(ImageLocation::Inside(bytes)) => image_extension(bytes).to_owned(),
+                    Ok(ImageLocation::Inside(bytes)) => sniff_image_extension(bytes).to_owned(),
                     Ok(ImageLocation::File(path)) => {
                         let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
                         let start = || first_bytes(path).unwrap_or_default();
-                        if MAPS.contains(&own.as_str()) { own } else { image_extension(&start()).to_owned() }
+                        if MAPS.contains(&own.as_str()) {
+                            own
+                        } else {
+                            sniff_image_extension(&start()).to_owned()
+                        }
                     }
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
-                let name = self.add_asset(ExportSource::Image(image), &wanted, &ending);
-                TextureFile { file: name, image: None }
+                let name = self.add_asset(ExportedFileContent::Image(image), &wanted, &ending);
+                TextureFileReference { file: name, image: None }
             }
         }
     }
@@ -353,7 +357,7 @@ fn first_bytes(path: &Path) -> Option<[u8; 4]> {
 }
 
 /// Detects an image format from a file's first bytes and returns the extension for it.
-fn image_extension(bytes: &[u8]) -> &'static str {
+fn sniff_image_extension(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"\xff\xd8") {
         "jpg"
     } else if bytes.starts_with(b"RIFF") {

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::gltf::{ExportSource, ExportStorage};
-use super::{GeneratedScene, ModelView, mark_as_generated_scene};
+use super::gltf::{ExportStorage, ExportedFileContent};
+use super::{GeneratedScene, ModelViewOptions, mark_diagnostic_as_generated};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
@@ -47,16 +47,16 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
     let naming = ExportStorage::Folder(folder.to_owned());
     let read = || {
         let GeneratedScene { text, notes, assets, .. } =
-            super::gltf::scene_text(path, (ModelView::default(), &naming), &containers, token)?;
+            super::gltf::scene_text(path, (ModelViewOptions::default(), &naming), &containers, token)?;
         check_scene(path, &containers, token)?;
         let container = containers.open(path, &ignore_progress, token)?;
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                ExportSource::Part(part) => {
+                ExportedFileContent::Part(part) => {
                     write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
                 }
-                ExportSource::Image(image) => {
+                ExportedFileContent::Image(image) => {
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
                     // arbitrary files as images.
                     container.check_image_decodes(image, token)?;
@@ -80,8 +80,12 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
 /// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` would render, because
 /// the files referenced by that text already exist.
 fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) -> Result<(), AssetError> {
-    let shown =
-        super::gltf::scene_text(path, (ModelView::default(), &ExportStorage::Inside), containers, token)?;
+    let shown = super::gltf::scene_text(
+        path,
+        (ModelViewOptions::default(), &ExportStorage::Inside),
+        containers,
+        token,
+    )?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
     // Ignore errors about file names, because the imported scene uses different ones.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
@@ -89,6 +93,6 @@ fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) ->
     Err(AssetError::Malformed {
         path: path.to_owned(),
         line: None,
-        reason: mark_as_generated_scene(first).message,
+        reason: mark_diagnostic_as_generated(first).message,
     })
 }

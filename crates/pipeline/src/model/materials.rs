@@ -11,16 +11,16 @@ use crate::scene::quote_toml_string;
 /// Access to the scene text and image files while materials are being written.
 pub(super) trait SceneExport {
     /// The scene text.
-    fn toml(&mut self) -> &mut TomlWriter;
+    fn toml_writer(&mut self) -> &mut TomlWriter;
     /// Name of an image, without an extension.
     fn image_name(&self, image: usize) -> String;
     /// The file that contains an image.
-    fn image_file(&mut self, image: usize) -> TextureFile;
+    fn image_file(&mut self, image: usize) -> TextureFileReference;
 }
 
 /// A texture's file.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct TextureFile {
+pub(super) struct TextureFileReference {
     /// Path as it appears in the scene.
     pub(super) file: String,
     /// Index of the image in a glTF file.
@@ -50,11 +50,7 @@ pub(super) struct MaterialWriter<'a, F> {
 
 impl<F: SceneExport> MaterialWriter<'_, F> {
     /// Writes the tables and returns the material names.
-    pub(super) fn write_all_and_return_names(
-        scene: &ModelScene,
-        names: &mut UniqueNames,
-        files: &mut F,
-    ) -> Vec<String> {
+    pub(super) fn write_all(scene: &ModelScene, names: &mut UniqueNames, files: &mut F) -> Vec<String> {
         let mut all = MaterialWriter { files, textures: HashMap::new(), names: UniqueNames::default() };
         scene
             .materials
@@ -73,7 +69,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "\"glass\"".to_owned()));
-                self.push_number(&mut keys, ("roughness", 0.0), &material.roughness, "g");
+                self.push_number_or_texture(&mut keys, ("roughness", 0.0), &material.roughness, "g");
                 if glass.tint != DVec3::ONE {
                     keys.push(("tint", format_color(glass.tint)));
                 }
@@ -84,22 +80,27 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
             keys.push(("ior", format_number(material.ior)));
         }
         self.write_common_keys(&mut keys, material);
-        let toml = self.files.toml();
+        let toml = self.files.toml_writer();
         toml.table(&format!("[materials.{}]", format_key(name)));
         keys.iter().for_each(|(key, value)| toml.key(key, value));
     }
 
     fn write_principled(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
         keys.push(("type", "\"principled\"".to_owned()));
-        self.push_color(keys, ("color", 0.8), &material.color);
-        self.push_number(keys, ("metallic", 0.0), &material.metallic, "b");
-        self.push_number(keys, ("roughness", 0.5), &material.roughness, "g");
-        self.push_number(keys, ("specular", 1.0), &material.specular, "a");
-        self.push_color(keys, ("specular_color", 1.0), &material.specular_color);
-        self.push_number(keys, ("transmission", 0.0), &material.transmission, "r");
-        self.push_number(keys, ("clearcoat", 0.0), &material.clearcoat, "r");
+        self.push_color_or_texture(keys, ("color", 0.8), &material.color);
+        self.push_number_or_texture(keys, ("metallic", 0.0), &material.metallic, "b");
+        self.push_number_or_texture(keys, ("roughness", 0.5), &material.roughness, "g");
+        self.push_number_or_texture(keys, ("specular", 1.0), &material.specular, "a");
+        self.push_color_or_texture(keys, ("specular_color", 1.0), &material.specular_color);
+        self.push_number_or_texture(keys, ("transmission", 0.0), &material.transmission, "r");
+        self.push_number_or_texture(keys, ("clearcoat", 0.0), &material.clearcoat, "r");
         if material.clearcoat.factor != DVec3::ZERO {
-            self.push_number(keys, ("clearcoat_roughness", 0.0), &material.clearcoat_roughness, "g");
+            self.push_number_or_texture(
+                keys,
+                ("clearcoat_roughness", 0.0),
+                &material.clearcoat_roughness,
+                "g",
+            );
         }
     }
 
@@ -109,7 +110,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
                 Some(texture) => {
-                    let name = self.write_texture(texture, TextureUse::Colors, DVec3::ONE);
+                    let name = self.ensure_texture_table(texture, TextureUse::Colors, DVec3::ONE);
                     let scale = emission.factor;
                     let scale = if scale == DVec3::ONE {
                         String::new()
@@ -125,7 +126,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
             }
         }
         if let Some(normal) = &material.normal {
-            let name = self.write_texture(normal, TextureUse::Normals, DVec3::ONE);
+            let name = self.ensure_texture_table(normal, TextureUse::Normals, DVec3::ONE);
             keys.push(("normal_map", quote_toml_string(&name)));
             if material.normal_strength != 1.0 {
                 keys.push(("normal_strength", format_number(material.normal_strength)));
@@ -158,7 +159,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
                 } else {
                     TextureUse::Numbers
                 };
-                let name = self.write_texture(texture, use_, value.factor);
+                let name = self.ensure_texture_table(texture, use_, value.factor);
                 keys.push((
                     "opacity",
                     format!("{{ texture = {}, channel = \"a\" }}", quote_toml_string(&name)),
@@ -169,7 +170,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         }
     }
 
-    fn push_color(
+    fn push_color_or_texture(
         &mut self,
         keys: &mut TomlEntries,
         (key, usual): (&'static str, f64),
@@ -177,7 +178,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
     ) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.write_texture(texture, TextureUse::Colors, slot.factor);
+                let name = self.ensure_texture_table(texture, TextureUse::Colors, slot.factor);
                 keys.push((key, format!("{{ texture = {} }}", quote_toml_string(&name))));
             }
             None if slot.factor != DVec3::splat(usual) => {
@@ -188,7 +189,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         }
     }
 
-    fn push_number(
+    fn push_number_or_texture(
         &mut self,
         keys: &mut TomlEntries,
         (key, usual): (&'static str, f64),
@@ -197,7 +198,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
     ) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.write_texture(texture, TextureUse::Numbers, slot.factor);
+                let name = self.ensure_texture_table(texture, TextureUse::Numbers, slot.factor);
                 keys.push((
                     key,
                     format!("{{ texture = {}, channel = \"{channel}\" }}", quote_toml_string(&name)),
@@ -209,7 +210,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
     }
 
     /// Returns a texture's name. Writes its table if it is new.
-    fn write_texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
+    fn ensure_texture_table(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
         let mut keys = TomlEntries::new();
         if texture.is_nearest {
             keys.push(("filter", "\"nearest\"".to_owned()));
@@ -241,8 +242,8 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         }
         let wanted = self.files.image_name(texture.image);
         let name = self.names.make_unique(&wanted, "image");
-        let TextureFile { file, image } = self.files.image_file(texture.image);
-        let toml = self.files.toml();
+        let TextureFileReference { file, image } = self.files.image_file(texture.image);
+        let toml = self.files.toml_writer();
         toml.table(&format!("[textures.{}]", format_key(&name)));
         toml.key("file", quote_toml_string(&file));
         if let Some(image) = image {

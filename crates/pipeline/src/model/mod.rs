@@ -25,7 +25,7 @@ use crate::scene::fingerprint::FingerprintHasher;
 
 /// View of a model, as specified on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ModelView {
+pub(crate) struct ModelViewOptions {
     /// Side facing the camera. `None` uses the camera from the file, or [`ViewSide::Iso`] if the file has no
     /// camera.
     pub(crate) from: Option<ViewSide>,
@@ -40,13 +40,13 @@ pub(crate) struct ModelView {
 /// Default width and height of the image.
 const SIZE: [f64; 2] = [640.0, 480.0];
 
-impl Default for ModelView {
+impl Default for ModelViewOptions {
     fn default() -> Self {
         Self { from: None, aspect: None, up: None, turns: 1 }
     }
 }
 
-impl ModelView {
+impl ModelViewOptions {
     /// Returns the view specified on the command line.
     pub(crate) fn from_overrides(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
@@ -99,7 +99,7 @@ pub(crate) struct GeneratedScene {
 /// The file cannot be read or is invalid.
 pub(crate) fn scene_text(
     path: &Path,
-    show: ModelView,
+    show: ModelViewOptions,
     containers: &GltfContainers,
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
@@ -114,7 +114,7 @@ pub(crate) fn scene_text(
 }
 
 /// Marks a diagnostic as coming from the generated scene, which is not stored in a file.
-pub(crate) fn mark_as_generated_scene(diagnostic: Diagnostic) -> Diagnostic {
+pub(crate) fn mark_diagnostic_as_generated(diagnostic: Diagnostic) -> Diagnostic {
     Diagnostic {
         message: format!("in the scene generated for this model, {}", diagnostic.message),
         ..diagnostic
@@ -203,7 +203,7 @@ fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
 }
 
 /// Writes a sky, plus a key light if the model has no lights.
-fn write_lights(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
+fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
     toml.key("color", format_number(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::frame::frame_model;
 use super::toml::TomlWriter;
 use super::{
-    FOV, GeneratedScene, Lighting, ModelView, NARROW, ROUGH, SIZE, UniqueNames, file_name, write_camera,
-    write_ground, write_lights, write_render_settings,
+    FOV, GeneratedScene, Lighting, ModelViewOptions, NARROW, ROUGH, SIZE, UniqueNames, file_name,
+    write_camera, write_ground, write_render_settings, write_sky_and_key_light,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, ignore_progress};
@@ -75,7 +75,7 @@ fn may_cast_caustics(material: &FileMaterial) -> bool {
 }
 
 /// Whether every face is fully transparent.
-fn is_fully_transparent(loaded: &LoadedMesh) -> bool {
+fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
     let is_clear =
         |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !own.is_glass();
     let is_fully_transparent = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
@@ -85,11 +85,11 @@ fn is_fully_transparent(loaded: &LoadedMesh) -> bool {
 /// Generates the scene text for a mesh file.
 pub(super) fn scene_text(
     path: &Path,
-    show: ModelView,
+    show: ModelViewOptions,
     containers: &GltfContainers,
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
-    let loaded = containers.load_mesh((path, None), &ignore_progress, token)?;
+    let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds() else {
         return Err(AssetError::Malformed {
             path: path.to_owned(),
@@ -122,7 +122,7 @@ pub(super) fn scene_text(
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(may_cast_caustics) };
     write_render_settings(&mut toml, None, lighting);
     write_camera(&mut toml, &eye, FOV);
-    write_lights(&mut toml, &eye, lighting);
+    write_sky_and_key_light(&mut toml, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.make_unique("model", "model");
@@ -150,7 +150,7 @@ pub(super) fn scene_text(
     write_ground(&mut toml, &mut names, bounds, &eye);
     // The generated material hides the fact that the file has no materials, so report it here.
     let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
-    notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
+    notes.extend(is_mesh_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
     containers.store_mesh_for_next_load(path, loaded);
     Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })

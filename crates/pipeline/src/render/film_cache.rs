@@ -77,7 +77,7 @@ impl FilmCache {
     ///
     /// # Errors
     /// Returns the error from `make`.
-    pub(crate) fn replace_current<E>(
+    pub(crate) fn replace_current_with_retry<E>(
         &mut self,
         make: impl Fn() -> Result<FilmState, E>,
     ) -> Result<&mut FilmState, E> {
@@ -144,7 +144,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::film::Convergence;
+    use crate::film::ConvergenceModel;
     use crate::plan::resolve_plan;
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::tests::loaded_of;
@@ -158,7 +158,7 @@ mod tests {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = resolve_plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
         let mut state =
-            FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified, None).expect("a film");
+            FilmState::new(key(name), &plan, u64::MAX, ConvergenceModel::Stratified, None).expect("a film");
         state.done.fill([1; 2]);
         state
     }
@@ -167,7 +167,7 @@ mod tests {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
             films.make_current_if_cached(key(name), |_| true);
-            films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
+            films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
@@ -193,7 +193,7 @@ mod tests {
     fn oversized_film_does_not_evict_others() {
         let mut films = films(&["a", "b"], state("a").memory_bytes());
         films
-            .replace_current(|| {
+            .replace_current_with_retry(|| {
                 let mut large = state("large");
                 large.base = Some(crate::film::RadianceImage::black(100, 100));
                 Ok::<_, ()>(large)
@@ -210,11 +210,11 @@ mod tests {
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
             films.make_current_if_cached(key(name), |_| true);
-            films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
+            films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
         let tries = std::cell::Cell::new(0);
-        let made = films.replace_current(|| {
+        let made = films.replace_current_with_retry(|| {
             tries.set(tries.get() + 1);
             if tries.get() == 1 { Err("no memory") } else { Ok(state("d")) }
         });
@@ -236,7 +236,7 @@ mod tests {
                 passing.done[0] = [u32::from(is_whole); 2];
                 Ok::<_, ()>(passing)
             };
-            films.replace_current(passing).expect("a film");
+            films.replace_current_with_retry(passing).expect("a film");
             films.make_current_if_cached(key("c"), |_| true);
             assert_eq!(finds(&mut films, "b"), is_whole);
             assert!(finds(&mut films, "a"));
@@ -250,7 +250,7 @@ mod tests {
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
         films.make_current_if_cached(key("c"), |_| true);
         let tries = std::cell::Cell::new(0);
-        let made = films.replace_current(|| {
+        let made = films.replace_current_with_retry(|| {
             tries.set(tries.get() + 1);
             if tries.get() == 1 { Err("no memory") } else { Ok(state("c")) }
         });

@@ -4,16 +4,16 @@ use std::cmp::Reverse;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::forecast::cost::{CellCost, JobCost, PixelOverhead};
+use super::forecast::cost::{CellCost, MeasuredJobCost, PixelOverhead};
 use super::forecast::samples::ExpectedSamples;
 use crate::film::{
-    CELLS, Convergence, Film, FilmError, PixelSubset, Previewer, RadianceImage, Rect, SelectedPixels,
+    CELLS, ConvergenceModel, Film, FilmError, PixelSubset, Previewer, RadianceImage, Rect, SelectedPixels,
     SumOrder,
 };
 use crate::integrators::RayCounters;
-use crate::output::part::Dependency;
+use crate::output::part::RenderInput;
 use crate::plan::RenderPlan;
-use crate::render::noise_goals::SampleGoals;
+use crate::render::noise_goals::CellSampleGoals;
 use crate::render::share::Shard;
 use crate::scene::fingerprint::Fingerprint;
 use crate::trace::{TileJob, TraceCost};
@@ -37,7 +37,7 @@ pub(crate) struct FilmState {
     /// Per-pixel overhead of a job, in addition to the cost of its samples.
     pixel_share: PixelOverhead,
     /// Maximum number of samples for each half of each cell.
-    pub(crate) goals: SampleGoals,
+    pub(crate) goals: CellSampleGoals,
     /// Expected number of samples for halves without a goal.
     expected: ExpectedSamples,
     /// First image at preview size, shown in place of pixels without samples.
@@ -55,20 +55,20 @@ pub(crate) struct FilmState {
     /// Whether each tile belongs to the share. `None` if all tiles do.
     own: Option<Vec<bool>>,
     /// Work done by the process whose checkpoint this render resumed from.
-    pub(crate) before: EarlierWork,
+    pub(crate) before: EarlierProcessWork,
     /// Rays traced by all requests and by the process whose checkpoint this render resumed from.
     pub(crate) traced: RayCounters,
     /// Whether a checkpoint contains all of the film's samples.
     pub(crate) is_kept: bool,
     /// Names and values of everything that affects the image. `None` until first needed.
-    pub(crate) identity: Option<Vec<Dependency>>,
+    pub(crate) identity: Option<Vec<RenderInput>>,
     /// Whether the film was loaded from a finished part.
     pub(crate) is_finished_part: bool,
 }
 
 /// Work done by an earlier process.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct EarlierWork {
+pub(crate) struct EarlierProcessWork {
     /// Ray and texture lookup counts.
     pub(crate) rays: RayCounters,
     /// Duration of the render stage in seconds.
@@ -84,13 +84,13 @@ impl FilmState {
         key: Fingerprint,
         plan: &RenderPlan,
         most_bytes: u64,
-        convergence: Convergence,
+        convergence: ConvergenceModel,
         share: Option<Shard>,
     ) -> Result<Self, FilmError> {
         let blocks = match (&share, convergence) {
             (Some(share), _) => share.sum_order(),
-            (None, Convergence::Photons) => SumOrder::Blocked,
-            (None, Convergence::Stratified) => SumOrder::Sequential,
+            (None, ConvergenceModel::Photons) => SumOrder::Blocked,
+            (None, ConvergenceModel::Stratified) => SumOrder::Sequential,
         };
         let film = Film::with_memory_limit(
             most_bytes,
@@ -98,11 +98,11 @@ impl FilmState {
             plan.settings.render.height,
             plan.crop,
         )?
-        .with_convergence(convergence)
+        .with_convergence_model(convergence)
         .with_sum_order(blocks)?
         .with_layers(plan.settings.layers.len())?;
         let film_cells = film.noise_cell_count();
-        let goals = SampleGoals::undecided(film_cells);
+        let goals = CellSampleGoals::new_undecided(film_cells);
         let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));
         let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
         let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
@@ -125,7 +125,7 @@ impl FilmState {
             render_seconds: 0.0,
             share,
             own,
-            before: EarlierWork::default(),
+            before: EarlierProcessWork::default(),
             traced: RayCounters::default(),
             is_kept: false,
             identity: None,
@@ -142,7 +142,7 @@ impl FilmState {
     /// consecutive, returns only the first consecutive range.
     pub(crate) fn to_global_samples(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
-            Some(share) => share.to_global_samples(samples),
+            Some(share) => share.to_global_sample_range(samples),
             None => samples,
         }
     }
@@ -163,7 +163,7 @@ impl FilmState {
     /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.assigned_cell_halves()
-            .filter(|(cell, _)| self.is_cell_in(part, *cell))
+            .filter(|(cell, _)| self.cell_tile_overlaps(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.get(tile, half).min(samples))
     }
 
@@ -190,14 +190,14 @@ impl FilmState {
             (done < self.goals.get(tile, half).min(most)).then_some(done)
         };
         self.assigned_cell_halves()
-            .filter(|(cell, _)| self.is_cell_in(part, *cell))
+            .filter(|(cell, _)| self.cell_tile_overlaps(part, *cell))
             .filter_map(of)
             .min()
             .unwrap_or(most)
     }
 
     /// Whether a cell's tile overlaps `part`.
-    fn is_cell_in(&self, part: Option<Rect>, cell: usize) -> bool {
+    fn cell_tile_overlaps(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
             self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
         })
@@ -243,7 +243,7 @@ impl FilmState {
         };
         let mut jobs = Vec::new();
         let is_wanted =
-            |tile: &&usize| self.is_tile_in_shard(**tile) && self.is_cell_in(part, CELLS * **tile);
+            |tile: &&usize| self.is_tile_in_shard(**tile) && self.cell_tile_overlaps(part, CELLS * **tile);
         for &tile in self.film.tile_order().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
@@ -279,7 +279,7 @@ impl FilmState {
                 let seconds = seconds * rect.area() as f64;
                 self.seconds += seconds;
                 let (pixels, samples) = (job.pixels.part.count(rect.area()) as f64, job.samples.len() as f64);
-                self.costs[cell].record(JobCost { seconds, pixels, samples }, &mut self.pixel_share);
+                self.costs[cell].record(MeasuredJobCost { seconds, pixels, samples }, &mut self.pixel_share);
                 match job.pixels.part {
                     PixelSubset::All => self.done[cell] = [job.samples.end; 2],
                     PixelSubset::Half(half) => self.done[cell][half] = job.samples.end,
@@ -298,8 +298,8 @@ impl FilmState {
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
     /// noise among them.
-    pub(crate) fn count_tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
-        self.goals.count_tiles_above_target(&self.film, error)
+    pub(crate) fn count_unconverged_at_sample_limit(&self, error: f64) -> Option<(usize, f64)> {
+        self.goals.count_finished_tiles_above_target(&self.film, error)
     }
 
     /// Returns the number of samples rendered so far, summed over all pixels.
@@ -402,7 +402,7 @@ mod tests {
             seconds: 0.0,
             costs: vec![CellCost::default(); cells],
             pixel_share: PixelOverhead::default(),
-            goals: SampleGoals::undecided(cells),
+            goals: CellSampleGoals::new_undecided(cells),
             expected: ExpectedSamples::unknown(cells),
             base: None,
             previewer: None,
@@ -411,7 +411,7 @@ mod tests {
             render_seconds: 0.0,
             share: None,
             own: None,
-            before: EarlierWork::default(),
+            before: EarlierProcessWork::default(),
             traced: RayCounters::default(),
             is_kept: false,
             identity: None,

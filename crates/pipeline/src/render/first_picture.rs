@@ -3,13 +3,13 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use super::preview::PreviewTarget;
+use super::preview::PreviewSender;
 use crate::film::range_map::RangeMap;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{LayerSet, PhotonMaps, RenderSettings};
 use crate::plan::RenderPlan;
 use crate::scene::description::RenderOptions;
-use crate::stages::StopReason;
+use crate::stages::AbortReason;
 use crate::trace::{TileJob, Tracer};
 
 /// Time budget for the first image while the camera is moving.
@@ -58,7 +58,7 @@ impl<'a> CoarseImageRenderer<'a> {
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),
         tick: impl Fn(),
-    ) -> Result<RadianceImage, StopReason> {
+    ) -> Result<RadianceImage, AbortReason> {
         let plan = self.plan;
         let full = (plan.settings.render.width, plan.settings.render.height);
         let render = RenderOptions { width, height, ..plan.settings.render };
@@ -91,14 +91,16 @@ impl<'a> CoarseImageRenderer<'a> {
     /// Returns [`StopReason::Cancelled`] if the token is cancelled.
     pub(crate) fn show_without_photons(
         &self,
-        screen: PreviewTarget<'_>,
+        screen: PreviewSender<'_>,
         tick: impl Fn(),
-    ) -> Result<(), StopReason> {
+    ) -> Result<(), AbortReason> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Skip data views, because they depend on the value range of the whole image or show the photons
         // themselves.
         let is_of_light = self.plan.tone.range_map == RangeMap::None;
-        let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
+        let Some(shown) = screen.fitted_image_size().filter(|_| is_whole && is_of_light) else {
+            return Ok(());
+        };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
         let picture = self.trace_picture(None, size, tick)?;
         screen.show_without_photons(&picture.resized(shown.0, shown.1));

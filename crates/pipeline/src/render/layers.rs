@@ -29,7 +29,7 @@ impl OutputLayer {
 }
 
 /// Returns the squared standard error of each pixel's mean luminance.
-fn luminance_variance_image(state: &FilmState) -> RadianceImage {
+fn squared_standard_error_image(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
@@ -45,7 +45,7 @@ pub(crate) fn layer_images(state: &FilmState, plan: &RenderPlan) -> Vec<LayerIma
     let of = |layer: &OutputLayer| {
         let image = match layer.source() {
             LayerSource::Samples(layer) => take(layer)?,
-            LayerSource::Variance => luminance_variance_image(state),
+            LayerSource::Variance => squared_standard_error_image(state),
             LayerSource::SampleCount => state.film.image(Quantity::Samples),
         };
         Some(LayerImage { name: layer.name(), channels: layer.channel_names(), image })

@@ -7,7 +7,7 @@
 //! worst case, this is a thirtieth of the noise.
 
 use crate::film::{
-    BrightnessPrepass, CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES,
+    BrightnessPrepassPixels, CELLS, CellHalfNoise, ConvergenceModel, Film, PREPASS_SAMPLES,
     total_samples_to_reduce_error,
 };
 
@@ -30,7 +30,7 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 
 /// Maximum number of samples for each half of each cell.
 #[derive(Debug)]
-pub(crate) struct SampleGoals {
+pub(crate) struct CellSampleGoals {
     /// Goal of each half of each cell. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last evaluated. Tiles are evaluated only once per sample count.
@@ -39,9 +39,9 @@ pub(crate) struct SampleGoals {
     pub(super) brightness: Option<f64>,
 }
 
-impl SampleGoals {
+impl CellSampleGoals {
     /// Creates undecided goals for `cells` cells.
-    pub(crate) fn undecided(cells: usize) -> Self {
+    pub(crate) fn new_undecided(cells: usize) -> Self {
         Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
     }
 
@@ -56,7 +56,7 @@ impl SampleGoals {
     }
 
     /// Whether any goal is below `samples`.
-    pub(crate) fn is_any_below(&self, samples: u32) -> bool {
+    pub(crate) fn has_goal_below(&self, samples: u32) -> bool {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
@@ -72,12 +72,12 @@ impl SampleGoals {
     ) -> Option<NoiseMeasurements> {
         let is_time = samples >= LEAST && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
-            self.brightness = BrightnessPrepass::new(film.crop()).film_mean_luminance(film);
+            self.brightness = BrightnessPrepassPixels::new(film.crop()).film_mean_luminance(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = NoiseTarget { error, brightness, convergence: film.convergence() };
         let is_open =
-            |tile: usize| self.judged[tile] < samples && self.has_undecided_half(tile, done, samples);
+            |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
             self.decide_all_goals_from_noise(&noise, done, samples, &aim);
@@ -90,17 +90,17 @@ impl SampleGoals {
     /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
     /// their goals, and the highest noise among them. Such tiles exist because a half's own noise does not
     /// affect its goal.
-    pub(crate) fn count_tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+    pub(crate) fn count_finished_tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
-            let halves = || [0, 1].map(|half| film.tile_half_noise(tile, half)).into_iter().flatten();
+            let halves = || [0, 1].map(|half| film.noise_in_tile_half(tile, half)).into_iter().flatten();
             let count = halves().count() as f64;
             let all =
                 halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
             let whole = halves().next().map(|half| CellHalfNoise { variance: all.0, mean: all.1, ..half });
             let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
-            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative_noise(&noise))
+            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.noise_relative_to_brightness(&noise))
         });
         let too_much = || noise.iter().flatten().filter(|noise| **noise > TOO_MUCH * error);
         let worst = too_much().copied().max_by(f64::total_cmp)?;
@@ -108,7 +108,7 @@ impl SampleGoals {
     }
 
     /// Whether a tile contains an undecided half with `samples` samples.
-    pub(crate) fn has_undecided_half(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(crate) fn tile_has_undecided_half(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -169,7 +169,7 @@ pub(crate) struct TileNoise {
 impl TileNoise {
     fn measure(film: &Film, tile: usize) -> Self {
         let noise = |half| {
-            let noise = film.tile_half_noise(tile, half)?;
+            let noise = film.noise_in_tile_half(tile, half)?;
             // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
             // other bright samples that have not been taken yet.
             Some(CellHalfNoise {
@@ -177,7 +177,7 @@ impl TileNoise {
                 ..noise
             })
         };
-        Self { halves: [0, 1].map(noise), fall: film.last_variance_reduction(tile) }
+        Self { halves: [0, 1].map(noise), fall: film.last_doubling_variance_reduction(tile) }
     }
 }
 
@@ -188,13 +188,13 @@ pub(crate) struct NoiseTarget {
     pub(crate) error: f64,
     /// Mean luminance of the image.
     brightness: f64,
-    pub(crate) convergence: Convergence,
+    pub(crate) convergence: ConvergenceModel,
 }
 
 impl NoiseTarget {
     /// Returns the number of samples needed for the noise to reach the target.
     fn samples_to_reach(&self, noise: &CellHalfNoise) -> u32 {
-        let relative = self.relative_noise(noise);
+        let relative = self.noise_relative_to_brightness(noise);
         if !(relative > 0.0) {
             return noise.samples;
         }
@@ -210,7 +210,7 @@ impl NoiseTarget {
     }
 
     /// Returns the noise relative to the reference brightness.
-    pub(crate) fn relative_noise(&self, noise: &CellHalfNoise) -> f64 {
+    pub(crate) fn noise_relative_to_brightness(&self, noise: &CellHalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
 }
@@ -239,8 +239,8 @@ pub(crate) mod tests {
         film
     }
 
-    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> SampleGoals {
-        let mut goals = SampleGoals::undecided(1);
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> CellSampleGoals {
+        let mut goals = CellSampleGoals::new_undecided(1);
         goals.decide_goals(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
@@ -257,11 +257,15 @@ pub(crate) mod tests {
     fn noise_in_only_one_half_is_reported() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.count_tiles_above_target(&rough, 0.01), None, "the first half should continue");
+        assert_eq!(
+            goals.count_finished_tiles_above_target(&rough, 0.01),
+            None,
+            "the first half should continue"
+        );
         let clean = judged([(1.0, 0.0); 2], 16, 0.01);
-        assert_eq!(clean.count_tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        assert_eq!(clean.count_finished_tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
         // One of the two halves has a standard error of √(1/12/16).
-        let Some((tiles, worst)) = clean.count_tiles_above_target(&rough, 0.01) else {
+        let Some((tiles, worst)) = clean.count_finished_tiles_above_target(&rough, 0.01) else {
             panic!("one tile should be reported")
         };
         assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
@@ -303,7 +307,7 @@ pub(crate) mod tests {
                 },
             );
         }
-        let mut goals = SampleGoals::undecided(2 * CELLS);
+        let mut goals = CellSampleGoals::new_undecided(2 * CELLS);
         goals.decide_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
         assert_eq!((goals.get(0, 0), goals.get(CELLS, 0)), (u32::MAX, 16));
     }
@@ -313,7 +317,7 @@ pub(crate) mod tests {
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
-        let (mut goals, mut done) = (SampleGoals::undecided(1), [[0; 2]]);
+        let (mut goals, mut done) = (CellSampleGoals::new_undecided(1), [[0; 2]]);
         for target in [16, 32, 64, 128, MOST] {
             for half in 0..2 {
                 let goal = goals.get(0, if by_own { 1 - half } else { half }).min(target);

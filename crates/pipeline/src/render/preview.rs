@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{ImagePosition, NormalizedRect, PreviewImageState, PreviewSize};
+use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewImageState};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for orders.
@@ -19,28 +19,29 @@ const PATIENCE: Duration = Duration::from_millis(4);
 
 /// Destination and contents of previews.
 #[derive(Clone, Copy)]
-pub(crate) struct PreviewTarget<'a> {
+pub(crate) struct PreviewSender<'a> {
     /// Maximum size of previews. `None` disables them.
-    pub(crate) bounds: Option<PreviewSize>,
+    pub(crate) bounds: Option<MaxPreviewSize>,
     pub(crate) plan: &'a RenderPlan,
     pub(crate) sink: &'a EventSink,
 }
 
-impl PreviewTarget<'_> {
+impl PreviewSender<'_> {
     /// Returns the size of a preview of the whole image.
-    pub(crate) fn size(&self) -> Option<(u32, u32)> {
+    pub(crate) fn fitted_image_size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
         self.bounds.and_then(|bounds| fit_size(render.width, render.height, bounds))
     }
 
     /// Sends a preview of the whole film unless cancelled. Must not be called while tiles are rendering,
     /// because it uses the thread pool.
-    pub(crate) fn show(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
-        let Some(size) = self.size() else { return };
+    pub(crate) fn send_film_preview(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
+        let Some(size) = self.fitted_image_size() else { return };
         if self.send_section_if_requested(state, true) {
             return;
         }
-        while !pool.install(|| update_previewer(state, self.plan.settings.view.film_quantity(), size)) {
+        while !pool.install(|| update_previewer_briefly(state, self.plan.settings.view.film_quantity(), size))
+        {
             if token.is_cancelled() {
                 return;
             }
@@ -51,11 +52,11 @@ impl PreviewTarget<'_> {
     /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
     /// was completed and sent.
     pub(crate) fn update_briefly(&self, state: &mut FilmState) -> bool {
-        let Some(size) = self.size() else { return false };
+        let Some(size) = self.fitted_image_size() else { return false };
         if self.send_section_if_requested(state, false) {
             return true;
         }
-        update_previewer(state, self.plan.settings.view.film_quantity(), size);
+        update_previewer_briefly(state, self.plan.settings.view.film_quantity(), size);
         let is_whole = state.previewer.as_ref().is_some_and(Previewer::has_processed_all_tiles);
         if is_whole {
             self.send_current(state, false);
@@ -74,7 +75,7 @@ impl PreviewTarget<'_> {
 
     /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
     fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
-        let Some(rect) = self.section() else { return false };
+        let Some(rect) = self.requested_section() else { return false };
         let quantity = self.plan.settings.view.film_quantity();
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
@@ -120,9 +121,9 @@ impl PreviewTarget<'_> {
     }
 
     /// Returns the pixels of the 1:1 section, if one was requested.
-    fn section(&self) -> Option<Rect> {
+    fn requested_section(&self) -> Option<Rect> {
         let render = &self.plan.settings.render;
-        let PreviewSize { width, height, around } = self.bounds?;
+        let MaxPreviewSize { width, height, around } = self.bounds?;
         let ImagePosition { x, y } = around?;
         let along = |middle: f64, length: u32, side: u32| {
             let length = length.min(side);
@@ -136,14 +137,14 @@ impl PreviewTarget<'_> {
 }
 
 /// Spends a short time on updating the previewer. Returns whether it is now up to date.
-fn update_previewer(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+fn update_previewer_briefly(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
-    let previewer = state.previewer.get_or_insert_with(|| Previewer::with_quantity(quantity, width, height));
+    let previewer = state.previewer.get_or_insert_with(|| Previewer::for_quantity(quantity, width, height));
     previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.
-fn fit_size(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
+fn fit_size(width: u32, height: u32, bounds: MaxPreviewSize) -> Option<(u32, u32)> {
     if bounds.width == 0 || bounds.height == 0 {
         return None;
     }
@@ -164,7 +165,7 @@ mod tests {
 
     #[test]
     fn preview_keeps_the_aspect_ratio() {
-        let bounds = |width, height| PreviewSize { width, height, around: None };
+        let bounds = |width, height| MaxPreviewSize { width, height, around: None };
         assert_eq!(fit_size(640, 480, bounds(80, 48)), Some((64, 48)));
         assert_eq!(fit_size(640, 480, bounds(64, 100)), Some((64, 48)));
         assert_eq!(fit_size(10_000, 1, bounds(80, 48)), Some((80, 1)));

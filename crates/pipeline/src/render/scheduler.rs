@@ -6,20 +6,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
-use super::film_state::{EarlierWork, FilmState};
+use super::film_state::{EarlierProcessWork, FilmState};
 use super::first_picture::CoarseImageRenderer;
 use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
-use super::preview::PreviewTarget;
+use super::preview::PreviewSender;
 use super::share::Shard;
 use super::time_budget::next_round_goals;
-use crate::film::{BrightnessPrepass, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
+use crate::film::{BrightnessPrepassPixels, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::plan::RenderPlan;
-use crate::protocol::{NormalizedRect, PreviewSize};
+use crate::protocol::{MaxPreviewSize, NormalizedRect};
 use crate::scene::description::RenderOptions;
 use crate::sink::EventSink;
-use crate::stages::StopReason;
+use crate::stages::AbortReason;
 use crate::stages::photons::{PhotonContext, PhotonStore};
 use crate::stopwatch::PausableClock;
 use crate::trace::{TileJob, Tracer, samples_after_next_pass};
@@ -37,7 +37,7 @@ pub(crate) struct RenderStageInputs<'a> {
     pub(crate) plan: &'a RenderPlan,
     /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
-    pub(crate) preview: Option<PreviewSize>,
+    pub(crate) preview: Option<MaxPreviewSize>,
     pub(crate) most_film_bytes: u64,
     /// Whether to start with an empty film even if a film is cached.
     pub(crate) force: bool,
@@ -48,7 +48,7 @@ pub(crate) struct RenderStageInputs<'a> {
     /// pixel has a sample.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
     /// Takes a pending order to change the preview size.
-    pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
+    pub(crate) take_preview: &'a dyn Fn() -> Option<Option<MaxPreviewSize>>,
     /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
     /// Speed at which the most recent first image was rendered, in pixels per second.
@@ -63,7 +63,7 @@ pub(crate) struct RenderStageInputs<'a> {
 pub(crate) struct Scheduler<'a> {
     pub(crate) state: &'a mut FilmState,
     rendering: &'a RenderStageInputs<'a>,
-    screen: PreviewTarget<'a>,
+    screen: PreviewSender<'a>,
     clock: PausableClock,
     forecast: Forecast,
     /// Number of samples so far, summed over all pixels.
@@ -85,12 +85,12 @@ impl<'a> Scheduler<'a> {
         let units = state.total_pixel_samples();
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
-        let EarlierWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
+        let EarlierProcessWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
         Self {
             is_first: !state.covers_all_pixels(),
             state,
             rendering,
-            screen: PreviewTarget { bounds, plan: rendering.plan, sink: rendering.sink },
+            screen: PreviewSender { bounds, plan: rendering.plan, sink: rendering.sink },
             clock: PausableClock::start(),
             forecast,
             units,
@@ -107,11 +107,11 @@ impl<'a> Scheduler<'a> {
     ///
     /// # Errors
     /// Returns [`StopReason::Cancelled`] if the token is cancelled. The film keeps its samples.
-    pub(crate) fn run(&mut self) -> Result<(), StopReason> {
+    pub(crate) fn run(&mut self) -> Result<(), AbortReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
-        let (traced, seconds) = (self.total_rays(), self.seconds_across_requests());
-        if let (Some(checkpointer), Err(StopReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
+        let (traced, seconds) = (self.rays_of_all_requests(), self.seconds_across_requests());
+        if let (Some(checkpointer), Err(AbortReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
             self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds);
         }
         self.state.traced = traced;
@@ -119,7 +119,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Returns the number of rays traced for this film by all requests.
-    pub(crate) fn total_rays(&self) -> RayCounters {
+    pub(crate) fn rays_of_all_requests(&self) -> RayCounters {
         let mut traced = self.state.traced;
         traced += self.rays;
         traced
@@ -136,7 +136,7 @@ impl<'a> Scheduler<'a> {
         self.seconds_before + self.clock.active_seconds(self.rendering.tracer.token.is_paused())
     }
 
-    fn run_passes_to_end(&mut self) -> Result<(), StopReason> {
+    fn run_passes_to_end(&mut self) -> Result<(), AbortReason> {
         self.report_progress(false);
         if self.is_first {
             if self.state.base.is_none() {
@@ -175,20 +175,21 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
-    fn estimate_reference_brightness(&mut self) -> Result<(), StopReason> {
+    fn estimate_reference_brightness(&mut self) -> Result<(), AbortReason> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
-        let pilot = BrightnessPrepass::new(self.state.film.crop());
+        let pilot = BrightnessPrepassPixels::new(self.state.film.crop());
         let job = |number: u64| {
-            let (x, y) = pilot.position(number);
+            let (x, y) = pilot.pixel_position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
             // Store the job's index as the tile number.
             TileJob { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
         };
-        let jobs: Vec<TileJob> = (0..pilot.count()).map(job).collect();
+        let jobs: Vec<TileJob> = (0..pilot.pixel_count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
-        let keep = |_: &TileJob, samples: TileSamples| BrightnessPrepass::pixel_luminance(samples);
+        let keep =
+            |_: &TileJob, samples: TileSamples| BrightnessPrepassPixels::luminance_from_samples(samples);
         self.rendering.tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;
@@ -212,7 +213,7 @@ impl<'a> Scheduler<'a> {
 
     /// Runs passes until every pixel in `part` (`None` for all) has `samples` samples or has reached its
     /// goal.
-    fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), StopReason> {
+    fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), AbortReason> {
         let RenderOptions { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.decide_goals_from_existing(part);
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
@@ -230,7 +231,7 @@ impl<'a> Scheduler<'a> {
             }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
                 self.rendering.tracer.pool.install(|| self.state.decide_goals(target, error.into()));
-                self.forecast.update_work_estimate(self.state, most);
+                self.forecast.update_total_work(self.state, most);
             }
         }
         Ok(())
@@ -243,9 +244,9 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders all tiles in `part` that have fewer than `target` samples.
-    fn run_pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), StopReason> {
+    fn run_pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), AbortReason> {
         let Some(photons) = self.rendering.photons else {
-            return self.render_jobs(part, |_, _| target, None, 0);
+            return self.render_to_sample_targets(part, |_, _| target, None, 0);
         };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
             let samples = self.state.min_unfinished_samples_in(part, target);
@@ -261,7 +262,7 @@ impl<'a> Scheduler<'a> {
             if self.is_over_time {
                 break;
             }
-            self.render_jobs(part, |_, _| end, Some(&maps), numbers.start - samples)?;
+            self.render_to_sample_targets(part, |_, _| end, Some(&maps), numbers.start - samples)?;
         }
         Ok(())
     }
@@ -271,13 +272,15 @@ impl<'a> Scheduler<'a> {
         &mut self,
         photons: &PhotonStore,
         samples: Range<u32>,
-    ) -> Result<PhotonMaps, StopReason> {
+    ) -> Result<PhotonMaps, AbortReason> {
         let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
         let begin = self.clock.active_seconds(token.is_paused());
         self.forecast.begin_photons(begin);
-        let maps = photons
-            .maps(samples, PhotonContext { world, plan, pool, token, sink }, || self.run_due_tasks())?;
+        let maps =
+            photons.get_or_trace_maps(samples, PhotonContext { world, plan, pool, token, sink }, || {
+                self.run_due_tasks()
+            })?;
         self.forecast.end_photons(self.clock.active_seconds(token.is_paused()));
         Ok(maps)
     }
@@ -295,7 +298,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders both halves of every cell in short steps until they reach their goals.
-    fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), StopReason> {
+    fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), AbortReason> {
         const STEP: Duration = Duration::from_millis(30);
         /// Number of pixels in half a tile.
         const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
@@ -308,7 +311,7 @@ impl<'a> Scheduler<'a> {
             if done == goals {
                 break;
             }
-            self.render_jobs(
+            self.render_to_sample_targets(
                 None,
                 |cell, half| goals[cell][half].min(done[cell][half].saturating_add(most)),
                 None,
@@ -318,13 +321,13 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    fn render_jobs(
+    fn render_to_sample_targets(
         &mut self,
         part: Option<Rect>,
         target: impl Fn(usize, usize) -> u32,
         photons: Option<&PhotonMaps>,
         first: u32,
-    ) -> Result<(), StopReason> {
+    ) -> Result<(), AbortReason> {
         let jobs = self.state.jobs(part, target);
         let film = Arc::clone(&self.state.film);
         let layers = Some(&*film).filter(|_| !self.rendering.plan.settings.layers.is_empty());
@@ -359,7 +362,7 @@ impl<'a> Scheduler<'a> {
         let seconds = self.total_render_seconds();
         if let Some(checkpointer) = self.rendering.checkpointer {
             let rendered = self.seconds_across_requests();
-            checkpointer.save_if_due(self.state, self.total_rays(), rendered);
+            checkpointer.save_if_due(self.state, self.rays_of_all_requests(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
@@ -367,7 +370,7 @@ impl<'a> Scheduler<'a> {
 
     pub(crate) fn show(&mut self) {
         let Tracer { pool, token, .. } = self.rendering.tracer;
-        self.screen.show(self.state, pool, token);
+        self.screen.send_film_preview(self.state, pool, token);
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
@@ -377,7 +380,7 @@ impl<'a> Scheduler<'a> {
         let RenderStageInputs { plan, photons, sink, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
         let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };
-        sink.send_progress(self.forecast.progress(&moment));
+        sink.send_progress(self.forecast.progress_and_predictions(&moment));
     }
 
     fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {
@@ -386,8 +389,8 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.
-    fn trace_coarse_images(&mut self) -> Result<(), StopReason> {
-        let Some(shown) = self.screen.size() else { return Ok(()) };
+    fn trace_coarse_images(&mut self) -> Result<(), AbortReason> {
+        let Some(shown) = self.screen.fitted_image_size() else { return Ok(()) };
         let coarse = self.coarse_image_renderer();
         for size in coarse.sizes(shown) {
             let maps = match self.rendering.photons {

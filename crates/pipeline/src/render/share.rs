@@ -56,7 +56,7 @@ impl Shard {
 
     /// Maps this share's samples `own` to sample indices in the whole image, stopping at the end of the
     /// block.
-    pub(crate) fn to_global_samples(&self, own: Range<u32>) -> Range<u32> {
+    pub(crate) fn to_global_sample_range(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
         let start = block * BLOCK_SIZE + own.start % BLOCK_SIZE;
@@ -79,7 +79,7 @@ impl Shard {
     }
 
     /// Returns the number of blocks in the image. 0 if shares consist of tiles.
-    pub(crate) fn block_count(&self) -> u32 {
+    pub(crate) fn image_block_count(&self) -> u32 {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
@@ -125,7 +125,7 @@ mod tests {
                         for tile in (0..tiles).filter(|tile| own[*tile]) {
                             let mut done = 0;
                             while done < share.samples_per_pixel() {
-                                let numbers = share.to_global_samples(done..share.samples_per_pixel());
+                                let numbers = share.to_global_sample_range(done..share.samples_per_pixel());
                                 done += numbers.len() as u32;
                                 assert!(numbers.clone().all(|number| seen.insert((tile, number))));
                             }
@@ -148,6 +148,6 @@ mod tests {
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
         assert_eq!(share.sum_order(), SumOrder::SeparateBlocks(128));
         assert_eq!(Shard::new((1, 1), true, 40).sum_order(), SumOrder::SeparateBlocks(2));
-        assert_eq!(Shard::new((1, 1), true, 40).block_count(), 3);
+        assert_eq!(Shard::new((1, 1), true, 40).image_block_count(), 3);
     }
 }

@@ -34,10 +34,10 @@ pub(crate) fn next_round_goals(
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
-    let halves = collect_half_cells(film, done, rays, (known, most))?;
+    let halves = collect_cell_halves(film, done, rays, (known, most))?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
-    let work: f64 = halves.iter().map(|half| half.work(half.samples)).sum();
+    let work: f64 = halves.iter().map(|half| half.cost_of_samples(half.samples)).sum();
     let mut order: Vec<(f64, &HalfCell)> =
         halves.iter().map(|half| (half.error_reduction_per_cost(mean), half)).collect();
     order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -47,7 +47,7 @@ pub(crate) fn next_round_goals(
             break;
         }
         goals[half.cell][half.half] = half.goal;
-        to_do += half.work(half.goal - half.samples);
+        to_do += half.cost_of_samples(half.goal - half.samples);
     }
     Some(goals)
 }
@@ -69,7 +69,7 @@ struct HalfCell {
 }
 
 impl HalfCell {
-    fn work(&self, samples: u32) -> f64 {
+    fn cost_of_samples(&self, samples: u32) -> f64 {
         self.pixels * f64::from(samples) * self.cost
     }
 
@@ -84,7 +84,7 @@ impl HalfCell {
     }
 }
 
-fn collect_half_cells(
+fn collect_cell_halves(
     film: &Film,
     done: &[[u32; 2]],
     rays: &[u64],

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{ImageReport, LightsReport, PhotonsReport, Report, SampledLightSet, WorkCounters};
+use super::{ImageReport, LightSamplingReport, PhotonsReport, Report, SampledLightSet, WorkCounters};
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::ProtectedInputs;
-use crate::integrators::{RayCounters, light_sampling_purpose};
+use crate::integrators::{RayCounters, light_sampling_mode};
 use crate::output::write::{WritePolicy, atomic_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
@@ -38,7 +38,7 @@ pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport
         scene: finished.scene.to_string_lossy().into_owned(),
         image: image_report(finished),
         settings: finished.plan.effective.clone(),
-        lights: lights_report(finished),
+        lights: light_sampling_report(finished),
         photons: finished.photons,
         stages,
         counters: count_work(finished),
@@ -71,7 +71,7 @@ pub(crate) fn write_report(
 ///
 /// # Errors
 /// The file cannot be removed. The error contains the file name.
-pub(crate) fn remove_report(
+pub(crate) fn remove_stale_report(
     plan: &RenderPlan,
     inputs: &ProtectedInputs,
     sink: &EventSink,
@@ -104,18 +104,18 @@ fn image_report(finished: &RequestResults<'_>) -> ImageReport {
     }
 }
 
-fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
+fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
     let lights = &finished.world.lights;
     let settings = &finished.plan.settings;
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler_for_mode(light_sampling_purpose(settings, are_gathered));
+    let selection = lights.sampler_for_mode(light_sampling_mode(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (SampledLightSet::Picked, samples * u64::from(selection.picks.count)),
         None => (SampledLightSet::All, 0),
     };
-    LightsReport {
+    LightSamplingReport {
         count: lights.len() as u64,
         sampled,
         picks,

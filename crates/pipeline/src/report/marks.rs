@@ -16,7 +16,7 @@ pub(crate) struct ReportRecognitionFields {
     _image: IgnoredAny,
     #[serde(rename = "settings")]
     _settings: IgnoredAny,
-    stages: Vec<StageRecognitionFields>,
+    stages: Vec<ReportStageName>,
     #[serde(rename = "counters")]
     _counters: IgnoredAny,
     #[serde(rename = "seconds")]
@@ -26,7 +26,7 @@ pub(crate) struct ReportRecognitionFields {
 }
 
 #[derive(Deserialize)]
-struct StageRecognitionFields {
+struct ReportStageName {
     name: String,
 }
 

@@ -7,7 +7,7 @@ use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, Meshes};
-use super::{FileReadContext, StageResult, StopReason};
+use super::{AbortReason, FileReadContext, StageResult};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::math::DVec3;
@@ -18,7 +18,7 @@ use crate::world::{
 };
 
 /// A mesh with distinct lights, and its key.
-type SeparatedEmitterMesh = (Fingerprint, Arc<LoadedMesh>);
+type MeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -34,10 +34,10 @@ pub(crate) struct AccelCache {
 }
 
 impl AccelCache {
-    pub(crate) fn end_request(&mut self, success: bool, request: u64) {
-        self.trees.end_request(success, request);
-        self.distinct.end_request(success, request);
-        self.geometry.end_request(success, request);
+    pub(crate) fn record_request_usage(&mut self, success: bool, request: u64) {
+        self.trees.record_request_usage(success, request);
+        self.distinct.record_request_usage(success, request);
+        self.geometry.record_request_usage(success, request);
     }
 
     pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
@@ -54,7 +54,7 @@ impl AccelCache {
     /// Returns the most recently built or reused geometry.
     #[cfg(test)]
     pub(crate) fn latest(&self) -> Option<&Arc<Geometry>> {
-        self.geometry.latest(&self.last?)
+        self.geometry.get_by_name(&self.last?)
     }
 }
 
@@ -77,10 +77,10 @@ pub(crate) fn build_accel_structures(
     meshes: &Meshes,
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<AccelResult>, StopReason> {
-    let distinct = separate_mesh_emitters(scene, meshes, cache, reading.token)?;
+) -> Result<StageResult<AccelResult>, AbortReason> {
+    let distinct = separate_coincident_mesh_emitters(scene, meshes, cache, reading.token)?;
     let (meshes, kept) = build_mesh_trees(scene, (meshes, &distinct), cache, reading)?;
-    let lights_key = keys::with_origin(&keys::coplanar_lights_key(scene, of), origin);
+    let lights_key = keys::key_with_coordinate_origin(&keys::coplanar_lights_key(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
     let changed = distinct.iter().map(|distinct| distinct.as_ref().map(|(key, _)| *key));
@@ -107,14 +107,14 @@ pub(crate) fn build_accel_structures(
 }
 
 /// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
-fn separate_mesh_emitters(
+fn separate_coincident_mesh_emitters(
     scene: &Scene,
     meshes: &Meshes,
     cache: &mut AccelCache,
     token: &CancelToken,
-) -> Result<Vec<Option<SeparatedEmitterMesh>>, StopReason> {
+) -> Result<Vec<Option<MeshWithSeparateEmitters>>, AbortReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
-        let key = keys::separated_emitter_mesh_key(&mesh.key, is_emissive);
+        let key = keys::lifted_emitter_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
             Some(found) => found,
             None => {
@@ -133,10 +133,10 @@ fn separate_mesh_emitters(
 /// Returns the trees for all meshes, and how many of them were cached.
 fn build_mesh_trees(
     scene: &Scene,
-    (meshes, distinct): (&Meshes, &[Option<SeparatedEmitterMesh>]),
+    (meshes, distinct): (&Meshes, &[Option<MeshWithSeparateEmitters>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
-) -> Result<(Vec<Arc<MeshTree>>, usize), StopReason> {
+) -> Result<(Vec<Arc<MeshTree>>, usize), AbortReason> {
     let mut kept = 0;
     let accel = scene.render.accel;
     let mut trees = Vec::with_capacity(meshes.len());

@@ -46,7 +46,7 @@ impl GltfContainers {
     }
 
     /// Reads a mesh file, a part of a glTF file, or a whole glTF file as a single mesh.
-    pub(crate) fn load_mesh(
+    pub(crate) fn load_any_mesh(
         &self,
         (path, part): (&Path, Option<u32>),
         progress: Progress<'_>,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::keys;
 use super::meshes::Meshes;
-use super::{Findings, StopReason};
+use super::{AbortReason, Findings};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::scene::LoadedScene;
@@ -28,7 +28,7 @@ pub(crate) fn find_glass_solids(
     memo: &mut Memo<Arc<GlassSolids>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Arc<GlassSolids>, StopReason> {
+) -> Result<Arc<GlassSolids>, AbortReason> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::glass_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None));
@@ -42,7 +42,7 @@ pub(crate) fn find_glass_solids(
     findings.warnings.extend(open_glass_warnings(loaded, bodies.open_objects()));
     findings
         .warnings
-        .extend(bodies.zero_volume_objects().iter().map(|&object| flat_glass_warning(loaded, object)));
+        .extend(bodies.zero_volume_objects().iter().map(|&object| zero_volume_glass_warning(loaded, object)));
     Ok(bodies)
 }
 
@@ -158,7 +158,7 @@ fn list_object_names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
 }
 
 /// Returns the warning about a closed mesh that encloses no volume.
-fn flat_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnostic {
+fn zero_volume_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
     let message =

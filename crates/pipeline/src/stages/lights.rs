@@ -9,13 +9,13 @@ use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
-use crate::lights::{LightSamplingMode, Lights};
+use crate::lights::{LightSamplingPurpose, Lights};
 use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, Geometry, TextureSource};
 
 /// Cache of the environment map's importance distribution, which does not depend on the map's rotation.
-pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
+pub(crate) type EnvironmentMapMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
 /// Collects the lights, or reuses them if they are unchanged.
 pub(crate) fn collect_lights(
@@ -23,13 +23,14 @@ pub(crate) fn collect_lights(
     of: &FingerprintContext<'_>,
     geometry: &Geometry,
     textures: &Textures,
-    (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
+    (memo, skies): (&mut Memo<Arc<Lights>>, &mut EnvironmentMapMemo),
     token: &CancelToken,
 ) -> Result<StageResult<Arc<Lights>>, Cancelled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
-    let declared = emission_textures(scene).filter_map(|source| textures.key_of.get(&source));
+    let declared = emissive_material_textures(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();
-    let key = keys::lights_key(scene, of, (geometry.origin(), geometry.light_lifts()), (map, &patterns));
+    let key =
+        keys::lights_key(scene, of, (geometry.coordinate_origin(), geometry.light_lifts()), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
@@ -40,11 +41,12 @@ pub(crate) fn collect_lights(
         1 => StageResult::done(lights, "1 light"),
         count => {
             let are_picked = |receivers| lights.sampler_for_mode(receivers).is_some();
-            let picked = match (are_picked(LightSamplingMode::Eye), are_picked(LightSamplingMode::Paths)) {
-                (true, _) => describe_light_tree("a subset is sampled", &lights),
-                (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
-                (false, false) => String::new(),
-            };
+            let picked =
+                match (are_picked(LightSamplingPurpose::Eye), are_picked(LightSamplingPurpose::Paths)) {
+                    (true, _) => describe_light_tree("a subset is sampled", &lights),
+                    (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
+                    (false, false) => String::new(),
+                };
             StageResult::done(lights, format!("{count} lights{picked}"))
         }
     })
@@ -56,7 +58,7 @@ fn describe_light_tree(which: &str, lights: &Lights) -> String {
 }
 
 /// Returns the textures used by the scene file's emissive materials.
-fn emission_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
+fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(move |material| {
         let textures = material.textures().into_iter().filter(|(_, role)| match role {
@@ -73,9 +75,9 @@ fn emission_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     })
 }
 
-fn sky_map(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
+fn sky_map(textures: &Textures, memo: &mut EnvironmentMapMemo) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {
-        *memo = SkyMemo::default();
+        *memo = EnvironmentMapMemo::default();
         return None;
     };
     if let Some(sky) = memo.get(*key) {

@@ -10,7 +10,7 @@ use super::super::cache::NamedCache;
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FileRead};
 use super::containers::canonical;
-use super::{FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, StopReason, loading_result};
+use super::{AbortReason, FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, loading_result};
 use crate::assets::{AssetError, Companion, DroppedFaces, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
@@ -47,10 +47,10 @@ pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 /// The token is cancelled, or there is not enough memory.
 pub(crate) fn load_meshes(
     loaded: &LoadedScene,
-    cache: &mut NamedCache<MeshName, CachedMesh>,
+    cache: &mut NamedCache<MeshPathAndPart, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Meshes>, StopReason> {
+) -> Result<StageResult<Meshes>, AbortReason> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
         return Ok(StageResult::skipped(Vec::new(), reasons::NO_MESHES));
@@ -58,11 +58,11 @@ pub(crate) fn load_meshes(
     let before: Vec<(FileContentId, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {
-            let name = mesh_name(file);
-            let content = reading.contents.read_content_id(&file.value, reading.token)?;
-            if let Some(last) = cache.latest(&name) {
+            let name = mesh_identity(file);
+            let content = reading.contents.first_seen_content_id(&file.value, reading.token)?;
+            if let Some(last) = cache.get_by_name(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
-                read_current_contents(&last.companions, reading)?;
+                read_current_content_ids(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
         })
@@ -73,16 +73,16 @@ pub(crate) fn load_meshes(
             .zip(before)
             .map(|(file, (content, kept))| {
                 let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
-                    reading.containers.load_mesh((&file.value, file.part), progress, token)
+                    reading.containers.load_any_mesh((&file.value, file.part), progress, token)
                 };
-                load_one(file, content, kept, reading, load)
+                load_or_reuse_mesh(file, content, kept, reading, load)
             })
             .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
     let mut counts = FileCounts::default();
     let mut warnings = MeshWarnings::default();
-    let file_materials = are_file_materials_used(&loaded.scene);
+    let file_materials = mesh_files_with_used_materials(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.add_file(file));
@@ -92,12 +92,12 @@ pub(crate) fn load_meshes(
                 counts.loaded += usize::from(!was_kept);
                 warnings.add(file, &mesh.mesh, uses_own);
                 let bytes = mesh.mesh.mesh.memory_bytes();
-                cache.insert(mesh_name(file), file_key(file, content), (mesh.clone(), bytes));
+                cache.insert(mesh_identity(file), file_key(file, content), (mesh.clone(), bytes));
                 mesh
             }
-            Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
+            Err(AssetError::Cancelled(_)) => return Err(AbortReason::Cancelled),
             Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
-                return Err(StopReason::work_failure(error));
+                return Err(AbortReason::work_failure(error));
             }
             Err(error) => {
                 counts.failed += 1;
@@ -122,7 +122,7 @@ pub(crate) fn load_meshes(
     warn_about_missing_mesh_data(loaded, files, &meshes, findings);
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
-        findings.warnings.extend(loaded.lights_facing_away(bounds));
+        findings.warnings.extend(loaded.lights_facing_away_warnings(bounds));
     }
     Ok(loading_result(meshes, counts))
 }
@@ -179,14 +179,14 @@ fn warn_about_missing_mesh_data(
 }
 
 /// Canonical path of a mesh file, and a part number.
-pub(crate) type MeshName = (PathBuf, Option<u32>);
+pub(crate) type MeshPathAndPart = (PathBuf, Option<u32>);
 
-fn mesh_name(file: &MeshFile) -> MeshName {
+fn mesh_identity(file: &MeshFile) -> MeshPathAndPart {
     (canonical(&file.value), file.part)
 }
 
 /// Loads one file, or returns the cached mesh if the file and all files it references are unchanged.
-fn load_one(
+fn load_or_reuse_mesh(
     file: &MeshFile,
     content: FileContentId,
     kept: Option<Arc<CachedMesh>>,
@@ -196,7 +196,7 @@ fn load_one(
     let path = &file.value;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == read_current_contents(&mesh.companions, reading)?
+        && mesh.companions == read_current_content_ids(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
@@ -235,8 +235,8 @@ fn has_companion_appeared(
     reading: &FileReadContext<'_>,
 ) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
-        let is_new = reading.contents.known(&companion.path).is_none();
-        let content = reading.contents.read_content_id(&companion.path, reading.token)?;
+        let is_new = reading.contents.seen_content(&companion.path).is_none();
+        let content = reading.contents.first_seen_content_id(&companion.path, reading.token)?;
         if is_new && matches!(content, FileContentId::Hash(_)) {
             return Ok(true);
         }
@@ -245,12 +245,12 @@ fn has_companion_appeared(
 }
 
 /// Returns the files with their current contents.
-fn read_current_contents(
+fn read_current_content_ids(
     files: &[FileRead],
     reading: &FileReadContext<'_>,
 ) -> Result<Vec<FileRead>, Cancelled> {
     let now = |file: &FileRead| {
-        let content = reading.contents.read_content_id(&file.path, reading.token)?;
+        let content = reading.contents.first_seen_content_id(&file.path, reading.token)?;
         Ok(FileRead { path: file.path.clone(), content })
     };
     files.iter().map(now).collect()
@@ -265,7 +265,7 @@ fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
 }
 
 /// Returns, for each mesh file, whether any object uses the file's own materials.
-fn are_file_materials_used(scene: &Scene) -> Vec<bool> {
+fn mesh_files_with_used_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
     plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);
@@ -361,7 +361,7 @@ mod tests {
     use super::super::containers::GltfContainers;
     use super::*;
     use crate::sink::EventSink;
-    use crate::watch::content::{FileHashCache, Snapshot};
+    use crate::watch::content::{FileHashCache, RequestFileSnapshot};
 
     const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
@@ -370,7 +370,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: EventSink,
         pool: rayon::ThreadPool,
-        cache: NamedCache<MeshName, CachedMesh>,
+        cache: NamedCache<MeshPathAndPart, CachedMesh>,
         contents: Arc<FileHashCache>,
     }
 
@@ -390,8 +390,8 @@ mod tests {
             std::fs::write(self.folder.path().join(name), text).expect("written");
         }
 
-        fn snapshot(&self) -> Snapshot {
-            Snapshot::new(self.contents.clone())
+        fn snapshot(&self) -> RequestFileSnapshot {
+            RequestFileSnapshot::new(self.contents.clone())
         }
 
         fn hash(&self, name: &str) -> FileContentId {
@@ -400,14 +400,14 @@ mod tests {
         }
 
         /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
-        fn read(&mut self, contents: &Snapshot) -> (Arc<CachedMesh>, Vec<FileRead>) {
+        fn read(&mut self, contents: &RequestFileSnapshot) -> (Arc<CachedMesh>, Vec<FileRead>) {
             let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
             assert!(findings.errors.is_empty(), "{:?}", findings.errors);
             (meshes[0].clone(), findings.files)
         }
 
         /// Loads the meshes of a scene that contains `tables`.
-        fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
+        fn find(&mut self, tables: &str, contents: &RequestFileSnapshot) -> (Meshes, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
@@ -495,7 +495,7 @@ mod tests {
         // Change the file after the request has hashed it.
         let snapshot = fixture.snapshot();
         snapshot
-            .read_content_id(&fixture.folder.path().join("a.obj"), &CancelToken::new())
+            .first_seen_content_id(&fixture.folder.path().join("a.obj"), &CancelToken::new())
             .expect("not cancelled");
         fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
         let (mesh, files) = fixture.read(&snapshot);
@@ -534,8 +534,8 @@ mod tests {
             mesh
         };
         let old = fixture.hash("a.mtl");
-        let asset =
-            load_one(&file, fixture.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let asset = load_or_reuse_mesh(&file, fixture.hash("a.obj"), None, &reading, load_and_change)
+            .expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
     }
@@ -560,8 +560,8 @@ mod tests {
             fixture.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             mesh
         };
-        let asset =
-            load_one(&file, fixture.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
+        let asset = load_or_reuse_mesh(&file, fixture.hash("a.obj"), None, &reading, load_and_appear)
+            .expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, fixture.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);

@@ -23,7 +23,7 @@ use rayon::ThreadPool;
 use self::containers::GltfContainers;
 use super::protocol::{Failure, Status, reasons};
 use super::sink::EventSink;
-use super::watch::content::{FileHashCache, FileRead, Snapshot};
+use super::watch::content::{FileHashCache, FileRead, RequestFileSnapshot};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::LoadedScene;
@@ -31,25 +31,25 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Reasons for ending a request early.
 #[derive(Debug)]
-pub(super) enum StopReason {
+pub(super) enum AbortReason {
     Cancelled,
     Failed(Failure),
 }
 
-impl From<Cancelled> for StopReason {
+impl From<Cancelled> for AbortReason {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled
     }
 }
 
-impl StopReason {
+impl AbortReason {
     #[allow(clippy::needless_pass_by_value, reason = "`map_err` passes ownership")]
     pub(super) fn work_failure(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
     /// An error on the command line, which has no location in the scene.
-    pub(super) fn command_line_error(message: String, help: &str) -> Self {
+    pub(super) fn from_command_line_error(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
         Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))
@@ -82,7 +82,7 @@ impl<T> StageResult<T> {
 pub(super) struct FileReadContext<'a> {
     pub(super) sink: &'a EventSink,
     pub(super) token: &'a CancelToken,
-    pub(super) contents: &'a Snapshot,
+    pub(super) contents: &'a RequestFileSnapshot,
     pub(super) pool: &'a ThreadPool,
     pub(super) containers: &'a GltfContainers,
 }
@@ -176,7 +176,7 @@ impl Findings {
     }
 
     /// Takes all errors and warnings, errors first.
-    pub(super) fn take_failure(&mut self) -> Failure {
+    pub(super) fn take_as_failure(&mut self) -> Failure {
         let mut all = std::mem::take(&mut self.errors);
         all.append(&mut self.warnings);
         Failure::Scene(all)

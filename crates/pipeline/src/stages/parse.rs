@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::model::{self, GeneratedScene, ModelView};
+use super::super::model::{self, GeneratedScene, ModelViewOptions};
 use super::super::protocol::{Failure, reasons};
-use super::super::watch::content::{FileContentId, FileRead, Snapshot};
+use super::super::watch::content::{FileContentId, FileRead, RequestFileSnapshot};
 use super::containers::GltfContainers;
-use super::{Findings, StageResult, StopReason};
+use super::{AbortReason, Findings, StageResult};
 use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
@@ -45,44 +45,44 @@ pub(crate) struct SceneParseRequest<'a> {
     /// Scene key overrides from the command line.
     pub(crate) sets: &'a [String],
     /// View of a model.
-    pub(crate) show: ModelView,
+    pub(crate) show: ModelViewOptions,
 }
 
 /// Generates a scene for a model. Also returns all other files that the generated scene depends on.
 fn generate_model_scene(
     SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
-    (contents, containers): (&Snapshot, &GltfContainers),
+    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::LoadedScene, GeneratedScene), StopReason> {
+) -> Result<(scene::LoadedScene, GeneratedScene), AbortReason> {
     let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
-        AssetError::Cancelled(_) => StopReason::Cancelled,
+        AssetError::Cancelled(_) => AbortReason::Cancelled,
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
-            StopReason::work_failure(error)
+            AbortReason::work_failure(error)
         }
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
-            if let Ok(content) = contents.read_content_id(&path, token) {
+            if let Ok(content) = contents.first_seen_content_id(&path, token) {
                 findings.add_file(FileRead { path: path.clone(), content });
             }
-            scene_error(&path, format!("cannot read it: {reason}"))
+            scene_failure_from_message(&path, format!("cannot read it: {reason}"))
         }
         AssetError::Malformed { path, line, reason } => {
             let line = line.map_or(String::new(), |line| format!("line {line}: "));
-            scene_error(&path, format!("{line}{reason}"))
+            scene_failure_from_message(&path, format!("{line}{reason}"))
         }
     })?;
     let loaded = scene::load_generated(made.text.as_str().into(), path, sets);
     let loaded = loaded.map_err(|errors| {
         let shown =
-            |one: Diagnostic| if one.path == path { model::mark_as_generated_scene(one) } else { one };
-        StopReason::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
+            |one: Diagnostic| if one.path == path { model::mark_diagnostic_as_generated(one) } else { one };
+        AbortReason::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
     })?;
     Ok((loaded, made))
 }
 
-fn scene_error(path: &Path, message: String) -> StopReason {
-    StopReason::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
+fn scene_failure_from_message(path: &Path, message: String) -> AbortReason {
+    AbortReason::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
 }
 
 /// Creates a diagnostic about an entire file.
@@ -96,11 +96,11 @@ fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnost
 /// Returns all errors in the scene file.
 pub(crate) fn parse(
     origin: SceneParseRequest<'_>,
-    (contents, containers): (&Snapshot, &GltfContainers),
+    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
     memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<StageResult<Arc<ParsedScene>>, StopReason> {
+) -> Result<StageResult<Arc<ParsedScene>>, AbortReason> {
     let SceneParseRequest { path, show, .. } = origin;
     if let BackupRecovery::Differs(held) = held::recover_backup(path) {
         let help =
@@ -110,7 +110,7 @@ pub(crate) fn parse(
             ..file_diagnostic(path, Severity::Warning, held::backup_differs_warning(&held))
         });
     }
-    let content = contents.read_content_id(path, token)?;
+    let content = contents.first_seen_content_id(path, token)?;
     let is_model = is_model(path);
     if !is_model && (show.from.is_some() || show.up.is_some()) {
         findings.add_file(FileRead { path: path.to_owned(), content });
@@ -118,7 +118,7 @@ pub(crate) fn parse(
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
         };
-        return Err(StopReason::Failed(Failure::Scene(vec![file_diagnostic(
+        return Err(AbortReason::Failed(Failure::Scene(vec![file_diagnostic(
             Path::new(""),
             Severity::Error,
             message.to_owned(),
@@ -128,7 +128,7 @@ pub(crate) fn parse(
     // A model's scene depends on several files. All must be unchanged.
     let is_same = |parsed: &&Arc<ParsedScene>| {
         let now = |file: &FileRead| {
-            contents.read_content_id(&file.path, token).is_ok_and(|content| content == file.content)
+            contents.first_seen_content_id(&file.path, token).is_ok_and(|content| content == file.content)
         };
         parsed.companions.iter().all(now)
     };
@@ -164,15 +164,15 @@ type SceneAndDependencies = (Arc<scene::LoadedScene>, FileContentId, Vec<FileRea
 
 fn read_scene(
     origin: SceneParseRequest<'_>,
-    (contents, containers): (&Snapshot, &GltfContainers),
+    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<SceneAndDependencies, StopReason> {
+) -> Result<SceneAndDependencies, AbortReason> {
     let SceneParseRequest { path, sets, .. } = origin;
     if !is_model(path) {
         let loaded = scene::load(path, sets).map_err(|errors| {
-            StopReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
+            AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
         })?;
         let content =
             contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
@@ -229,7 +229,7 @@ fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     let named = loaded.named.iter().filter(|path| !is_read(path));
     let textures = textures.into_iter().filter(|path| is_gltf(path) && !is_read(path));
-    let referenced = companion_files(named.chain(textures), token)?;
+    let referenced = files_referenced_by_assets(named.chain(textures), token)?;
     Ok(loaded.named.iter().cloned().chain(referenced).collect())
 }
 
@@ -238,7 +238,7 @@ fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<
 ///
 /// # Errors
 /// Returns [`Cancelled`] if the token is cancelled.
-pub fn companion_files<'a>(
+pub fn files_referenced_by_assets<'a>(
     files: impl Iterator<Item = &'a PathBuf>,
     token: &CancelToken,
 ) -> Result<BTreeSet<PathBuf>, Cancelled> {
@@ -256,12 +256,12 @@ type OrbiterReadResult = (Option<GkitOrbiterCamera>, Option<FileContentId>);
 fn read_orbiter_camera_file(
     loaded: &scene::LoadedScene,
     known: Option<&ParsedScene>,
-    contents: &Snapshot,
+    contents: &RequestFileSnapshot,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<OrbiterReadResult, StopReason> {
+) -> Result<OrbiterReadResult, AbortReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
-    let content = contents.read_content_id(&file.value, token)?;
+    let content = contents.first_seen_content_id(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
         findings.add_file(FileRead { path: file.value.clone(), content });
         return Ok((parsed.orbiter, Some(content)));

@@ -14,9 +14,9 @@ use super::super::cache::Memo;
 use super::super::plan::RenderPlan;
 use super::super::protocol::{PhotonsReport, reasons};
 use super::super::sink::EventSink;
-use super::super::stopwatch::PauseExcludingStopwatch;
+use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
-use super::{StageResult, StopReason};
+use super::{AbortReason, StageResult};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
 use crate::scene::description::RenderOptions;
@@ -69,13 +69,13 @@ struct PhotonCounts {
 
 impl PhotonStore {
     /// Whether any surface causes caustics. If not, no photons are traced.
-    pub(crate) fn emits_photons(&self) -> bool {
+    pub(crate) fn has_lit_caustic_casters(&self) -> bool {
         self.photons.emits_photons()
     }
 
     /// Returns how many passes may be in use at the same time, assuming that each is as large as the first.
     pub(crate) fn max_passes_at_once(&self) -> u32 {
-        if !self.emits_photons() {
+        if !self.has_lit_caustic_casters() {
             return MAX_WITHOUT_TREE;
         }
         let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
@@ -85,14 +85,14 @@ impl PhotonStore {
     /// Average number of seconds needed to trace a pass. 0 if no pass was traced.
     pub(crate) fn mean_seconds_per_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
-        if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
+        if self.has_lit_caustic_casters() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
     /// Returns the maps for these samples. Calls `tick` regularly.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn maps(
+    pub(crate) fn get_or_trace_maps(
         &self,
         samples: Range<u32>,
         sending: PhotonContext<'_>,
@@ -113,12 +113,12 @@ impl PhotonStore {
         sending: PhotonContext<'_>,
         tick: &mut impl FnMut(),
     ) -> Result<Arc<PhotonPass>, Cancelled> {
-        let number_kept = if self.emits_photons() { number } else { 0 };
+        let number_kept = if self.has_lit_caustic_casters() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
         }
         let PhotonContext { world, plan, pool, token, .. } = sending;
-        let watch = PauseExcludingStopwatch::start(token);
+        let watch = PausableStopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.without_ineffective_settings();
         let pass = run_with_ticks(pool, tick, || photons.trace_pass(world, &settings, number, token))?;
@@ -127,7 +127,7 @@ impl PhotonStore {
         self.sent.set(PhotonCounts {
             passes: sent.passes + 1,
             emitted: sent.emitted + pass.emitted,
-            stored: sent.stored + pass.photon_count(),
+            stored: sent.stored + pass.stored_photon_count(),
             lookups: sent.lookups + pass.lookups,
             seconds: sent.seconds + watch.seconds(),
             ..sent
@@ -195,8 +195,8 @@ pub(crate) fn trace_first_photons(
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
-    before: impl FnOnce() -> Result<(), StopReason>,
-) -> Result<StageResult<()>, StopReason> {
+    before: impl FnOnce() -> Result<(), AbortReason>,
+) -> Result<StageResult<()>, AbortReason> {
     let settings = sending.plan.settings.without_ineffective_settings();
     let skipped = |why: &str| Ok(StageResult::skipped((), why));
     let Some(of_photons) = settings.photons else {
@@ -223,7 +223,7 @@ pub(crate) fn trace_first_photons(
     }
     before()?;
     let PhotonContext { world, pool, token, .. } = sending;
-    let watch = PauseExcludingStopwatch::start(token);
+    let watch = PausableStopwatch::start(token);
     let send = |progress: Progress<'_>| {
         run_with_ticks(pool, &mut tick, || {
             PhotonMapper::new_with_first_pass(world, &settings, of_photons, progress, token)
@@ -231,7 +231,7 @@ pub(crate) fn trace_first_photons(
     };
     let (photons, first) = sending.sink.load_with_progress("photons", send)?;
     let seconds = watch.seconds();
-    let (passes, emitted, stored, lookups) = (1, first.emitted, first.photon_count(), first.lookups);
+    let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored_photon_count(), first.lookups);
     let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let emits_photons = photons.emits_photons();

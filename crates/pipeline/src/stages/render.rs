@@ -5,8 +5,8 @@
 //! is a function of its pixel and index, and each pixel sums its samples in order.
 
 use super::photons::PhotonStore;
-use super::{StageResult, StopReason};
-use crate::film::Convergence;
+use super::{AbortReason, StageResult};
+use crate::film::ConvergenceModel;
 use crate::integrators::RayCounters;
 use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
@@ -23,28 +23,28 @@ pub(crate) fn render(
     key: Fingerprint,
     films: &mut FilmCache,
     rendering: &RenderStageInputs<'_>,
-) -> Result<StageResult<RayCounters>, StopReason> {
+) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
     films.make_current_if_cached(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
-        let convergence = match rendering.photons.is_some_and(PhotonStore::emits_photons) {
-            true => Convergence::Photons,
-            false => Convergence::Stratified,
+        let convergence = match rendering.photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
+            true => ConvergenceModel::Photons,
+            false => ConvergenceModel::Stratified,
         };
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
-        let empty = films.replace_current(state).map_err(StopReason::work_failure)?;
+        let empty = films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
         let is_of_use = match rendering.checkpointer.filter(|_| !rendering.force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
         if !is_of_use {
-            films.replace_current(state).map_err(StopReason::work_failure)?;
+            films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
         }
     }
     let Some(state) = films.current_mut() else {
-        return Err(StopReason::work_failure("the film is missing"));
+        return Err(AbortReason::work_failure("the film is missing"));
     };
     let budget = rendering.plan.time_seconds;
     let is_part = state.is_finished_part;
@@ -54,7 +54,7 @@ pub(crate) fn render(
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
-        scheduler.state.traced = scheduler.total_rays();
+        scheduler.state.traced = scheduler.rays_of_all_requests();
         let why = match (is_part, is_resumed, is_other) {
             (true, ..) => reasons::PART_COMPLETE,
             (false, true, _) => reasons::CHECKPOINT_COMPLETE,
@@ -72,9 +72,10 @@ pub(crate) fn render(
             state.ended_by = budget;
             StageResult::done(rays, reasons::TIME_LIMIT_REACHED)
         }
-        (false, _) if state.goals.is_any_below(wanted) => {
-            let missed =
-                state.count_tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
+        (false, _) if state.goals.has_goal_below(wanted) => {
+            let missed = state
+                .count_unconverged_at_sample_limit(error.into())
+                .map_or_else(String::new, |(tiles, worst)| {
                     format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
                 });
             StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))

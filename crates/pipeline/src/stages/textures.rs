@@ -14,11 +14,11 @@ use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FileRead};
 use super::containers::{ImageInput, canonical};
 use super::meshes::Meshes;
-use super::{FileCounts, FileReadContext, Findings, StageResult, StopReason, loading_result};
+use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, build_coverage_mipmaps,
-    load_embedded, load_hashed, mipmaps, read_dimensions, read_embedded_dimensions,
+    load_embedded, load_hashed, mipmaps, read_dimensions_and_decoded_bytes, read_embedded_dimensions,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -29,7 +29,7 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, is_model};
 use crate::world::{
-    CutoffBits, Image, Images, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
+    AlphaCutoffKey, Image, Images, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
     textures_needed,
 };
 
@@ -37,9 +37,9 @@ use crate::world::{
 const MAX_BYTES: u64 = 2 << 30;
 
 /// Canonical path of an image, and how to interpret its values.
-type TextureName = (PathBuf, Option<u32>, ImageEncoding, Option<CutoffBits>);
+type TextureKey = (PathBuf, Option<u32>, ImageEncoding, Option<AlphaCutoffKey>);
 
-fn texture_name(source: &TextureSource) -> TextureName {
+fn texture_key(source: &TextureSource) -> TextureKey {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
@@ -53,21 +53,21 @@ struct DecodedTexture {
 /// Texture cache. Each file and encoding has one entry, plus one for its mipmaps if a material uses them.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
-    texels: NamedCache<TextureName, DecodedTexture>,
-    mipmaps: NamedCache<TextureName, Mipmaps>,
+    texels: NamedCache<TextureKey, DecodedTexture>,
+    mipmaps: NamedCache<TextureKey, Mipmaps>,
     /// Image files referenced by glTF files, by texture name.
-    linked: HashMap<TextureName, PathBuf>,
+    linked: HashMap<TextureKey, PathBuf>,
 }
 
 impl TextureCache {
     /// Whether all of these textures are cached, even if their files have changed since.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
-        needed.iter().all(|one| self.texels.latest(&texture_name(&one.source)).is_some())
+        needed.iter().all(|one| self.texels.get_by_name(&texture_key(&one.source)).is_some())
     }
 
-    pub(crate) fn end_request(&mut self, success: bool, request: u64) {
-        self.texels.end_request(success, request);
-        self.mipmaps.end_request(success, request);
+    pub(crate) fn record_request_usage(&mut self, success: bool, request: u64) {
+        self.texels.record_request_usage(success, request);
+        self.mipmaps.record_request_usage(success, request);
     }
 
     pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
@@ -78,14 +78,14 @@ impl TextureCache {
         self.texels.evict_unused_before(request);
         self.mipmaps.evict_unused_before(request);
         let texels = &self.texels;
-        self.linked.retain(|name, _| texels.latest(name).is_some());
+        self.linked.retain(|name, _| texels.get_by_name(name).is_some());
     }
 
     /// Returns the texels last read from a file.
     #[cfg(test)]
     pub(crate) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
         let name = (canonical(path), None, ImageEncoding::Color, None);
-        self.texels.latest(&name).map(|decoded| &decoded.texels)
+        self.texels.get_by_name(&name).map(|decoded| &decoded.texels)
     }
 }
 
@@ -119,7 +119,7 @@ pub(crate) struct NeededTextures {
 
 /// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
 /// returns all of them, so that the lights and trees that depend on them can be reused.
-pub(crate) fn find_needed_textures(
+pub(crate) fn find_textures_needed_for_view(
     loaded: &LoadedScene,
     meshes: &Meshes,
     lookups: NeededTextureRoleSet,
@@ -137,17 +137,17 @@ pub(crate) fn find_needed_textures(
 
 /// An image and all textures that use it.
 struct ImageWithTextures<'a> {
-    name: TextureName,
+    name: TextureKey,
     content: FileContentId,
     /// The image file that the glTF file references.
     linked: Option<FileRead>,
-    kept: CachedTexture,
+    kept: CachedTexelsAndMipmaps,
     asked_by: Vec<&'a NeededTexture>,
 }
 
 /// Data cached for an image.
 #[derive(Debug, Default)]
-struct CachedTexture {
+struct CachedTexelsAndMipmaps {
     texels: Option<Arc<DecodedTexture>>,
     mipmaps: Option<Arc<Mipmaps>>,
 }
@@ -162,7 +162,7 @@ pub(crate) fn load_textures(
     cache: &mut TextureCache,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Textures>, StopReason> {
+) -> Result<StageResult<Textures>, AbortReason> {
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
@@ -174,7 +174,7 @@ pub(crate) fn load_textures(
     }
     let environment = environment_source(&loaded.scene);
     let images = group_by_image(needed, cache, reading)?;
-    let assets = load_all(&images, MAX_BYTES, reading);
+    let assets = load_images_within_limit(&images, MAX_BYTES, reading);
     let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
@@ -219,9 +219,9 @@ pub(crate) fn load_textures(
                 let bytes = texels.memory_bytes();
                 cache.texels.insert(image.name, key, (decoded, bytes));
             }
-            Err(AssetError::Cancelled(_)) => return Err(StopReason::Cancelled),
+            Err(AssetError::Cancelled(_)) => return Err(AbortReason::Cancelled),
             Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
-                return Err(StopReason::work_failure(error));
+                return Err(AbortReason::work_failure(error));
             }
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
@@ -344,7 +344,7 @@ fn warn_about_gray_normal_map(
     findings: &mut Findings,
 ) {
     let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
-    let Some((one, material)) = normals.filter(|_| texels.is_gray()) else { return };
+    let Some((one, material)) = normals.filter(|_| texels.are_all_gray()) else { return };
     let effect = match one.mesh_file {
         Some(_) => "it does not change the normals (use `bump` for heights)",
         None => "it tilts all normals to one side (use `bump` for heights)",
@@ -413,18 +413,18 @@ fn group_by_image<'a>(
     let mut images: Vec<ImageWithTextures<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {
-        let name = texture_name(&one.source);
+        let name = texture_key(&one.source);
         let index = *known.entry(name.clone()).or_insert(images.len());
         if let Some(image) = images.get_mut(index) {
             image.asked_by.push(one);
             continue;
         }
-        let content = reading.contents.read_content_id(&one.source.path, reading.token)?;
+        let content = reading.contents.first_seen_content_id(&one.source.path, reading.token)?;
         let linked = cache.linked.get(&name).map(|path| {
-            let content = reading.contents.read_content_id(path, reading.token)?;
+            let content = reading.contents.first_seen_content_id(path, reading.token)?;
             Ok(FileRead { path: path.clone(), content })
         });
-        let (linked, kept) = (linked.transpose()?, CachedTexture::default());
+        let (linked, kept) = (linked.transpose()?, CachedTexelsAndMipmaps::default());
         images.push(ImageWithTextures { name, content, linked, kept, asked_by: vec![one] });
     }
     for image in &mut images {
@@ -438,18 +438,18 @@ fn group_by_image<'a>(
 }
 
 /// Loads all images. Returns an error for each image that would raise the total size above `most_bytes`.
-fn load_all(
+fn load_images_within_limit(
     images: &[ImageWithTextures<'_>],
     most_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureFileContentIds, Result<DecodedTextureWithMipmaps, AssetError>)> {
+) -> Vec<(TextureAndLinkedImageContent, Result<DecodedTextureWithMipmaps, AssetError>)> {
     let size = |image: &ImageWithTextures<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
                 (texels.width, texels.height, texels.memory_bytes() as u64)
             }
             // Unreadable images are reported during loading.
-            None => image_dimensions(&image.asked_by[0].source, reading).unwrap_or_default(),
+            None => image_dimensions_and_memory(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
         let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
         bytes
@@ -493,7 +493,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if this is a glTF file, of the image file that it references.
-type TextureFileContentIds = (FileContentId, Option<FileRead>);
+type TextureAndLinkedImageContent = (FileContentId, Option<FileRead>);
 
 /// An image and its mipmaps, and whether both came from the cache.
 type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -501,7 +501,7 @@ type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, boo
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContentIds,
+    contents: &mut TextureAndLinkedImageContent,
     reading: &FileReadContext<'_>,
 ) -> Result<DecodedTextureWithMipmaps, AssetError> {
     let mut was_kept = true;
@@ -530,7 +530,7 @@ fn load_one(
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContentIds,
+    contents: &mut TextureAndLinkedImageContent,
     reading: &FileReadContext<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
@@ -549,7 +549,7 @@ fn decode(
                     return reading.sink.load_with_progress(&one.name, load);
                 }
                 ImageInput::File(path) => {
-                    let content = reading.contents.read_content_id(&path, token)?;
+                    let content = reading.contents.first_seen_content_id(&path, token)?;
                     contents.1 = Some(FileRead { path: path.clone(), content });
                     path
                 }
@@ -567,7 +567,10 @@ fn decode(
 }
 
 /// Returns where an image's bytes are stored.
-fn image_input(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<ImageInput, AssetError> {
+fn locate_image_bytes(
+    source: &TextureSource,
+    reading: &FileReadContext<'_>,
+) -> Result<ImageInput, AssetError> {
     match source.image {
         None => Ok(ImageInput::File(source.path.clone())),
         Some(image) => {
@@ -577,13 +580,13 @@ fn image_input(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<
 }
 
 /// Returns the width, height and memory size of an image.
-fn image_dimensions(
+fn image_dimensions_and_memory(
     source: &TextureSource,
     reading: &FileReadContext<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
-    match image_input(source, reading)? {
-        ImageInput::File(path) => read_dimensions(&path, encoding, limits, reading.token),
+    match locate_image_bytes(source, reading)? {
+        ImageInput::File(path) => read_dimensions_and_decoded_bytes(&path, encoding, limits, reading.token),
         ImageInput::Bytes(bytes) => read_embedded_dimensions(
             EmbeddedImage { path: &source.path, bytes },
             encoding,

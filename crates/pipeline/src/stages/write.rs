@@ -7,23 +7,23 @@ use serde_json::Value;
 
 use super::super::inputs::ProtectedInputs;
 use super::super::plan::RenderPlan;
-use super::super::protocol::{WriteMode, reasons};
+use super::super::protocol::{WriteRequirement, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
 use super::super::render::layers::layer_images;
 use super::super::sink::EventSink;
-use super::super::targets::{OutputTarget, conflicts, overwrite_protection, write_guarded};
+use super::super::targets::{OutputTarget, output_conflicts, overwrite_protection, write_guarded};
 use super::super::turntable::TurntableFrame;
 use super::super::watch::content::{FileContentId, FileHashCache};
-use super::{StageResult, StopReason};
+use super::{AbortReason, StageResult};
 use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
 use crate::integrators::{AovSource, LightAov};
-use crate::output::part::{self, PartHeader, PartKind};
+use crate::output::part::{self, PartHeader, PartOrCheckpoint};
 use crate::output::write::{Durability, SweptFolders, WritePolicy};
-use crate::output::{self, BitDepth, DevelopSettings, Format, OutputError, scene_path};
+use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
@@ -105,15 +105,17 @@ pub(crate) struct ImageWriteContext<'a> {
 /// With [`WriteMode::Must`], returns an error for the first file that cannot be written. Otherwise, reports
 /// failures as events.
 pub(crate) fn check_targets(
-    writing: WriteMode,
+    writing: WriteRequirement,
     plan: &RenderPlan,
     sink: &EventSink,
-) -> Result<(), StopReason> {
+) -> Result<(), AbortReason> {
     match writing {
-        WriteMode::No => Ok(()),
-        WriteMode::Must => check_each_target(plan, output::check_image_target, output::check_file_target)
-            .map_err(StopReason::work_failure),
-        WriteMode::Try => {
+        WriteRequirement::No => Ok(()),
+        WriteRequirement::Must => {
+            check_each_target(plan, output::check_image_path, output::check_file_target)
+                .map_err(AbortReason::work_failure)
+        }
+        WriteRequirement::Try => {
             if let Err(error) = check_each_target(
                 plan,
                 output::check_image_target_read_only,
@@ -154,16 +156,16 @@ fn check_each_target(
 /// # Errors
 /// With [`WriteMode::Must`], returns an error if the image could not be written.
 pub(crate) fn write_if_wanted(
-    writing: WriteMode,
+    writing: WriteRequirement,
     state: &FilmState,
     to: ImageWriteContext<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
-) -> Result<StageResult<bool>, StopReason> {
+) -> Result<StageResult<bool>, AbortReason> {
     match writing {
-        WriteMode::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
-        WriteMode::Try | WriteMode::Must => {
-            write_outdated_outputs(state, to, written, token, writing == WriteMode::Must)
+        WriteRequirement::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
+        WriteRequirement::Try | WriteRequirement::Must => {
+            write_outdated_outputs(state, to, written, token, writing == WriteRequirement::Must)
         }
     }
 }
@@ -179,7 +181,7 @@ fn write_outdated_outputs(
     written: &mut WrittenImages,
     token: &CancelToken,
     is_must: bool,
-) -> Result<StageResult<bool>, StopReason> {
+) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, contents, is_own, sink, .. } = to;
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = SweptFolders::default();
@@ -202,7 +204,7 @@ fn write_outdated_outputs(
                 let image =
                     radiance.get_or_insert_with(|| state.film.image(plan.settings.view.film_quantity()));
                 token
-                    .check()
+                    .check_pause_and_cancel()
                     .map_err(OutputError::from)
                     .and_then(|()| write_one(image, state, to, (path, &written.sweep), token))
             }
@@ -221,7 +223,7 @@ fn write_outdated_outputs(
             Err(error) => {
                 contents.outputs.end_write(path, None);
                 if matches!(error, OutputError::Cancelled(_)) {
-                    return Err(StopReason::Cancelled);
+                    return Err(AbortReason::Cancelled);
                 }
                 errors.push((path, error.to_string()));
             }
@@ -236,7 +238,7 @@ fn write_outdated_outputs(
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.send_write_failed(Some(path), message));
-            if is_must { Err(StopReason::work_failure(last)) } else { Ok(StageResult::skipped(false, last)) }
+            if is_must { Err(AbortReason::work_failure(last)) } else { Ok(StageResult::skipped(false, last)) }
         }
         (true, 0) => Ok(StageResult::reused(true, reasons::ALREADY_WRITTEN)),
         (true, 1) => Ok(StageResult::done(true, "")),
@@ -251,7 +253,7 @@ pub(crate) fn write_on_request(
     to: ImageWriteContext<'_>,
     written: &mut WrittenImages,
 ) -> bool {
-    let conflicts = conflicts(to.plan, to.inputs);
+    let conflicts = output_conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         to.sink.send_write_conflicts(conflicts);
         return false;
@@ -268,7 +270,7 @@ pub(crate) fn write_on_request(
 
 /// Finished turntable frames, with their sample counts.
 #[derive(Debug, Default)]
-pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
+pub(crate) struct RenderedTurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
 /// have been written.
@@ -278,12 +280,12 @@ pub(crate) struct TurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 pub(crate) fn add_animation_frame(
     state: &FilmState,
     to: ImageWriteContext<'_>,
-    (turn, frames): (TurntableFrame, &mut TurntableFrames),
+    (turn, frames): (TurntableFrame, &mut RenderedTurntableFrames),
     token: &CancelToken,
-) -> Result<StageResult<bool>, StopReason> {
+) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
     let finish = develop_settings(plan);
-    let image = finish.extract_image(&state.film);
+    let image = finish.extract_radiance_image(&state.film);
     frames.0.truncate(turn.number as usize);
     frames.0.push((
         tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)),
@@ -301,7 +303,7 @@ pub(crate) fn add_animation_frame(
     for path in &plan.moving {
         let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
-            let metadata = develop_settings_for_path(plan, path).metadata_with_samples(samples);
+            let metadata = develop_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
             let write =
                 |guard: &WritePolicy<'_>| output::write::atomic_with_policy(path, &bytes, guard, token);
@@ -310,8 +312,8 @@ pub(crate) fn add_animation_frame(
         };
         match write() {
             Ok(bytes) => sink.send_image_written(path, bytes, true, None),
-            Err(OutputError::Cancelled(_)) => return Err(StopReason::Cancelled),
-            Err(error) => return Err(StopReason::work_failure(error)),
+            Err(OutputError::Cancelled(_)) => return Err(AbortReason::Cancelled),
+            Err(error) => return Err(AbortReason::work_failure(error)),
         }
     }
     Ok(StageResult::done(true, format!("{} frames", frames.len())))
@@ -324,14 +326,13 @@ fn write_one(
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let mut finish = develop_settings_for_path(plan, path);
+    let mut finish = develop_settings_with_relative_scene(plan, path);
     // Record the time limit only if it ended the render.
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
     let layers = layer_images(state, plan);
-    let bytes =
-        finish.encode_extracted_image(&state.film, (image, &layers), Format::from_path(path)?, token)?;
+    let bytes = finish.encode_film_image(&state.film, (image, &layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::for_image(plan, path), Some(sweep));
     write_guarded(plan, inputs, target, sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)
@@ -349,7 +350,7 @@ fn write_part(
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative_to_image(&plan.path, path);
     let references = inputs.relative_paths(&plan.path);
-    let head = create_header(PartKind::Part, state, identity, &develop_settings(plan));
+    let head = create_header(PartOrCheckpoint::Part, state, identity, &develop_settings(plan));
     let head = PartHeader { scene, references, ..head };
     let save = |guard: &WritePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
@@ -359,8 +360,8 @@ fn write_part(
 }
 
 /// Returns the settings for developing and encoding a film.
-pub(crate) fn develop_settings(plan: &RenderPlan) -> DevelopSettings {
-    DevelopSettings {
+pub(crate) fn develop_settings(plan: &RenderPlan) -> FilmEncodingSettings {
+    FilmEncodingSettings {
         quantity: plan.settings.view.film_quantity(),
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
@@ -370,7 +371,7 @@ pub(crate) fn develop_settings(plan: &RenderPlan) -> DevelopSettings {
 }
 
 /// Like [`develop_settings`], but with the scene's path relative to the image.
-fn develop_settings_for_path(plan: &RenderPlan, path: &Path) -> DevelopSettings {
+fn develop_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
     let mut finish = develop_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {

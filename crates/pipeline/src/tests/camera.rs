@@ -3,20 +3,20 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraSaveResult, ImagePosition, MovedCamera, PickResult, SceneFileEdit};
-use crate::scene::description::{CameraChange, Pose, Viewpoint};
+use crate::protocol::{CameraSaveResult, ImagePosition, MovedCamera, PickedPixel, SavedCameraEdit};
+use crate::scene::description::{CameraOverrides, Pose, ResolvedCamera};
 
 /// Tables that add a mirror and photons to a scene.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
     [materials.steel]\ntype = \"mirror\"\n[photons]\nenabled = true\ncount = 500\n";
 
-fn moved() -> CameraChange {
+fn moved() -> CameraOverrides {
     let pose = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
-    CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
+    CameraOverrides { pose: Some(pose), fov: Some(35.0), focus: None }
 }
 
 /// Returns a request's camera, which is the scene's camera with the front end's changes.
-fn camera(bench: &mut Bench) -> Viewpoint {
+fn camera(bench: &mut Bench) -> ResolvedCamera {
     let of = bench.send();
     let events = bench.until_end(of);
     let camera = |event: &Event| match event {
@@ -33,13 +33,13 @@ fn moving_camera_reuses_trees_lights_and_photons() {
     bench.done();
     let own = bench.picture();
     bench.overrides.camera = moved();
-    bench.writing = WriteMode::No;
+    bench.writing = WriteRequirement::No;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrrds");
     assert_eq!(report.counters.photons_emitted, 0);
     assert_eq!(bench.picture(), own, "the image should not be written");
-    bench.overrides.camera = CameraChange::default();
-    bench.writing = WriteMode::Must;
+    bench.overrides.camera = CameraOverrides::default();
+    bench.writing = WriteRequirement::Must;
     assert_statuses(&bench.done().0, "rrrrrrrr");
 }
 
@@ -49,7 +49,7 @@ fn moved_camera_matches_edited_file() {
     bench.overrides.camera = moved();
     bench.done();
     let shown = bench.picture();
-    bench.overrides.camera = CameraChange::default();
+    bench.overrides.camera = CameraOverrides::default();
     bench.done();
     assert_ne!(bench.picture(), shown);
     bench.overrides.sets = vec!["camera.position=[0.5,1.5,4.25]".to_owned(), "camera.fov=35".to_owned()];
@@ -98,26 +98,30 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
     }
 }
 
-fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<CameraSaveResult, String> {
+fn keep(bench: &mut Bench, camera: ResolvedCamera) -> Result<CameraSaveResult, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
 /// Like [`keep`], but for a camera that was moved starting from `own` instead of the scene's camera.
-fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<CameraSaveResult, String> {
+fn keep_moved_from(
+    bench: &mut Bench,
+    camera: ResolvedCamera,
+    own: ResolvedCamera,
+) -> Result<CameraSaveResult, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
 }
 
-fn undo(bench: &mut Bench, edit: SceneFileEdit) -> Result<std::path::PathBuf, String> {
+fn undo(bench: &mut Bench, edit: SavedCameraEdit) -> Result<std::path::PathBuf, String> {
     match answer(bench, Command::UndoCamera(edit)) {
         Event::CameraUndone { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
 }
 
-fn pick(bench: &mut Bench, x: f64, y: f64) -> PickResult {
+fn pick(bench: &mut Bench, x: f64, y: f64) -> PickedPixel {
     match answer(bench, Command::Pick(ImagePosition { x, y })) {
         Event::Picked { picked, .. } => *picked,
         other => panic!("{other:?}"),
@@ -136,7 +140,7 @@ fn saving_the_camera_does_not_rerender() {
         .replace("[0, 1, 4]", "[0.5, 1.5, 4.25]")
         .replace("look_at = [0, 1, 0]", "look_at = [0, 1, 0]\nfov = 35");
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), expected);
-    bench.overrides.camera = CameraChange::default();
+    bench.overrides.camera = CameraOverrides::default();
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "drrrrsrr");
     assert!(unchanged && bench.picture() == shown);
@@ -162,7 +166,7 @@ fn outdated_camera_is_not_saved() {
     let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
     bench.done();
     let own = bench.own.get().expect("a camera");
-    let moved = own.with_change(&CameraChange { fov: None, ..moved() });
+    let moved = own.with_change(&CameraOverrides { fov: None, ..moved() });
     // The worker reads the edited file before it receives the camera.
     bench.edit("fov = 34", "fov = 20");
     bench.done();
@@ -171,7 +175,7 @@ fn outdated_camera_is_not_saved() {
     assert_eq!(why, messages::CAMERA_CHANGED);
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
     // If the move starts from the file's current camera, the camera is saved and the edit is preserved.
-    let moved = Viewpoint { fov: 20.0, ..moved };
+    let moved = ResolvedCamera { fov: 20.0, ..moved };
     assert!(keep(&mut bench, moved).expect("written").is_new);
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     assert!(text.contains("fov = 20") && text.contains("[0.5, 1.5, 4.25]"), "{text}");
@@ -311,7 +315,7 @@ fn queries_do_not_interrupt_a_render() {
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
-    let camera = Viewpoint { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
+    let camera = ResolvedCamera { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
     assert!(keep(&mut bench, camera).expect("written").is_new);
     assert!(
         matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }),

@@ -18,11 +18,11 @@ use std::time::Duration;
 
 use crate::engine::EngineConfig;
 use crate::protocol::{
-    Command, Event, Failure, ImagePosition, LatestPreview, NormalizedRect, PreviewSize, Report, Request,
-    Stage, Status, WriteMode, reasons,
+    Command, Event, Failure, ImagePosition, MaxPreviewSize, NormalizedRect, PreviewUpdate, Report, Request,
+    Stage, Status, WriteRequirement, reasons,
 };
 use crate::scene::LoadedScene;
-use crate::scene::description::Viewpoint;
+use crate::scene::description::ResolvedCamera;
 use crate::scene::diagnostic::Diagnostic;
 use crate::settings::Overrides;
 use crate::trace::TileKernel;
@@ -84,14 +84,14 @@ pub(crate) struct Bench {
     pub(super) worker: Handle,
     pub(super) generation: u64,
     pub(super) overrides: Overrides,
-    pub(super) preview: Option<PreviewSize>,
+    pub(super) preview: Option<MaxPreviewSize>,
     pub(super) force: bool,
     pub(super) first: Option<NormalizedRect>,
-    pub(super) writing: WriteMode,
+    pub(super) writing: WriteRequirement,
     /// Number of files written so far.
     pub(super) saves: Cell<u64>,
     /// The scene's camera, as last reported by the worker.
-    pub(super) own: Cell<Option<Viewpoint>>,
+    pub(super) own: Cell<Option<ResolvedCamera>>,
 }
 
 impl Bench {
@@ -117,7 +117,7 @@ impl Bench {
             preview: None,
             force: false,
             first: None,
-            writing: WriteMode::Must,
+            writing: WriteRequirement::Must,
             saves: Cell::new(0),
             own: Cell::new(None),
         };

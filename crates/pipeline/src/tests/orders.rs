@@ -25,7 +25,7 @@ fn endless(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     loop {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         std::thread::sleep(Duration::from_millis(1));
     }
 }
@@ -192,7 +192,7 @@ fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneOutcome {
 #[test]
 fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
-    bench.writing = WriteMode::Try;
+    bench.writing = WriteRequirement::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     assert_eq!(last_good_end(&bench, 1), LastValidSceneOutcome::Stopped);
 }
@@ -201,7 +201,7 @@ fn nothing_is_rendered_without_a_valid_scene() {
 fn broken_scene_file_does_not_stop_a_render() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
     (bench.writing, bench.preview) =
-        (WriteMode::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
+        (WriteRequirement::Try, Some(MaxPreviewSize { width: 12, height: 12, around: None }));
     let first = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.edit("width = 40", "width = = 40");
@@ -245,10 +245,12 @@ fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
 #[test]
 fn last_valid_scene_applies_new_overrides() {
     use crate::math::DVec3;
-    use crate::scene::description::{CameraChange, Pose};
+    use crate::scene::description::{CameraOverrides, Pose};
     let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
     let changes: [fn(&mut Bench, Pose); 4] = [
-        |bench, pose| bench.overrides.camera = CameraChange { pose: Some(pose), ..CameraChange::default() },
+        |bench, pose| {
+            bench.overrides.camera = CameraOverrides { pose: Some(pose), ..CameraOverrides::default() }
+        },
         |bench, _| bench.overrides.view = Some(ViewMode::Normal),
         |bench, _| bench.overrides.shadows = Some(ShadowMode::Off),
         |bench, _| bench.overrides.exposure = Some(-2.0),
@@ -262,8 +264,8 @@ fn last_valid_scene_applies_new_overrides() {
     for (fault, fix) in faults {
         for change in changes {
             let mut bench = Bench::new(SCENE);
-            bench.writing = WriteMode::Try;
-            bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+            bench.writing = WriteRequirement::Try;
+            bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
             bench.done();
             fault(&bench);
             assert!(matches!(bench.failed(), Failure::Scene(_)));
@@ -297,7 +299,7 @@ fn last_valid_scene_applies_new_overrides() {
 fn last_valid_scene_never_mixes_file_versions() {
     for is_changed in [false, true] {
         let mut bench = Bench::new(SCENE);
-        bench.writing = WriteMode::Try;
+        bench.writing = WriteRequirement::Try;
         // This view needs no textures.
         bench.overrides.view = Some(ViewMode::Depth);
         bench.done();
@@ -342,7 +344,7 @@ fn priority_region_is_rendered_first() {
     let text = text.replace("samples = 4", "samples = 32");
     let mut bench = Bench::with(&text, slow);
     bench.overrides.view = Some(ViewMode::Samples);
-    bench.preview = Some(PreviewSize { width: 256, height: 256, around: None });
+    bench.preview = Some(MaxPreviewSize { width: 256, height: 256, around: None });
     bench.first = Some(NormalizedRect { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
     let of = bench.send();
     // The corner tile, which is usually rendered last, must be complete before the middle tile.
@@ -350,7 +352,7 @@ fn priority_region_is_rendered_first() {
         let event = bench.next();
         assert!(!matches!(event, Event::Done { .. }), "the corner tile was not rendered first");
         let latest = bench.worker.previews.lock().expect("not poisoned").clone();
-        let Some(LatestPreview { picture, range: Some([_, most]), .. }) = latest else { continue };
+        let Some(PreviewUpdate { picture, range: Some([_, most]), .. }) = latest else { continue };
         let value = |x: usize, y: usize| f32::from(picture.pixels[y * 256 + x][0]) / 255.0 * most;
         if value(5, 5) > 31.0 {
             assert!(value(128, 128) < 31.0, "{}", value(128, 128));
@@ -427,7 +429,7 @@ fn next_request_carries_out_postponed_write() {
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { .. }) {}
-    bench.writing = WriteMode::No;
+    bench.writing = WriteRequirement::No;
     bench.overrides.samples = Some(2);
     let of = bench.send();
     let events = bench.until_end(of);
@@ -464,7 +466,7 @@ fn held_between_passes(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let first = samples.start == 0;
     let done = KERNEL(photons, world, settings, pixels, samples, &CancelToken::new());
     if first {
@@ -532,8 +534,8 @@ fn unwritable_output_fails_before_rendering() {
 fn image_is_shown_despite_unwritable_output() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
-    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
-    bench.writing = WriteMode::Try;
+    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.writing = WriteRequirement::Try;
     let of = bench.send();
     let events = bench.until_end(of);
     let failed =
@@ -567,7 +569,7 @@ fn warnings_are_reported_before_rendering() {
     let mut bench = Bench::new(SCENE);
     // A face with zero area.
     bench.write("one.obj", &format!("{OBJ}f 1 1 2\n"));
-    bench.preview = Some(PreviewSize { width: 20, height: 20, around: None });
+    bench.preview = Some(MaxPreviewSize { width: 20, height: 20, around: None });
     let of = bench.send();
     let events = bench.until_end(of);
     let at = |what: &dyn Fn(&Event) -> bool| events.iter().position(what).expect("an event");
@@ -613,7 +615,7 @@ fn leisurely(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     std::thread::sleep(Duration::from_millis(5));
     KERNEL(photons, world, settings, pixels, samples, token)
 }

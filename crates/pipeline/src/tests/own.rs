@@ -11,13 +11,13 @@ struct ToggledBench(Bench);
 impl ToggledBench {
     fn new() -> Self {
         let mut bench = Bench::new(SCENE);
-        bench.writing = WriteMode::Try;
+        bench.writing = WriteRequirement::Try;
         Self(bench)
     }
 
     fn with(kernel: TileKernel) -> Self {
         let mut bench = Bench::with(SCENE, kernel);
-        bench.writing = WriteMode::Try;
+        bench.writing = WriteRequirement::Try;
         Self(bench)
     }
 
@@ -33,7 +33,7 @@ impl ToggledBench {
             own: Some(Box::new(self.0.overrides.clone())),
             overrides: shown,
             preview: None,
-            write: WriteMode::No,
+            write: WriteRequirement::No,
             saves: self.0.saves.get(),
             force: false,
             first: None,
@@ -401,7 +401,7 @@ fn unfinished_image_removes_outdated_report() {
 #[test]
 fn last_valid_image_removes_outdated_report() {
     let mut bench = Bench::with(SCENE, slow);
-    bench.writing = WriteMode::Try;
+    bench.writing = WriteRequirement::Try;
     let report = bench.path("r.json");
     bench.overrides.report = Some(report.clone());
     bench.done();

@@ -107,7 +107,7 @@ fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
 #[test]
 fn first_preview_does_not_wait_for_photons() {
     let mut bench = Bench::with(&wrapped(300_000), without);
-    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
     let previews = previews_of(&mut bench);
     assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
     assert!(WITHOUT.load(Ordering::SeqCst));
@@ -122,7 +122,7 @@ fn first_preview_does_not_wait_for_photons() {
 
 #[test]
 fn preview_without_photons_does_not_affect_film() {
-    let mut pictures = [None, Some(PreviewSize { width: 12, height: 12, around: None })].map(|preview| {
+    let mut pictures = [None, Some(MaxPreviewSize { width: 12, height: 12, around: None })].map(|preview| {
         let mut bench = Bench::new(&wrapped(1000));
         bench.preview = preview;
         bench.done();

@@ -294,11 +294,11 @@ fn toggling_a_setting_back_reuses_the_film() {
     assert_eq!(report.counters.films, 2);
     assert!(report.counters.film_memory_bytes >= 2 * 40 * 30 * 28);
     bench.overrides.shadows = None;
-    bench.writing = WriteMode::No;
+    bench.writing = WriteRequirement::No;
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "rrrrrsrs");
     assert!(!unchanged, "the shown image should differ");
-    bench.writing = WriteMode::Must;
+    bench.writing = WriteRequirement::Must;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrsrd");
     assert_eq!(report.counters.camera_rays, 0);

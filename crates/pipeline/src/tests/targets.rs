@@ -29,8 +29,8 @@ fn image_is_shown_despite_conflict() {
     let (good, report) = (bench.path("good.png"), bench.path("r.json"));
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
     bench.overrides.report = Some(report.clone());
-    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
-    bench.writing = WriteMode::Try;
+    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.writing = WriteRequirement::Try;
     let of = bench.send();
     let events = bench.until_end(of);
     let (conflicts, end) = conflicts_and_end(&events);

@@ -90,7 +90,7 @@ struct SeenFile {
 /// File contents as seen by a single request. A file's content must not change during a request. If it does,
 /// the request starts again. The watcher detects later changes.
 #[derive(Debug)]
-pub(crate) struct Snapshot {
+pub(crate) struct RequestFileSnapshot {
     contents: Arc<FileHashCache>,
     /// Time before the first read.
     begun: SystemTime,
@@ -98,7 +98,7 @@ pub(crate) struct Snapshot {
     changed: Mutex<Option<PathBuf>>,
 }
 
-impl Snapshot {
+impl RequestFileSnapshot {
     pub(crate) fn new(contents: Arc<FileHashCache>) -> Self {
         Self { contents, begun: SystemTime::now(), seen: Mutex::default(), changed: Mutex::default() }
     }
@@ -107,12 +107,12 @@ impl Snapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn read_content_id(
+    pub(crate) fn first_seen_content_id(
         &self,
         path: &Path,
         token: &CancelToken,
     ) -> Result<FileContentId, Cancelled> {
-        if let Some(content) = self.known(path) {
+        if let Some(content) = self.seen_content(path) {
             return Ok(content);
         }
         let stamp = FileStamp::from_path(path);
@@ -153,7 +153,7 @@ impl Snapshot {
     ) -> Result<FileRead, Cancelled> {
         let content = match hash {
             Some(hash) => self.record_decoded_with_stamp(path, *hash, *stamp),
-            None => self.read_content_id(path, token)?,
+            None => self.first_seen_content_id(path, token)?,
         };
         Ok(FileRead { path: path.clone(), content })
     }
@@ -189,14 +189,15 @@ impl Snapshot {
         loop {
             let now = SystemTime::now();
             let is_young = |path: &PathBuf| {
-                let last_change = FileStamp::from_path(path).and_then(|stamp| stamp.last_change());
+                let last_change =
+                    FileStamp::from_path(path).and_then(|stamp| stamp.last_content_or_metadata_change());
                 let age = last_change.and_then(|change| now.duration_since(change).ok());
                 age.is_some_and(|age| age < SETTLE_TIME)
             };
             if begun.elapsed() > SETTLE_TIME || !self.lock_seen_files().keys().any(is_young) {
                 return Ok(());
             }
-            token.check()?;
+            token.check_pause_and_cancel()?;
             std::thread::sleep(SETTLE_TIME / 20);
         }
     }
@@ -211,7 +212,7 @@ impl Snapshot {
     }
 
     /// Returns a file's content if this request has seen it.
-    pub(crate) fn known(&self, path: &Path) -> Option<FileContentId> {
+    pub(crate) fn seen_content(&self, path: &Path) -> Option<FileContentId> {
         self.lock_seen_files().get(path).map(|seen| seen.content)
     }
 
@@ -224,7 +225,7 @@ impl Snapshot {
 const SETTLE_TIME: Duration = Duration::from_millis(100);
 
 /// Content to use for a file that is too long to hash.
-fn content_id_from_stamp(stamp: &FileStamp) -> FileContentId {
+fn hash_stamp_as_content_id(stamp: &FileStamp) -> FileContentId {
     FileContentId::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
 }
 
@@ -241,7 +242,7 @@ impl FileHashCache {
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled. The token is checked once per mebibyte.
     pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let now = SystemTime::now();
         let metadata = match file::file_kind(path) {
             Ok((FileKind::Regular, metadata)) => metadata,
@@ -249,7 +250,7 @@ impl FileHashCache {
             Ok((FileKind::Special, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Special)),
             Ok((FileKind::Kernel, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Kernel)),
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(FileContentId::Missing),
-            Err(error) => return Ok(unreadable(&error)),
+            Err(error) => return Ok(unreadable_content_id(&error)),
         };
         let stamp = FileStamp::new(&metadata);
         let known =
@@ -258,7 +259,7 @@ impl FileHashCache {
             return Ok(content);
         }
         let content = if stamp.len > MAX_HASHED {
-            content_id_from_stamp(&stamp)
+            hash_stamp_as_content_id(&stamp)
         } else {
             self.hash_uncached(path, token)?
         };
@@ -293,7 +294,7 @@ impl FileHashCache {
     }
 }
 
-fn unreadable(error: &io::Error) -> FileContentId {
+fn unreadable_content_id(error: &io::Error) -> FileContentId {
     FileContentId::Unusable(UnreadableReason::Error(error.kind()))
 }
 
@@ -306,17 +307,17 @@ fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId,
         Ok(Err(FileKind::Regular | FileKind::Kernel)) => {
             return Ok(FileContentId::Unusable(UnreadableReason::Kernel));
         }
-        Err(error) => return Ok(unreadable(&error)),
+        Err(error) => return Ok(unreadable_content_id(&error)),
     };
     let mut hasher = blake3::Hasher::new();
     let mut buffer = vec![0; CHUNK];
     loop {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         match file.read(&mut buffer) {
             Ok(0) => return Ok(FileContentId::Hash(*hasher.finalize().as_bytes())),
             Ok(count) => hasher.update(&buffer[..count]),
             Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            Err(error) => return Ok(unreadable(&error)),
+            Err(error) => return Ok(unreadable_content_id(&error)),
         };
     }
 }
@@ -373,13 +374,13 @@ mod tests {
         let path = folder.path().join("file");
         let token = CancelToken::new();
         let contents = Arc::new(FileHashCache::default());
-        let snapshot = Snapshot::new(contents.clone());
+        let snapshot = RequestFileSnapshot::new(contents.clone());
         fs::write(&path, "a").expect("written");
-        let first = snapshot.read_content_id(&path, &token).expect("not cancelled");
+        let first = snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
-        assert_eq!(snapshot.read_content_id(&path, &token), Ok(first));
+        assert_eq!(snapshot.first_seen_content_id(&path, &token), Ok(first));
         assert_ne!(
-            Snapshot::new(contents).read_content_id(&path, &token),
+            RequestFileSnapshot::new(contents).first_seen_content_id(&path, &token),
             Ok(first),
             "the next request should see the change"
         );
@@ -405,31 +406,31 @@ mod tests {
         let [mesh, texture, library, same] =
             ["mesh", "texture", "library", "same"].map(|name| current.join(name));
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
-        let verified = |snapshot: &Snapshot| {
+        let verified = |snapshot: &RequestFileSnapshot| {
             snapshot.recheck_seen_files(&token).expect("not cancelled");
             snapshot.changed_file()
         };
         for is_decoded in [false, true] {
             show("old");
-            let snapshot = Snapshot::new(Arc::default());
-            snapshot.read_content_id(&same, &token).expect("not cancelled");
+            let snapshot = RequestFileSnapshot::new(Arc::default());
+            snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
             if is_decoded {
                 let (hash, stamp) = (Some(hash_of(&library)), FileStamp::from_path(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
                 snapshot.read_companion(&companion, &token).expect("not cancelled");
             } else {
-                snapshot.read_content_id(&mesh, &token).expect("not cancelled");
+                snapshot.first_seen_content_id(&mesh, &token).expect("not cancelled");
                 assert_eq!(verified(&snapshot), None);
                 show("new");
             }
-            snapshot.read_content_id(&texture, &token).expect("not cancelled");
+            snapshot.first_seen_content_id(&texture, &token).expect("not cancelled");
             assert_eq!(verified(&snapshot), Some(if is_decoded { library.clone() } else { mesh.clone() }));
         }
         // Neither replacement with the same content nor removal is a change.
         show("old");
-        let snapshot = Snapshot::new(Arc::default());
-        snapshot.read_content_id(&same, &token).expect("not cancelled");
+        let snapshot = RequestFileSnapshot::new(Arc::default());
+        snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
         show("new");
         assert_eq!(verified(&snapshot), None);
         fs::remove_file(&current).expect("removed");
@@ -444,7 +445,7 @@ mod tests {
         let (old, stamp) = (*blake3::hash(b"old").as_bytes(), FileStamp::from_path(&path));
         let token = CancelToken::new();
         for is_settled in [false, true] {
-            let mut snapshot = Snapshot::new(Arc::default());
+            let mut snapshot = RequestFileSnapshot::new(Arc::default());
             if is_settled {
                 snapshot.begun += Duration::from_secs(4);
             }
@@ -460,8 +461,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "half").expect("written");
-        let (snapshot, token) = (Snapshot::new(Arc::default()), CancelToken::new());
-        snapshot.read_content_id(&path, &token).expect("not cancelled");
+        let (snapshot, token) = (RequestFileSnapshot::new(Arc::default()), CancelToken::new());
+        snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
         snapshot.wait_for_writers(&token).expect("not cancelled");
         let modified = fs::metadata(&path).and_then(|found| found.modified()).expect("metadata");
         assert!(modified.elapsed().is_ok_and(|age| age >= SETTLE_TIME));

@@ -44,7 +44,7 @@ fn identity(folder: &Path) -> Option<Identity> {
 
 /// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
 /// been dropped, and any use of the watcher would panic, even dropping it.
-fn keep_watcher_if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
+fn forget_dead_watcher<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
     }
@@ -65,7 +65,7 @@ impl WatchedFolders {
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
-        let watcher = watcher.and_then(|watcher| keep_watcher_if_alive(watcher, &names));
+        let watcher = watcher.and_then(|watcher| forget_dead_watcher(watcher, &names));
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
@@ -75,7 +75,7 @@ impl WatchedFolders {
     }
 
     /// Watches the folders that contain the files or the targets of symbolic links.
-    pub(super) fn watch_parents<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
+    pub(super) fn watch_folders_of_files<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
         let mut folders = HashSet::new();
         let mut names = HashSet::new();
         for file in files {
@@ -210,9 +210,9 @@ mod tests {
     #[test]
     fn watcher_without_thread_is_not_used() {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
-        assert!(keep_watcher_if_alive(Dead, &names).is_none());
+        assert!(forget_dead_watcher(Dead, &names).is_none());
         let _handler = names.clone();
-        assert_eq!(keep_watcher_if_alive(1, &names), Some(1));
+        assert_eq!(forget_dead_watcher(1, &names), Some(1));
     }
 
     #[test]

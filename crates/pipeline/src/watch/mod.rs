@@ -27,9 +27,9 @@ use self::change_tracker::ChangeTracker;
 use self::content::FileContentId;
 pub use self::content::{FileHashCache, FileRead};
 use self::folders::{ChangeHint, WatchedFolders};
-use self::outputs::UnconfirmedChanges;
+use self::outputs::PossiblyTransientChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
-pub use self::working_folder::missing_folder;
+pub use self::working_folder::find_missing_folder;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 
@@ -75,7 +75,7 @@ impl Default for WatchDelays {
 #[derive(Clone, Debug)]
 pub enum WatchEvent {
     /// A file's content changed, and the save appears complete.
-    Changed(ContentChange),
+    Changed(ContentChangeTime),
     /// The changed files appear to be complete.
     Settled,
     /// A file written by glimt was changed, or was restored to what glimt wrote.
@@ -84,7 +84,7 @@ pub enum WatchEvent {
 
 /// A change to one or more files.
 #[derive(Clone, Copy, Debug)]
-pub struct ContentChange {
+pub struct ContentChangeTime {
     /// Time of the first hint, from which the save-to-screen latency is measured.
     pub noticed: Instant,
 }
@@ -181,7 +181,7 @@ struct WatchThread<F> {
     /// Changes that the last check found but did not report.
     pending: Vec<FileRead>,
     /// Output changes that may be temporary.
-    suspects: UnconfirmedChanges,
+    suspects: PossiblyTransientChanges,
     /// Time after which to report a missing file or a changed output.
     quiet: Duration,
     say: F,
@@ -236,7 +236,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         let outputs = self.contents.outputs.paths();
         let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
         self.contents.retain(is_watched);
-        self.folders.watch_parents(self.files.keys().chain(&outputs));
+        self.folders.watch_folders_of_files(self.files.keys().chain(&outputs));
     }
 
     /// Checks all files and reports changes.
@@ -253,9 +253,9 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
                 self.files.insert(path, (content, now));
             }
             let noticed = self.change_tracker.mark_reported(now);
-            (self.say)(WatchEvent::Changed(ContentChange { noticed }));
+            (self.say)(WatchEvent::Changed(ContentChangeTime { noticed }));
         }
-        if self.change_tracker.settle_if_due(now) {
+        if self.change_tracker.take_settled(now) {
             (self.say)(WatchEvent::Settled);
         }
     }

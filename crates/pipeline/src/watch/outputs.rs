@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::content::{FileContentId, FileHashCache};
 use crate::control::CancelToken;
-use crate::protected::{OverwriteProtection, ProtectedFile};
+use crate::protected::{OverwriteConflict, OverwriteProtection};
 
 /// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,8 +139,8 @@ impl WrittenOutputs {
                 FileContentId::Hash(_) | FileContentId::Unusable(_) => {
                     Some(match output.protection.reason_to_keep(&path) {
                         None => ExternalChange::Replaced,
-                        Some(ProtectedFile::OtherScene) => ExternalChange::ReplacedByOtherScene,
-                        Some(ProtectedFile::Foreign) => ExternalChange::ReplacedByForeign,
+                        Some(OverwriteConflict::OtherScene) => ExternalChange::ReplacedByOtherScene,
+                        Some(OverwriteConflict::Foreign) => ExternalChange::ReplacedByForeign,
                     })
                 }
             };
@@ -166,9 +166,9 @@ impl WrittenOutputs {
 
 /// Changes that may be temporary, because programs may remove a file before replacing it.
 #[derive(Debug, Default)]
-pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
+pub(super) struct PossiblyTransientChanges(Vec<(OutputChange, Instant)>);
 
-impl UnconfirmedChanges {
+impl PossiblyTransientChanges {
     /// Returns changes that have lasted for `quiet`. Returns each change only once.
     pub(super) fn take_confirmed(
         &mut self,
@@ -216,7 +216,7 @@ mod tests {
     fn lasting_changes_are_reported_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let (contents, mut suspects) = (FileHashCache::default(), UnconfirmedChanges::default());
+        let (contents, mut suspects) = (FileHashCache::default(), PossiblyTransientChanges::default());
         let begin = Instant::now();
         let mut look = |contents: &FileHashCache, after: u64| {
             let found = suspects.take_confirmed(contents, QUIET, begin + Duration::from_millis(after));

@@ -28,7 +28,7 @@ fn is_working_folder_removed() -> bool {
 }
 
 /// Returns a missing folder that the file needs: the working directory or the file's own folder.
-pub fn missing_folder(file: &Path) -> Option<PathBuf> {
+pub fn find_missing_folder(file: &Path) -> Option<PathBuf> {
     if is_working_folder_removed() && file.is_relative() {
         return HOME.get().cloned();
     }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::key_path::{quote_key_part, shortened_key};
-use crate::sanitize::shortened;
+use crate::sanitize::escape_and_truncate;
 use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
 /// Maximum size of documents to parse, in bytes. Parsing a document of this size delays the new render by a
@@ -93,7 +93,7 @@ impl KeyDifferences<'_> {
         let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_equal_value(a, b);
         let start = old.iter().zip(&new).take_while(is_same).count();
         let end = old.iter().rev().zip(new.iter().rev()).take(least - start).take_while(is_same).count();
-        let (old_names, new_names) = (element_keys(&old), element_keys(&new));
+        let (old_names, new_names) = (element_path_segments(&old), element_path_segments(&new));
         let changed = |all: &[Value<'_>]| start..all.len() - end;
         for (index, old) in changed(&old).zip(&old[changed(&old)]) {
             if let Some(after) = new[changed(&new)].get(index - start) {
@@ -113,7 +113,7 @@ impl KeyDifferences<'_> {
         match value.decode() {
             TomlValue::Array(array) if array.starts_with_table() => {
                 let all: Vec<Value<'_>> = array.iter().collect();
-                for (element, value) in element_keys(&all).iter().zip(&all) {
+                for (element, value) in element_path_segments(&all).iter().zip(&all) {
                     self.add_unmatched_entry(sign, &join_key(name, element), value, text);
                 }
             }
@@ -148,7 +148,8 @@ impl KeyDifferences<'_> {
             return "{…}".to_owned();
         }
         let written = self.texts[text].get(value.span()).unwrap_or_default();
-        let shown = shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), MAX_VALUE_CHARS);
+        let shown =
+            escape_and_truncate(&written.split_whitespace().collect::<Vec<_>>().join(" "), MAX_VALUE_CHARS);
         // Cut between elements, because a truncated number would look like a different number.
         match (value.decode(), shown.rfind(", ")) {
             (TomlValue::Array(_), Some(end)) if shown.ends_with('…') => format!("{}…", &shown[..end + 2]),
@@ -163,19 +164,19 @@ fn join_key(name: &str, key: &str) -> String {
 
 /// Returns the key parts by which `--set` refers to a list's elements: unique names or, failing that, 1-based
 /// positions.
-fn element_keys(all: &[Value<'_>]) -> Vec<String> {
+fn element_path_segments(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
-    for name in all.iter().filter_map(table_name) {
+    for name in all.iter().filter_map(name_key_value) {
         *counts.entry(name).or_default() += 1;
     }
     let finds = |name: &&str| name.parse::<usize>().is_err() && counts.get(name) == Some(&1);
     let of = |(number, value): (usize, &Value<'_>)| {
-        table_name(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
+        name_key_value(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
     };
     (1..).zip(all).map(of).collect()
 }
 
-fn table_name<'t>(value: &Value<'t>) -> Option<&'t str> {
+fn name_key_value<'t>(value: &Value<'t>) -> Option<&'t str> {
     let TomlValue::Table(table) = value.decode() else { return None };
     match table.get("name")?.value.decode() {
         TomlValue::String(name) => Some(name),

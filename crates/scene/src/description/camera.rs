@@ -40,7 +40,7 @@ pub enum Camera {
 /// A camera defined by vectors, created from either kind of [`Camera`]. The fields have the same invariants
 /// as those of [`Camera::LookAt`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewpoint {
+pub struct ResolvedCamera {
     /// Position and orientation.
     pub pose: Pose,
     /// Vertical field of view in degrees.
@@ -64,7 +64,7 @@ pub struct Pose {
 
 /// A change to a camera. `None` keeps the current value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CameraChange {
+pub struct CameraOverrides {
     /// Position and orientation.
     pub pose: Option<Pose>,
     /// Vertical field of view in degrees, in (0, 180).
@@ -80,17 +80,17 @@ impl Pose {
     }
 }
 
-impl CameraChange {
+impl CameraOverrides {
     /// Whether any value changes.
     pub fn has_changes(&self) -> bool {
         *self != Self::default()
     }
 }
 
-impl Viewpoint {
+impl ResolvedCamera {
     /// Applies a change. If the focal plane passes through `look_at` (the default), the focus follows
     /// `look_at`.
-    pub fn with_change(&self, change: &CameraChange) -> Self {
+    pub fn with_change(&self, change: &CameraOverrides) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
         Self {
@@ -107,9 +107,9 @@ impl Viewpoint {
     }
 }
 
-impl From<Viewpoint> for Camera {
-    fn from(view: Viewpoint) -> Self {
-        let Viewpoint { pose: Pose { position, look_at, up }, fov, aperture, focus } = view;
+impl From<ResolvedCamera> for Camera {
+    fn from(view: ResolvedCamera) -> Self {
+        let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = view;
         Self::LookAt { position, look_at, up, fov, aperture, focus }
     }
 }
@@ -123,10 +123,10 @@ pub fn is_same_distance(a: f64, b: f64) -> bool {
 
 impl Camera {
     /// Whether the camera has this viewpoint, up to rounding of the focus distance.
-    pub fn matches_viewpoint(&self, view: &Viewpoint) -> bool {
+    pub fn matches_viewpoint(&self, view: &ResolvedCamera) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
-                *self == Viewpoint { focus: *focus, ..*view }.into()
+                *self == ResolvedCamera { focus: *focus, ..*view }.into()
             }
             Self::LookAt { .. } | Self::Orbiter { .. } => false,
         }

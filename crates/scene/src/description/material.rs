@@ -74,7 +74,7 @@ pub enum NumberSource {
 
 impl NumberSource {
     /// The number, or `None` if it is a texture.
-    pub fn constant(&self) -> Option<f32> {
+    pub fn as_constant(&self) -> Option<f32> {
         match *self {
             Self::Constant(number) => Some(number),
             Self::Texture { .. } => None,
@@ -460,7 +460,7 @@ impl MaterialKind {
     }
 
     /// Returns the number parameters that may be textures.
-    fn number_parameters(&self) -> Vec<NumberSource> {
+    fn texturable_number_parameters(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
             Self::Plastic { roughness, .. } | Self::Glass { roughness, .. } => vec![*roughness],
@@ -510,7 +510,7 @@ impl Material {
             .into_iter()
             .filter_map(|(color, role)| Some((color.texture_index()?, role)));
         let numbers = kind
-            .number_parameters()
+            .texturable_number_parameters()
             .into_iter()
             .filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));

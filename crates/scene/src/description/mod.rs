@@ -13,7 +13,7 @@ mod shape;
 use std::ops::Range;
 use std::path::PathBuf;
 
-pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
+pub use camera::{Camera, CameraOverrides, Pose, ResolvedCamera, is_same_distance};
 pub use light::{Environment, Light};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use crate::geometry;
 use crate::geometry::cone::Cone;
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -220,7 +220,9 @@ impl Shape {
             Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center: at(center), radius }),
             Self::Quad { corner, u, v } => geometry::Shape::Quad(Parallelogram::new(at(corner), u, v)),
             Self::Plane { point, normal } => geometry::Shape::Plane(Plane::new(at(point), normal)),
-            Self::Box { center, size, rotate } => geometry::Shape::Box(Cuboid::new(at(center), size, rotate)),
+            Self::Box { center, size, rotate } => {
+                geometry::Shape::Box(OrientedBox::new(at(center), size, rotate))
+            }
             Self::Triangle { a, b, c } => {
                 geometry::Shape::Triangle(Triangle { a: at(a), b: at(b), c: at(c) })
             }
@@ -298,7 +300,7 @@ impl Shape {
 
     /// Returns an upper bound on the projection of the shape's points onto a unit direction. Infinite for
     /// planes that are not perpendicular to the direction. `None` for a mesh.
-    pub fn max_projection_onto(&self, direction: DVec3) -> Option<f64> {
+    pub fn upper_bound_along(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
         // The projected extent of a circle around an axis.
         let round = |axis: DVec3, radius: f64| {

@@ -24,16 +24,20 @@ pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
         return None;
     }
     let table = root.table("camera")?;
-    let camera =
-        if uses_orbiter_file(&table) { read_orbiter_camera(&table) } else { read_look_at_camera(&table) };
-    table.report_key_errors();
+    let camera = if is_orbiter_file_effective(&table) {
+        read_orbiter_camera(&table)
+    } else {
+        read_look_at_camera(&table)
+    };
+    table.report_unknown_and_missing_keys();
     camera
 }
 
 /// Whether the orbiter file defines the camera. It does not if `--set` sets both `position` and `look_at`.
-fn uses_orbiter_file(table: &TableReader<'_>) -> bool {
-    let is_set =
-        |name| table.optional_key(name).span().is_some_and(|span| table.context.is_span_in_set_arg(&span));
+fn is_orbiter_file_effective(table: &TableReader<'_>) -> bool {
+    let is_set = |name| {
+        table.optional_key(name).value_span().is_some_and(|span| table.context.is_span_in_set_arg(&span))
+    };
     let is_replaced = is_set("position") && is_set("look_at") && !is_set("orbiter");
     table.optional_key("orbiter").is_present() && !is_replaced
 }
@@ -62,7 +66,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     }
     let view = look_at - position;
     let Some(direction) = view.try_normalize() else {
-        let span = table.optional_key("look_at").span()?;
+        let span = table.optional_key("look_at").value_span()?;
         let issue = Issue::error(span, "the camera has no direction")
             .with_label("this is the same point as `position`")
             .with_help("`look_at` is the point at the center of the image");
@@ -75,8 +79,8 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
 
 /// Returns `up` if it is long enough and not parallel to `view`.
 fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
-    let span = table.optional_key("up").span().or(table.optional_key("look_at").span())?;
-    if !table.optional_key("up").check_vector_length(up) {
+    let span = table.optional_key("up").value_span().or(table.optional_key("look_at").value_span())?;
+    if !table.optional_key("up").check_vector_magnitude(up) {
         return None;
     }
     let Some(direction) = up.try_normalize() else {

@@ -7,7 +7,7 @@ use super::table::TableReader;
 
 /// Reads `emission` and `emission_sides`.
 pub(super) fn read_emission(table: &TableReader<'_>, textures: &DefinedNames) -> EmissionSource {
-    let source = table.optional_key("emission").emission(textures).unwrap_or(EmissionSource::NONE);
+    let source = table.optional_key("emission").emission_source(textures).unwrap_or(EmissionSource::NONE);
     let sides = table.optional_key("emission_sides").choice().unwrap_or(source.sides);
     warn_if_ineffective_without(table, "emission_sides", "emission");
     EmissionSource { sides, ..source }
@@ -31,7 +31,7 @@ pub(super) fn read_bump(table: &TableReader<'_>, textures: &DefinedNames) -> Opt
 }
 
 /// Reads `opacity` and `opacity_cutoff`.
-pub(super) fn read_opacity(table: &TableReader<'_>, textures: &DefinedNames) -> OpacitySource {
+pub(super) fn read_opacity_and_cutoff(table: &TableReader<'_>, textures: &DefinedNames) -> OpacitySource {
     let value = table.optional_key("opacity").number_or_texture(textures, table.key_limits("opacity"));
     let cutoff =
         table.optional_key("opacity_cutoff").number_f32(table.key_limits("opacity_cutoff")).unwrap_or(0.0);

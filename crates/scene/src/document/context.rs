@@ -138,7 +138,7 @@ impl<'a> FileContext<'a> {
     /// Calls `look` to search a list for a similar name, unless the file's search limit has been reached. The
     /// limit exists because the cost of a search is linear in the length of the list, and files with many
     /// wrong names usually repeat the same mistake.
-    pub(super) fn search_similar_name<T>(
+    pub(super) fn run_limited_name_search<T>(
         &self,
         comparisons: usize,
         look: impl FnOnce() -> Option<T>,
@@ -158,7 +158,7 @@ impl<'a> FileContext<'a> {
     }
 
     /// The 1-based line number of a byte offset.
-    pub(super) fn line_number(&self, offset: usize) -> usize {
+    pub(super) fn line_number_at_offset(&self, offset: usize) -> usize {
         self.cached_line_start_index().line_number(offset)
     }
 
@@ -193,7 +193,7 @@ impl<'a> FileContext<'a> {
                 // Placeholders for values with syntax errors have no span.
                 IssueCause::Value if issue.span == (0..0) => false,
                 IssueCause::Value => {
-                    let line = self.line_number(issue.span.start);
+                    let line = self.line_number_at_offset(issue.span.start);
                     let before = broken_lines.partition_point(|lines| lines.start <= line);
                     !before.checked_sub(1).is_some_and(|last| broken_lines[last].contains(&line))
                 }

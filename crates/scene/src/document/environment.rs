@@ -18,13 +18,13 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     let radiance = if color.is_present() { color.color() } else { Some(default) };
     let rotate = table.optional_key("rotate");
     let degrees = if rotate.is_present() { rotate.number(table.key_limits("rotate")) } else { Some(0.0) };
-    table.report_key_errors();
-    if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_present())) {
+    table.report_unknown_and_missing_keys();
+    if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.value_span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
             .with_label("this scales the map in `file`");
         table.context.report(issue.with_help("remove it to use the map unchanged"));
     }
-    if let Some(span) = rotate.span().filter(|_| !file.is_present()) {
+    if let Some(span) = rotate.value_span().filter(|_| !file.is_present()) {
         let issue = Issue::warning(span, "`rotate` has no effect without `file`");
         table.context.report(issue.with_help("a constant environment looks the same from every direction"));
     }

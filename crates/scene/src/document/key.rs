@@ -7,8 +7,8 @@ mod number;
 
 use std::ops::{Range, RangeInclusive};
 
-use super::super::nearest::translate_foreign_name;
-use super::super::sanitize::shortened;
+use super::super::nearest::foreign_or_nearest_name;
+use super::super::sanitize::escape_and_truncate;
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
@@ -17,7 +17,7 @@ use super::value::{
     TomlValue, Value, describe_value, number_within, parse_integer_in_radix, report_wrong_type,
 };
 use crate::choice::Choice;
-use crate::math::limits::{SHORTEST, is_too_short, robust_length};
+use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 use crate::math::{DVec3, Vec2};
 
 /// A table's key, which may be absent.
@@ -49,7 +49,7 @@ impl<'a> TableKey<'a> {
     }
 
     /// The span of the value.
-    pub(super) fn span(&self) -> Option<Range<usize>> {
+    pub(super) fn value_span(&self) -> Option<Range<usize>> {
         self.value.map(|value| value.span())
     }
 
@@ -114,7 +114,7 @@ impl<'a> TableKey<'a> {
         if text.bytes().any(|byte| !byte.is_ascii_digit()) {
             return Some(Some(text.into()));
         }
-        let issue = Issue::error(self.span()?, format!("`{}` must not be a number", self.name));
+        let issue = Issue::error(self.value_span()?, format!("`{}` must not be a number", self.name));
         self.context.report(
             issue.with_help("use a name with a letter, because shapes can also be referenced by number"),
         );
@@ -136,7 +136,8 @@ impl<'a> TableKey<'a> {
         if let Some(meant) = C::named(text) {
             return Some(meant);
         }
-        let (span, name, shown, list) = (self.span()?, self.name, shortened(text, 32), list());
+        let (span, name, shown, list) =
+            (self.value_span()?, self.name, escape_and_truncate(text, 32), list());
         let mut issue = if C::UNAVAILABLE.contains(&text) {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
@@ -145,7 +146,7 @@ impl<'a> TableKey<'a> {
                 .with_help(format!("expected {list}"))
         };
         let names: Vec<&str> = C::ALL.iter().map(|one| one.name()).collect();
-        if let Some(near) = translate_foreign_name(text, &names) {
+        if let Some(near) = foreign_or_nearest_name(text, &names) {
             issue = issue.with_label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);
@@ -164,9 +165,9 @@ impl<'a> TableKey<'a> {
 
     /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
     /// length 0, the caller reports a more specific error.
-    pub(super) fn check_vector_length(&self, vector: DVec3) -> bool {
+    pub(super) fn check_vector_magnitude(&self, vector: DVec3) -> bool {
         let length = robust_length(vector);
-        let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
+        let Some(span) = self.value_span().filter(|_| is_nonzero_but_too_short(length)) else { return true };
         let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
         self.context.report(issue.with_label(format!("its length is {length:e}")));
         false
@@ -176,8 +177,8 @@ impl<'a> TableKey<'a> {
     /// reports an error if not. For equal points, the caller reports a more specific error.
     pub(super) fn check_points_far_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = robust_length(to - from);
-        let span = other.span().or(self.span());
-        let Some(span) = span.filter(|_| is_too_short(distance)) else { return true };
+        let span = other.value_span().or(self.value_span());
+        let Some(span) = span.filter(|_| is_nonzero_but_too_short(distance)) else { return true };
         let (first, second) = (self.name, other.name);
         let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
         self.context.report(Issue::error(span, message).with_label(format!("they are {distance:e} apart")));
@@ -192,7 +193,7 @@ impl<'a> TableKey<'a> {
     /// Reads an array of `N` numbers. Reports every invalid number.
     pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
-        let Some(array) = value.array().filter(|array| array.len() == N) else {
+        let Some(array) = value.as_array().filter(|array| array.len() == N) else {
             report_wrong_type(self.context, self.name, value, expected);
             return None;
         };
@@ -219,10 +220,10 @@ impl<'a> TableKey<'a> {
 
     /// Looks up `text`, the name that is the key's value.
     fn find_defined_name(&self, names: &DefinedNames, text: &str) -> Option<usize> {
-        let index = names.find(text);
+        let index = names.find_and_mark_used(text);
         if index.is_none() {
-            let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
-            let issue = Issue::error(self.span()?, message).mark_missing_value();
+            let message = format!("there is no {} \"{}\"", names.kind, escape_and_truncate(text, 40));
+            let issue = Issue::error(self.value_span()?, message).mark_missing_value();
             self.context.report(names.add_name_suggestions(self.context, issue, text));
         }
         index

@@ -22,11 +22,11 @@ choice! {
 }
 
 pub(super) fn read_lights(root: &TableReader<'_>) -> Option<Vec<Light>> {
-    let read: Vec<Option<Light>> = root.tables("light").map(|table| read_light(&table)).collect();
+    let read: Vec<Option<Light>> = root.tables("light").map(|table| noise_target_label(&table)).collect();
     read.into_iter().collect()
 }
 
-fn read_light(table: &TableReader<'_>) -> Option<Light> {
+fn noise_target_label(table: &TableReader<'_>) -> Option<Light> {
     let key = table.optional_key("type");
     // Without a valid type, keys cannot be checked.
     let kind = if key.is_present() { key.choice()? } else { LightKind::Point };
@@ -35,7 +35,7 @@ fn read_light(table: &TableReader<'_>) -> Option<Light> {
         LightKind::Spot => read_spot_light(table).map(Light::Spot),
         LightKind::Directional => read_directional_light(table).map(Light::Directional),
     };
-    table.report_key_errors();
+    table.report_unknown_and_missing_keys();
     light
 }
 
@@ -57,7 +57,7 @@ fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
     let (point, look_at) = (point?, look_at?);
     let place = table.optional_key("position");
     if point.position == look_at {
-        let issue = Issue::error(aim.span().or(place.span())?, "the spotlight has no direction")
+        let issue = Issue::error(aim.value_span().or(place.value_span())?, "the spotlight has no direction")
             .with_label("`position` and `look_at` are the same point")
             .with_help("the defaults are `position = [0, 3, 0]` and `look_at = [0, 0, 0]`");
         table.context.report(issue);
@@ -80,7 +80,7 @@ fn read_directional_light(table: &TableReader<'_>) -> Option<DirectionalLight> {
     let angle = if key.is_present() { key.number(table.key_limits("directional.angle")) } else { Some(0.0) };
     if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
         let issue =
-            Issue::error(key.span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
+            Issue::error(key.value_span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
         table.context.report(issue.with_help("0 means no extent; use 0.53 for the sun"));
         return None;
     }

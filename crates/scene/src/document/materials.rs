@@ -78,9 +78,9 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
         common::reject_opacity_keys(table);
         OpacitySource::FULL
     } else {
-        common::read_opacity(table, textures)
+        common::read_opacity_and_cutoff(table, textures)
     };
-    table.report_key_errors();
+    table.report_unknown_and_missing_keys();
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
@@ -118,7 +118,9 @@ fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &Col
     let sum = constant(kd) + constant(ks);
     // Decimal values that sum to 1 may sum to slightly more in binary.
     let most = sum.max_element();
-    let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
+    let Some(span) = ks_key.value_span().or(kd_key.value_span()).filter(|_| most > 1.0 + 1e-5) else {
+        return;
+    };
     let channel = ["red", "green", "blue"][sum.max_position()];
     let issue = Issue::warning(span, ENERGY_GAIN)
         .with_label(format!("diffuse + specular is {:.3} in {channel}", most))
@@ -127,10 +129,10 @@ fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &Col
 }
 
 fn read_metal(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
-    let fresnel = read_fresnel(table, textures);
+    let fresnel = read_metal_reflectance(table, textures);
     Some(MaterialKind::Metal {
-        roughness: read_number(table, textures, "metal.roughness", 0.2),
-        anisotropy: read_number(table, textures, "metal.anisotropy", 0.0),
+        roughness: read_number_or_texture(table, textures, "metal.roughness", 0.2),
+        anisotropy: read_number_or_texture(table, textures, "metal.anisotropy", 0.0),
         fresnel: fresnel?,
     })
 }
@@ -140,7 +142,7 @@ fn read_plastic(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKin
         diffuse: read_color(table, textures, "plastic.diffuse", 0.7),
         specular: read_color(table, textures, "plastic.specular", 1.0),
         ior: read_ior(table, "plastic.ior"),
-        roughness: read_number(table, textures, "plastic.roughness", 0.1),
+        roughness: read_number_or_texture(table, textures, "plastic.roughness", 0.1),
     }
 }
 
@@ -148,7 +150,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
     common::warn_if_ineffective_without(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
         |path, default| read_color(table, textures, path, default),
-        |path, default| read_number(table, textures, path, default),
+        |path, default| read_number_or_texture(table, textures, path, default),
     );
     MaterialKind::Principled {
         color: color("principled.color", 0.8),
@@ -191,7 +193,7 @@ fn read_color(
 }
 
 /// Reads a number or a texture.
-fn read_number(
+fn read_number_or_texture(
     table: &TableReader<'_>,
     textures: &DefinedNames,
     path: &'static str,
@@ -207,7 +209,7 @@ fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
 }
 
 /// Reads a metal's reflectance, which exactly one of three groups of keys must specify.
-fn read_fresnel(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
+fn read_metal_reflectance(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional_key(name));
     let is_index = eta.is_present() || k.is_present();
     let count =
@@ -244,14 +246,14 @@ fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Materi
     let ior = read_ior(table, "glass.ior");
     let (tint, thin) = (table.optional_key("tint"), table.optional_key("thin"));
     let rough = table.optional_key("roughness");
-    let roughness = read_number(table, textures, "glass.roughness", 0.0);
+    let roughness = read_number_or_texture(table, textures, "glass.roughness", 0.0);
     // If `thin` is present but invalid, the user probably wants a pane.
     if !thin.boolean().unwrap_or(thin.is_present()) {
         let tint = tint.color_f64(table.key_limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {
-        let issue = Issue::error(rough.span()?, "thin panes cannot be rough")
+        let issue = Issue::error(rough.value_span()?, "thin panes cannot be rough")
             .with_help("remove `thin` and give the glass a thickness: use a box instead of a quad");
         table.context.report(issue);
         return None;

@@ -60,7 +60,7 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
         };
     }
     let (document, errors) = toml::parse(text);
-    let broken_lines = syntax::report_syntax_errors(&context, errors);
+    let broken_lines = syntax::report_first_error_per_line(&context, errors);
     let document = sets::apply_set_args(&context, source, document);
     let scene = read_scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
@@ -146,7 +146,7 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let (objects, mesh_files) = shapes::read_objects(root, &materials);
     let lights = lights::read_lights(root);
     let environment = environment::read_environment(root);
-    root.report_key_errors();
+    root.report_unknown_and_missing_keys();
 
     let scene = Scene {
         render: render?,

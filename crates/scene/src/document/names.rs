@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::super::nearest::nearest_name;
-use super::super::sanitize::shortened;
+use super::super::sanitize::escape_and_truncate;
 use super::context::{FileContext, Issue};
 
 /// The names of all textures, or of all materials, in a file.
@@ -37,7 +37,7 @@ impl DefinedNames {
     }
 
     /// Looks up a name and marks it as used.
-    pub(super) fn find(&self, name: &str) -> Option<usize> {
+    pub(super) fn find_and_mark_used(&self, name: &str) -> Option<usize> {
         let index = *self.indices.get(name)?;
         self.entries[index].used.set(true);
         Some(index)
@@ -48,7 +48,7 @@ impl DefinedNames {
         const MAX_LISTED: usize = 12;
         let kind = self.kind;
         let known = || self.entries.iter().map(|entry| entry.name.as_str());
-        let quoted = |name: &str| format!("\"{}\"", shortened(name, 40));
+        let quoted = |name: &str| format!("\"{}\"", escape_and_truncate(name, 40));
         let list = known().take(MAX_LISTED).map(quoted).collect::<Vec<_>>().join(", ");
         let help = match self.entries.len() {
             0 => format!("the scene has no {kind}s; define one with [{kind}s.NAME]"),
@@ -57,7 +57,7 @@ impl DefinedNames {
             _ => format!("there are {list}"),
         };
         let issue = issue.with_help(help);
-        match context.search_similar_name(self.entries.len(), || nearest_name(name, known())) {
+        match context.run_limited_name_search(self.entries.len(), || nearest_name(name, known())) {
             Some(near) => issue.with_label(format!("did you mean {}?", quoted(near))),
             None => issue,
         }
@@ -66,7 +66,8 @@ impl DefinedNames {
     /// Warns about every unused name. Must only be called for scenes without errors.
     pub(super) fn warn_about_unused(&self, context: &FileContext<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
-            let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));
+            let message =
+                format!("the {} \"{}\" is not used", self.kind, escape_and_truncate(&entry.name, 40));
             context.report(Issue::warning(entry.span.clone(), message));
         }
     }

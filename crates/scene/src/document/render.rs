@@ -50,7 +50,7 @@ pub(super) fn read_render_table(root: &TableReader<'_>) -> (Option<RenderOptions
     let render = read_settings(&table);
     let output = read_output_path(&table);
     check_image_size(&table, &render);
-    table.report_key_errors();
+    table.report_unknown_and_missing_keys();
     (Some(render), output)
 }
 
@@ -62,7 +62,7 @@ fn read_output_path(table: &TableReader<'_>) -> Option<PathBuf> {
 
 fn check_image_size(table: &TableReader<'_>, render: &RenderOptions) {
     let RenderOptions { width, height, .. } = *render;
-    let spans = || table.optional_key("width").span().or(table.optional_key("height").span());
+    let spans = || table.optional_key("width").value_span().or(table.optional_key("height").value_span());
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         let issue =
             Issue::error(spans().unwrap_or_default(), format!("{width} × {height} pixels are too many"))

@@ -1,14 +1,14 @@
 //! Applies `--set` values to a document.
 
 use super::super::nearest::nearest_name;
-use super::super::sanitize::shortened;
+use super::super::sanitize::escape_and_truncate;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, apply_assignment};
+use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelTableKinds, apply_assignment};
 use super::context::{FileContext, Issue};
 use super::shapes;
 
 /// The top-level scene keys that are groups of named tables or lists of tables.
-const LAYOUT: TopLevelLayout = TopLevelLayout {
+const LAYOUT: TopLevelTableKinds = TopLevelTableKinds {
     groups: &["materials", "textures"],
     is_list: |name| name == "light" || shapes::is_shape_table_name(name),
 };
@@ -19,7 +19,7 @@ pub(super) fn apply_set_args<'s>(
     source: &'s SceneText,
     mut document: Document<'s>,
 ) -> Document<'s> {
-    for at in source.set_arg_offsets() {
+    for at in source.override_arg_offsets() {
         let placed;
         (document, placed) = apply_assignment(document, source.full_text(), at, LAYOUT);
         if let Err(key_error) = placed {
@@ -30,15 +30,15 @@ pub(super) fn apply_set_args<'s>(
 }
 
 fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
-    let list = shortened(&above.join("."), 40);
-    let part = shortened(&part, 40);
+    let list = escape_and_truncate(&above.join("."), 40);
+    let part = escape_and_truncate(&part, 40);
     let quoted = |names: &[String]| {
         const MAX_LISTED: usize = 12;
-        let names = names.iter().take(MAX_LISTED).map(|name| format!("`{}`", shortened(name, 40)));
+        let names = names.iter().take(MAX_LISTED).map(|name| format!("`{}`", escape_and_truncate(name, 40)));
         names.collect::<Vec<_>>().join(", ")
     };
     let near = |issue: Issue, names: &[String]| match nearest_name(&part, names.iter().map(String::as_str)) {
-        Some(near) => issue.with_label(format!("did you mean `{}`?", shortened(near, 40))),
+        Some(near) => issue.with_label(format!("did you mean `{}`?", escape_and_truncate(near, 40))),
         None => issue,
     };
     match why {

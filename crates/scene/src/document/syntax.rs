@@ -4,25 +4,26 @@ use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::super::sanitize::shortened;
+use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Bracket, SyntaxError, find_all_array_brackets, innermost_bracket_open_at_end};
 use super::context::{FileContext, Issue};
 
 /// Reports only the first error on each line, because it usually causes the other errors on the line. Returns
 /// the unreliable lines in order: lines with errors, and the lines after a broken header, because their keys
 /// appear to belong to another table.
-pub(super) fn report_syntax_errors(
+pub(super) fn report_first_error_per_line(
     context: &FileContext<'_>,
     mut errors: Vec<SyntaxError>,
 ) -> Vec<Range<usize>> {
-    let lists = ArrayBrackets { text: context.file_text(), brackets: OnceCell::new() };
+    let lists = LazyBracketIndex { text: context.file_text(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
     // The opening brackets of unclosed lists, indexed by line.
     let (mut in_open_array, mut opened) = (false, BTreeMap::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
-        let is_new = lines.insert(context.line_number(error.span.start)) && !(lacks_comma && in_open_array);
+        let is_new =
+            lines.insert(context.line_number_at_offset(error.span.start)) && !(lacks_comma && in_open_array);
         in_open_array = lacks_comma;
         if !is_new {
             continue;
@@ -30,8 +31,10 @@ pub(super) fn report_syntax_errors(
         match find_unclosed_bracket(context, &lists, &error) {
             // The parser treated all lines from the bracket to the error as part of the list.
             Some(open) => {
-                lines.extend(context.line_number(open)..context.line_number(error.span.start));
-                opened.insert(context.line_number(open), open);
+                lines.extend(
+                    context.line_number_at_offset(open)..context.line_number_at_offset(error.span.start),
+                );
+                opened.insert(context.line_number_at_offset(open), open);
             }
             None => firsts.push(error),
         }
@@ -41,12 +44,12 @@ pub(super) fn report_syntax_errors(
     if let Some(open) =
         last_unclosed_bracket(context.file_text()).filter(|_| !firsts.iter().any(is_nesting_limit_error))
     {
-        lines.insert(context.line_number(open));
-        opened.insert(context.line_number(open), open);
+        lines.insert(context.line_number_at_offset(open));
+        opened.insert(context.line_number_at_offset(open), open);
     }
     for error in firsts {
         // Ignore errors after an unclosed bracket on the same line.
-        let open = opened.get(&context.line_number(error.span.start));
+        let open = opened.get(&context.line_number_at_offset(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
             context.report(syntax_issue(context, &lists, error).mark_syntax_error());
         }
@@ -59,12 +62,12 @@ pub(super) fn report_syntax_errors(
 }
 
 /// The array brackets in a text with syntax errors.
-struct ArrayBrackets<'a> {
+struct LazyBracketIndex<'a> {
     text: &'a str,
     brackets: OnceCell<Vec<Bracket>>,
 }
 
-impl ArrayBrackets<'_> {
+impl LazyBracketIndex<'_> {
     /// Returns the opening bracket of the innermost list that is open at byte `end`.
     fn enclosing_open_bracket(&self, end: usize) -> Option<usize> {
         let all = self.brackets.get_or_init(|| find_all_array_brackets(self.text));
@@ -78,7 +81,7 @@ const MISSING_COMMA: &str = "missing comma between array elements";
 /// header.
 fn find_unclosed_bracket(
     context: &FileContext<'_>,
-    lists: &ArrayBrackets<'_>,
+    lists: &LazyBracketIndex<'_>,
     SyntaxError { span, what, .. }: &SyntaxError,
 ) -> Option<usize> {
     if what == "unclosed array" {
@@ -86,9 +89,9 @@ fn find_unclosed_bracket(
         return if is_bracket { Some(span.start) } else { lists.enclosing_open_bracket(span.end) };
     }
     let open = lists.enclosing_open_bracket(span.start)?;
-    let line = context.line_text_by_number(context.line_number(span.start))?.trim();
+    let line = context.line_text_by_number(context.line_number_at_offset(span.start))?.trim();
     let is_header = line.starts_with('[') && line.ends_with(']') && !line.contains([',', ' ']);
-    let is_later = context.line_number(open) < context.line_number(span.start);
+    let is_later = context.line_number_at_offset(open) < context.line_number_at_offset(span.start);
     (what == MISSING_COMMA && is_later && (starts_with_key(line) || is_header)).then_some(open)
 }
 
@@ -121,7 +124,7 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
         .span_text(&(open..context.file_text().len()))
         .find('\n')
         .map_or(context.file_text().len(), |at| open + at);
-    match format_number_list(context.span_text(&(open + 1..end))) {
+    match reformat_number_list(context.span_text(&(open + 1..end))) {
         Some(list) => format!("write {list}"),
         None => "expected `]`".to_owned(),
     }
@@ -129,15 +132,19 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
 
 /// Returns the message about missing commas in a single-line list. `at` is the position of the first missing
 /// comma.
-fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
+fn missing_commas_message(
+    context: &FileContext<'_>,
+    lists: &LazyBracketIndex<'_>,
+    at: usize,
+) -> Option<String> {
     let open = lists.enclosing_open_bracket(at)?;
     let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
-    let line = context.line_text_by_number(context.line_number(at))?;
+    let line = context.line_text_by_number(context.line_number_at_offset(at))?;
     let inner = line.get(open.checked_sub(line_start)? + 1..)?;
     let inner = &inner[..inner.find(']')?];
     let values = split_values(inner);
     let is_plain = |value: &&str| !value.contains(['[', '{', '"', '\'', '#', '=']);
-    let list = format_list(&values).filter(|_| values.iter().all(is_plain))?;
+    let list = format_array_if_short(&values).filter(|_| values.iter().all(is_plain))?;
     let missing = (values.len() - 1).saturating_sub(inner.matches(',').count());
     let words = if missing > 1 { "commas are missing" } else { "a comma is missing" };
     Some(format!("{words}: write {list}"))
@@ -146,20 +153,20 @@ fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, 
 /// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0,
 /// 1, 0)`.
 fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
-    let line = context.line_text_by_number(context.line_number(at))?;
+    let line = context.line_text_by_number(context.line_number_at_offset(at))?;
     let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
     let (key, after) = line.split_once('=').filter(|_| starts_with_key(line))?;
     let value = after.split('#').next()?.trim();
     let name = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let inner = value.trim_start_matches(name).strip_prefix(['(', '{', '<'])?;
-    let list = format_number_list(inner)?;
+    let list = reformat_number_list(inner)?;
     let start = line_start + key.len() + 1 + after.find(value)?;
     let issue = Issue::error(start..start + value.len(), format!("lists use square brackets: write {list}"));
     Some(issue)
 }
 
 /// Formats numbers with any separators as a list, ignoring a closing bracket.
-fn format_number_list(text: &str) -> Option<String> {
+fn reformat_number_list(text: &str) -> Option<String> {
     let text = text.split('#').next().unwrap_or_default().trim();
     let values = split_values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
     let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
@@ -169,7 +176,7 @@ fn format_number_list(text: &str) -> Option<String> {
             && is_digit(digits.chars().next())
             && is_digit(digits.chars().next_back())
     };
-    format_list(&values).filter(|_| values.iter().all(is_number))
+    format_array_if_short(&values).filter(|_| values.iter().all(is_number))
 }
 
 /// Splits at commas, semicolons and whitespace.
@@ -178,7 +185,7 @@ fn split_values(text: &str) -> Vec<&str> {
 }
 
 /// Formats several values as a list. `None` for long lists.
-fn format_list(values: &[&str]) -> Option<String> {
+fn format_array_if_short(values: &[&str]) -> Option<String> {
     const LONGEST: usize = 60;
     let list = format!("[{}]", values.join(", "));
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
@@ -196,7 +203,7 @@ fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
 }
 
 /// Returns the text of the number that contains `span`.
-fn number_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
+fn number_text_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);
     while start > 0 && is_of_number(context.span_text(&(start - 1..start))) {
@@ -221,14 +228,14 @@ fn add_missing_digits(number: &str) -> Option<String> {
     (has_digit && whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
 }
 
-fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -> Issue {
+fn syntax_issue(context: &FileContext<'_>, lists: &LazyBracketIndex<'_>, error: SyntaxError) -> Issue {
     let is_deep = is_nesting_limit_error(&error);
     let SyntaxError { span, what, expected } = error;
     if let Some(issue) = wrong_brackets_issue(context, span.start) {
         return issue;
     }
     let expected = expected.unwrap_or_default();
-    let written = shortened(context.span_text(&span), 40);
+    let written = escape_and_truncate(context.span_text(&span), 40);
     let error = |words: &str| Issue::error(span.clone(), words);
     match what.as_str() {
         "duplicate key" => Issue::error(span, format!("`{written}` is defined twice"))
@@ -243,7 +250,7 @@ fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: Syn
             error("this header is not closed").with_help(format!("expected {expected}"))
         }
         "invalid mantissa" | "invalid fraction" | "invalid exponent" => {
-            let help = match add_missing_digits(number_at(context, &span)) {
+            let help = match add_missing_digits(number_text_at(context, &span)) {
                 Some(number) => format!("write {number}"),
                 None => "write 0.5, 5.0 and 1e3".to_owned(),
             };

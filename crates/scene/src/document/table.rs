@@ -6,8 +6,8 @@ use std::ops::{Range, RangeInclusive};
 
 use super::super::keys::find_table as table_info;
 use super::super::keys::key::ValueKind;
-use super::super::nearest::{nearest_name, translate_foreign_name};
-use super::super::sanitize::shortened;
+use super::super::nearest::{foreign_or_nearest_name, nearest_name};
+use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{FileContext, Issue};
 use super::key::TableKey;
@@ -35,7 +35,7 @@ impl fmt::Display for TableTitle<'_> {
             Self::Root => Ok(()),
             Self::Table(name) => write!(f, "[{name}]"),
             Self::List(name) => write!(f, "[[{name}]]"),
-            Self::Named(group, name) => write!(f, "[{group}.{}]", shortened(name, 40)),
+            Self::Named(group, name) => write!(f, "[{group}.{}]", escape_and_truncate(name, 40)),
             Self::Key(name) => write!(f, "`{name}`"),
         }
     }
@@ -133,7 +133,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Returns the range defined for an integer key.
-    pub(super) fn integer_range(&self, name: &str) -> RangeInclusive<i128> {
+    pub(super) fn integer_key_range(&self, name: &str) -> RangeInclusive<i128> {
         match self.expected_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
@@ -149,7 +149,7 @@ impl<'a> TableReader<'a> {
             TableTitle::Root | TableTitle::Key(_) => return None,
         };
         let (kind, name) = match name.split_once('.') {
-            Some((kind, name)) => (info.find_type(Some(kind)), name),
+            Some((kind, name)) => (info.find_type_or_default(Some(kind)), name),
             None => (None, name),
         };
         info.keys_for_type(kind).find(|key| key.name == name).map(|key| key.kind)
@@ -193,7 +193,7 @@ impl<'a> TableReader<'a> {
         let context = self.context;
         let key = self.optional_key(name);
         let list = key.value.and_then(|value| {
-            if let Some(array) = value.array() {
+            if let Some(array) = value.as_array() {
                 return Some(array);
             }
             let span = key.key_span().unwrap_or_default();
@@ -208,7 +208,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
-    pub(super) fn report_key_errors(&self) {
+    pub(super) fn report_unknown_and_missing_keys(&self) {
         let known = self.known.borrow();
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
@@ -232,7 +232,7 @@ impl<'a> TableReader<'a> {
         let unavailable = self.unavailable.borrow();
         let is_other = |name: &&&'static str| absent(name) && !unavailable.contains(name);
         let others: Vec<&'static str> = known.iter().filter(is_other).copied().collect();
-        translate_foreign_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
+        foreign_or_nearest_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
     }
 
     /// Whether there is a table with a similar name that is probably a misspelling of `name`.
@@ -249,7 +249,7 @@ impl<'a> TableReader<'a> {
         value: &TomlValue<'_>,
         near: Option<&str>,
     ) -> Issue {
-        let shown = shortened(key, 40);
+        let shown = escape_and_truncate(key, 40);
         let message = match self.title {
             TableTitle::Root if matches!(value, TomlValue::Table(_)) || is_array_of_tables(value) => {
                 format!("unknown table `{shown}`")

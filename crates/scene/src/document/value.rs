@@ -1,6 +1,6 @@
 //! Converts TOML values to numbers and describes them.
 
-use super::super::sanitize::shortened;
+use super::super::sanitize::escape_and_truncate;
 pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
@@ -8,7 +8,7 @@ use super::limits::Limits;
 /// Describes a value for use in messages, as in `found the string "a"`.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
-    let written = || shortened(context.span_text(&value.span()), LONGEST);
+    let written = || escape_and_truncate(context.span_text(&value.span()), LONGEST);
     match value.decode() {
         TomlValue::String(_) => format!("the string {}", written()),
         TomlValue::Integer { .. } | TomlValue::Float(_) | TomlValue::Boolean(_) => written(),

@@ -8,7 +8,7 @@ pub fn color_names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Parses a color string (`#rrggbb` or a case-insensitive name) into sRGB bytes.
-pub fn parse_color_bytes(text: &str) -> Option<[u8; 3]> {
+pub fn parse_hex_or_named_srgb8(text: &str) -> Option<[u8; 3]> {
     parse_hex_color(text).or_else(|| named_color(text))
 }
 
@@ -36,20 +36,20 @@ mod tests {
 
     #[test]
     fn color_names_are_case_insensitive() {
-        assert_eq!(parse_color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
-        assert_eq!(parse_color_bytes("DarkSlateGrey"), parse_color_bytes("darkslategray"));
+        assert_eq!(parse_hex_or_named_srgb8("rebeccapurple"), Some([0x66, 0x33, 0x99]));
+        assert_eq!(parse_hex_or_named_srgb8("DarkSlateGrey"), parse_hex_or_named_srgb8("darkslategray"));
         assert_eq!(color_names().count(), 148);
         for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
-            assert_eq!(parse_color_bytes(wrong), None, "{wrong}");
+            assert_eq!(parse_hex_or_named_srgb8(wrong), None, "{wrong}");
         }
     }
 
     #[test]
     fn hex_colors_need_six_digits() {
-        assert_eq!(parse_color_bytes("#ff8000"), Some([255, 128, 0]));
-        assert_eq!(parse_color_bytes("#FF80aa"), Some([255, 128, 170]));
+        assert_eq!(parse_hex_or_named_srgb8("#ff8000"), Some([255, 128, 0]));
+        assert_eq!(parse_hex_or_named_srgb8("#FF80aa"), Some([255, 128, 170]));
         for wrong in ["", "#", "ff8000", "#ff800", "#ff80000", "#gg8000", "#+f8000", "#ä1234"] {
-            assert_eq!(parse_color_bytes(wrong), None, "{wrong}");
+            assert_eq!(parse_hex_or_named_srgb8(wrong), None, "{wrong}");
         }
     }
 }

@@ -159,7 +159,7 @@ pub(super) const fn define_key(
 impl TableInfo {
     /// Returns the type called `name`, or the default type if `name` is `None`. `None` if the type is
     /// unknown.
-    pub fn find_type(&self, name: Option<&str>) -> Option<&'static TableTypeInfo> {
+    pub fn find_type_or_default(&self, name: Option<&str>) -> Option<&'static TableTypeInfo> {
         match name {
             Some(name) => self.types.iter().find(|one| one.name == name),
             None => self.types.first(),
@@ -204,7 +204,7 @@ impl KeyInfo {
     }
 
     /// Returns the default in Markdown, as shown in the documentation.
-    pub fn default_text(&self) -> String {
+    pub fn default_markdown(&self) -> String {
         match self.default {
             DefaultValue::Required(_) => "*required*".to_owned(),
             DefaultValue::Is(value) => format!("`{value}`"),

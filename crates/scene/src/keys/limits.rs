@@ -1,6 +1,6 @@
 //! Ranges of numbers, with descriptions.
 
-use crate::math::limits::{LARGEST, is_too_short};
+use crate::math::limits::{LARGEST, is_nonzero_but_too_short};
 
 /// A range of accepted numbers. In addition, numbers must be finite and at most [`LARGEST`] in magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +31,10 @@ impl Limits {
             return Some("must be less than 1e18 in magnitude".to_owned());
         }
         match self {
-            Self::LengthOrZero if is_too_short(number) => Some("must be 0, or at least 1e-18".to_owned()),
-            Self::Length | Self::NotZero if is_too_short(number) => {
+            Self::LengthOrZero if is_nonzero_but_too_short(number) => {
+                Some("must be 0, or at least 1e-18".to_owned())
+            }
+            Self::Length | Self::NotZero if is_nonzero_but_too_short(number) => {
                 Some("must be more than 1e-18 in magnitude".to_owned())
             }
             _ if self.contains(number) => None,

@@ -17,7 +17,7 @@ mod textures;
 use std::sync::LazyLock;
 
 pub(super) use colors::hex_digits;
-pub use colors::{color_names, parse_color_bytes};
+pub use colors::{color_names, parse_hex_or_named_srgb8};
 pub use key::{
     ChoiceValue, ChoiceValuesFn, DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind,
     choice_values,
@@ -79,7 +79,7 @@ mod tests {
         let pair = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
         let required = super::find_table(table)
             .into_iter()
-            .flat_map(|info| info.keys_for_type(info.find_type(Some(kind))));
+            .flat_map(|info| info.keys_for_type(info.find_type_or_default(Some(kind))));
         let required =
             required.filter(|info| table != "camera" && matches!(info.default, DefaultValue::Required(_)));
         let required = required.map(|info| (info.name.to_owned(), info.default_or_example()));

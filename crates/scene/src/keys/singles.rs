@@ -6,7 +6,7 @@ use super::key::ValueKind::{Color, File, Flag, Number, Numbers, Whole};
 use super::key::{KeyInfo, TableInfo, TableSyntax, define_key};
 use super::limits::Limits::{Any, AtLeast, Inside, Length, LengthOrZero};
 
-pub(super) const CAMERA: TableInfo = single_table(
+pub(super) const CAMERA: TableInfo = single_table_info(
     "camera",
     "The camera: `position` and `look_at`, or an `orbiter` file",
     &[
@@ -56,7 +56,7 @@ pub(super) const CAMERA: TableInfo = single_table(
     ],
 );
 
-pub(super) const PHOTONS: TableInfo = single_table(
+pub(super) const PHOTONS: TableInfo = single_table_info(
     "photons",
     "Photon mapping in `whitted`: caustics and all other indirect light",
     &[
@@ -85,7 +85,7 @@ pub(super) const PHOTONS: TableInfo = single_table(
     ],
 );
 
-pub(super) const ENVIRONMENT: TableInfo = single_table(
+pub(super) const ENVIRONMENT: TableInfo = single_table_info(
     "environment",
     "Light from all directions, a color or a map; replaces `background`",
     &[
@@ -113,6 +113,6 @@ pub(super) const ENVIRONMENT: TableInfo = single_table(
     ],
 );
 
-const fn single_table(name: &'static str, doc: &'static str, keys: &'static [KeyInfo]) -> TableInfo {
+const fn single_table_info(name: &'static str, doc: &'static str, keys: &'static [KeyInfo]) -> TableInfo {
     TableInfo { name, form: TableSyntax::Single, doc, keys, types: &[] }
 }

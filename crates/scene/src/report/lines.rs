@@ -13,14 +13,14 @@ pub type ReportLine = Vec<StyledSpan>;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StyledSpan {
     /// The role of the text, which determines its color.
-    pub role: SpanRole,
+    pub role: ReportTextRole,
     /// The text, without control characters.
     pub text: String,
 }
 
 /// Role of a piece of text. Front ends choose the colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpanRole {
+pub enum ReportTextRole {
     /// Source text and paths.
     Text,
     /// The word `error`, and underlines and labels for errors.
@@ -47,7 +47,7 @@ pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine>
 /// sanitized.
 fn split_styled_spans(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
-    let mut role = SpanRole::Text;
+    let mut role = ReportTextRole::Text;
     for (number, part) in line.split("\u{1b}[").enumerate() {
         let text = match part.split_once('m') {
             Some((codes, text)) if number > 0 => {
@@ -64,12 +64,12 @@ fn split_styled_spans(line: &str) -> ReportLine {
 }
 
 /// Returns the role that a color code marks in [`report_lines`].
-fn role_from_color_code(codes: &str) -> SpanRole {
+fn role_from_color_code(codes: &str) -> ReportTextRole {
     match codes {
-        "31" => SpanRole::Error,
-        "33" => SpanRole::Warning,
-        "34" => SpanRole::Frame,
-        "1" => SpanRole::Message,
-        _ => SpanRole::Text,
+        "31" => ReportTextRole::Error,
+        "33" => ReportTextRole::Warning,
+        "34" => ReportTextRole::Frame,
+        "1" => ReportTextRole::Message,
+        _ => ReportTextRole::Text,
     }
 }

@@ -109,11 +109,11 @@ fn lines_match_the_plain_report() {
     assert_eq!(joined.join("\n") + "\n", render_report(&diagnostics, 80, ReportStyle::Plain));
     let role =
         |text: &str| lines.iter().flatten().find(|piece| piece.text.contains(text)).map(|piece| piece.role);
-    assert_eq!(role("error"), Some(SpanRole::Error));
-    assert_eq!(role("found"), Some(SpanRole::Error));
-    assert_eq!(role("greater"), Some(SpanRole::Message));
-    assert_eq!(role("a.toml:1:10"), Some(SpanRole::Text));
-    assert_eq!(role("-->"), Some(SpanRole::Frame));
+    assert_eq!(role("error"), Some(ReportTextRole::Error));
+    assert_eq!(role("found"), Some(ReportTextRole::Error));
+    assert_eq!(role("greater"), Some(ReportTextRole::Message));
+    assert_eq!(role("a.toml:1:10"), Some(ReportTextRole::Text));
+    assert_eq!(role("-->"), Some(ReportTextRole::Frame));
     assert!(render_report(&diagnostics, 80, ReportStyle::Ansi).contains("\u{1b}["));
 }
 

@@ -90,7 +90,7 @@ impl<'s> DocumentBuilder<'s> {
 
     /// Stores the decoded string at `span`.
     pub(super) fn store_string(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
-        self.document.add_text(span, text)
+        self.document.store_decoded_string(span, text)
     }
 
     /// Creates an array from the elements starting at `first`.
@@ -113,7 +113,7 @@ impl<'s> DocumentBuilder<'s> {
         let is_dotted = !path.is_empty();
         let Some(parent) = self.find_or_create_table(self.table, path, is_dotted) else { return };
         let adds_to_defined = is_dotted && !self.document.table_origin(parent).is_implicit;
-        if adds_to_defined || self.document.find(parent, &key.text).is_some() {
+        if adds_to_defined || self.document.find_in_table(parent, &key.text).is_some() {
             self.report_duplicate(key.span);
         } else {
             self.document.add_entry(parent, key, value);
@@ -130,7 +130,7 @@ impl<'s> DocumentBuilder<'s> {
     ) {
         let Some(parent) = self.find_or_create_inline_table(table, path) else { return };
         let adds_to_defined = self.document.table_origin(parent).is_dotted == path.is_empty();
-        if adds_to_defined || self.document.find(parent, &key.text).is_some() {
+        if adds_to_defined || self.document.find_in_table(parent, &key.text).is_some() {
             self.report_duplicate(key.span);
         } else {
             self.document.add_entry(parent, key, value);
@@ -174,7 +174,7 @@ impl<'s> DocumentBuilder<'s> {
             self.document.add_entry(parent, key, node);
             return;
         }
-        match self.document.find(parent, &key.text).map(|found| found.kind) {
+        match self.document.find_in_table(parent, &key.text).map(|found| found.kind) {
             Some(NodeKind::List(list)) => self.document.table_list_mut(list).push(node),
             Some(_) => self.report_duplicate(key.span),
             None => {
@@ -190,12 +190,12 @@ impl<'s> DocumentBuilder<'s> {
     /// Returns the table at `path`. Creates missing tables.
     fn find_or_create_table(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
-            let Some(found) = self.document.find(table, &name.text) else {
+            let Some(found) = self.document.find_in_table(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted, is_inline: false };
                 return Some(self.create_implicit_table(table, name, origin));
             };
             match found.kind {
-                NodeKind::Table(inner) => self.extendable_table(inner, name, is_dotted),
+                NodeKind::Table(inner) => self.check_table_extendable(inner, name, is_dotted),
                 NodeKind::List(list) => {
                     let last = self.document.table_list_mut(list).last()?.kind;
                     if let NodeKind::Table(last) = last { Some(last) } else { None }
@@ -206,7 +206,12 @@ impl<'s> DocumentBuilder<'s> {
     }
 
     /// Returns the table if a header or dotted key may add keys to it.
-    fn extendable_table(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
+    fn check_table_extendable(
+        &mut self,
+        table: TableId,
+        name: &Name<'s>,
+        is_dotted: bool,
+    ) -> Option<TableId> {
         let origin = self.document.table_origin(table);
         if origin.is_inline {
             self.add_error(name.span, "cannot extend value of type inline table with a dotted key");
@@ -225,7 +230,7 @@ impl<'s> DocumentBuilder<'s> {
     /// Like [`Self::find_or_create_table`], but within an inline table.
     fn find_or_create_inline_table(&mut self, from: TableId, path: &[Name<'s>]) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
-            let Some(found) = self.document.find(table, &name.text) else {
+            let Some(found) = self.document.find_in_table(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted: true, is_inline: true };
                 return Some(self.create_implicit_table(table, name, origin));
             };

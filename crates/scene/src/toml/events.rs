@@ -170,7 +170,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
             ScalarKind::Boolean(value) => NodeKind::Boolean(value),
             ScalarKind::DateTime => NodeKind::Datetime,
             ScalarKind::Float => NodeKind::Float(text()),
-            ScalarKind::Integer(radix) => NodeKind::Integer(text(), convert_radix(radix)),
+            ScalarKind::Integer(radix) => NodeKind::Integer(text(), radix_from_parser(radix)),
         };
         ValueNode { span, kind }
     }
@@ -247,7 +247,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
     }
 }
 
-fn convert_radix(radix: IntegerRadix) -> Radix {
+fn radix_from_parser(radix: IntegerRadix) -> Radix {
     match radix {
         IntegerRadix::Dec => Radix::Decimal,
         IntegerRadix::Hex => Radix::Hexadecimal,

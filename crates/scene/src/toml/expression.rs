@@ -13,12 +13,12 @@ use super::{MARK, MAX_DEPTH};
 
 /// Expression parser with reusable buffers.
 #[derive(Default)]
-pub(super) struct ExpressionParser {
+pub(super) struct StatementParser {
     tokens: Vec<Token>,
     events: Vec<Event>,
 }
 
-impl ExpressionParser {
+impl StatementParser {
     /// Reads the expression that starts at byte `at`, which must be the start of a line. Returns the offset
     /// after the expression.
     pub(super) fn read<'s>(
@@ -69,12 +69,12 @@ fn parse_into_events(
 /// while `open` is empty.
 #[derive(Default)]
 struct ExpressionEndFinder {
-    phase: ExpressionPhase,
+    phase: StatementPhase,
     open: Vec<TokenKind>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
-enum ExpressionPhase {
+enum StatementPhase {
     /// Before the first token that is not whitespace.
     #[default]
     Start,
@@ -95,46 +95,40 @@ impl ExpressionEndFinder {
         let is_end = token == T::Newline && self.open.is_empty();
         self.phase = match (self.phase, token) {
             (phase, T::Whitespace) => phase,
-            (ExpressionPhase::Start, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
-                ExpressionPhase::Key
+            (StatementPhase::Start, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
+                StatementPhase::Key
             }
-            (ExpressionPhase::Start, T::MlLiteralString | T::MlBasicString) => ExpressionPhase::Key,
-            (ExpressionPhase::Start | ExpressionPhase::Key | ExpressionPhase::Equals, T::Equals) => {
-                ExpressionPhase::Equals
+            (StatementPhase::Start, T::MlLiteralString | T::MlBasicString) => StatementPhase::Key,
+            (StatementPhase::Start | StatementPhase::Key | StatementPhase::Equals, T::Equals) => {
+                StatementPhase::Equals
             }
-            (ExpressionPhase::Key, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
-                ExpressionPhase::Key
+            (StatementPhase::Key, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
+                StatementPhase::Key
             }
-            (ExpressionPhase::Key, T::MlLiteralString | T::MlBasicString) => ExpressionPhase::Key,
-            (
-                ExpressionPhase::Equals | ExpressionPhase::Value,
-                T::LeftSquareBracket | T::LeftCurlyBracket,
-            ) => {
+            (StatementPhase::Key, T::MlLiteralString | T::MlBasicString) => StatementPhase::Key,
+            (StatementPhase::Equals | StatementPhase::Value, T::LeftSquareBracket | T::LeftCurlyBracket) => {
                 self.open.push(token);
-                ExpressionPhase::Value
+                StatementPhase::Value
             }
-            (ExpressionPhase::Value, T::RightSquareBracket | T::RightCurlyBracket) => {
+            (StatementPhase::Value, T::RightSquareBracket | T::RightCurlyBracket) => {
                 self.close_bracket(token)
             }
-            (ExpressionPhase::Value, _) => ExpressionPhase::Value,
+            (StatementPhase::Value, _) => StatementPhase::Value,
             (
-                ExpressionPhase::Start
-                | ExpressionPhase::Key
-                | ExpressionPhase::Equals
-                | ExpressionPhase::Rest,
+                StatementPhase::Start | StatementPhase::Key | StatementPhase::Equals | StatementPhase::Rest,
                 _,
-            ) => ExpressionPhase::Rest,
+            ) => StatementPhase::Rest,
         };
         is_end
     }
 
-    fn close_bracket(&mut self, token: TokenKind) -> ExpressionPhase {
+    fn close_bracket(&mut self, token: TokenKind) -> StatementPhase {
         let opened = if token == TokenKind::RightSquareBracket {
             TokenKind::LeftSquareBracket
         } else {
             TokenKind::LeftCurlyBracket
         };
         self.open.pop_if(|last| *last == opened);
-        if self.open.is_empty() { ExpressionPhase::Rest } else { ExpressionPhase::Value }
+        if self.open.is_empty() { StatementPhase::Rest } else { StatementPhase::Value }
     }
 }

@@ -31,11 +31,11 @@ mod set;
 mod tree;
 
 use assembly::DocumentBuilder;
-use expression::ExpressionParser;
+use expression::StatementParser;
 
 pub(super) use brackets::{Bracket, find_all_array_brackets, innermost_bracket_open_at_end};
 pub(super) use error::SyntaxError;
-pub(super) use set::{KeyError, KeyErrorKind, TopLevelLayout};
+pub(super) use set::{KeyError, KeyErrorKind, TopLevelTableKinds};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
 
 /// Maximum nesting depth of arrays and tables, and maximum number of parts in a dotted key.
@@ -45,7 +45,7 @@ const MAX_DEPTH: u32 = 80;
 const MARK: &str = "\u{feff}";
 
 /// Whether a text consists of exactly one dotted key and its value.
-pub(super) fn is_key_value(text: &str) -> bool {
+pub(super) fn is_dotted_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty()
         && document.sole_assignment_in_table(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
@@ -60,11 +60,11 @@ pub(super) fn apply_assignment<'s>(
     document: Document<'s>,
     source: &'s str,
     at: usize,
-    layout: TopLevelLayout,
+    layout: TopLevelTableKinds,
 ) -> (Document<'s>, Result<(), KeyError>) {
     let (mut assembly, detached) =
         DocumentBuilder::from_document_with_new_table(document.with_extended_source(source));
-    ExpressionParser::default().read(source, at, &mut assembly);
+    StatementParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
     let placed = match document.sole_assignment_in_table(detached) {
         Some((keys, value)) => document.set_at_path(&keys, value, layout),
@@ -77,7 +77,7 @@ pub(super) fn apply_assignment<'s>(
 /// in keys and values, both in text order.
 pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
     let mut assembly = DocumentBuilder::new(source);
-    let mut expressions = ExpressionParser::default();
+    let mut expressions = StatementParser::default();
     let mut at = if source.starts_with(MARK) { MARK.len() } else { 0 };
     while at < source.len() {
         let plain =

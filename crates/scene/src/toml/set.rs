@@ -43,7 +43,7 @@ pub(crate) enum KeyErrorKind {
 
 /// The groups and lists of tables at the top level of a document.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TopLevelLayout {
+pub(crate) struct TopLevelTableKinds {
     /// Top-level tables that contain named tables. Named tables are never created.
     pub(crate) groups: &'static [&'static str],
     /// Whether a top-level name denotes a list of tables.
@@ -56,19 +56,19 @@ impl<'s> Document<'s> {
         &mut self,
         keys: &[Name<'s>],
         value: ValueNode,
-        layout: TopLevelLayout,
+        layout: TopLevelTableKinds,
     ) -> Result<(), KeyError> {
         let mut table = Self::ROOT;
         let mut depth = 0;
         while depth + 1 < keys.len() {
             let next = depth + 1;
             match self.resolve_key_part(keys, depth, table, layout)? {
-                KeyTarget::Table(inner) => table = inner,
-                KeyTarget::Element(list, index) if next + 1 == keys.len() => {
+                KeyPartTarget::Table(inner) => table = inner,
+                KeyPartTarget::Element(list, index) if next + 1 == keys.len() => {
                     self.set_element(list, index, value);
                     return Ok(());
                 }
-                KeyTarget::Element(list, index) => {
+                KeyPartTarget::Element(list, index) => {
                     let element = self.elements_of(list).get(index).and_then(|node| node.kind.table());
                     table = element.ok_or_else(|| key_error(keys, next, KeyErrorKind::Element))?;
                     depth = next;
@@ -89,22 +89,22 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: TopLevelLayout,
-    ) -> Result<KeyTarget, KeyError> {
+        layout: TopLevelTableKinds,
+    ) -> Result<KeyPartTarget, KeyError> {
         let (name, next) = (&keys[depth], &keys[depth + 1]);
         let is_list = depth == 0 && (layout.is_list)(&name.text);
         self.check_group_member_exists(keys, depth, table, layout)?;
-        let found = self.find(table, &name.text).map(|node| node.kind);
+        let found = self.find_in_table(table, &name.text).map(|node| node.kind);
         if let Some(inner) = found.and_then(NodeKind::table) {
-            return Ok(KeyTarget::Table(inner));
+            return Ok(KeyPartTarget::Table(inner));
         }
         let elements = found.map_or_else(Vec::new, |kind| self.elements_of(kind));
         let has_tables = elements.iter().any(|node| node.kind.table().is_some());
         match found {
             Some(list) if has_tables => {
-                let index = self.find_element(&elements, &next.text);
+                let index = self.find_element_by_number_or_name(&elements, &next.text);
                 index
-                    .map(|index| KeyTarget::Element(list, index))
+                    .map(|index| KeyPartTarget::Element(list, index))
                     .map_err(|why| key_error(keys, depth + 1, why))
             }
             None if is_list => {
@@ -113,7 +113,7 @@ impl<'s> Document<'s> {
             Some(_) if !elements.is_empty() && next.text.parse::<u64>().is_ok() => {
                 Err(key_error(keys, depth + 1, KeyErrorKind::Element))
             }
-            Some(_) | None => Ok(KeyTarget::Table(self.create_table(table, name))),
+            Some(_) | None => Ok(KeyPartTarget::Table(self.create_table(table, name))),
         }
     }
 
@@ -123,10 +123,10 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: TopLevelLayout,
+        layout: TopLevelTableKinds,
     ) -> Result<(), KeyError> {
         let is_in_group = depth == 1 && layout.groups.contains(&&*keys[0].text);
-        if is_in_group && self.find(table, &keys[1].text).is_none() {
+        if is_in_group && self.find_in_table(table, &keys[1].text).is_none() {
             return Err(key_error(keys, 1, KeyErrorKind::Unknown { known: self.keys(table) }));
         }
         Ok(())
@@ -144,12 +144,16 @@ impl<'s> Document<'s> {
     }
 
     /// Finds the index of an element from its 1-based number or the value of its key `name`.
-    fn find_element(&self, elements: &[ValueNode], part: &str) -> Result<usize, KeyErrorKind> {
+    fn find_element_by_number_or_name(
+        &self,
+        elements: &[ValueNode],
+        part: &str,
+    ) -> Result<usize, KeyErrorKind> {
         let number = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         if let Some(index) = number.filter(|index| *index < elements.len()) {
             return Ok(index);
         }
-        let name_of = |node: &ValueNode| self.find_text(node.kind.table()?, "name");
+        let name_of = |node: &ValueNode| self.find_string(node.kind.table()?, "name");
         let mut named = elements.iter().enumerate().filter(|(_, node)| name_of(node) == Some(part));
         match (named.next(), named.count()) {
             (Some((index, _)), 0) => Ok(index),
@@ -163,7 +167,7 @@ impl<'s> Document<'s> {
 }
 
 /// What one part of a key refers to.
-enum KeyTarget {
+enum KeyPartTarget {
     /// A table.
     Table(TableId),
     /// An element of a list, selected by the next part.

@@ -168,7 +168,7 @@ impl<'s> Document<'s> {
 
     pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
         self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
-        TableId(index_to_u32(self.tables.len() - 1))
+        TableId(index_to_u32_or_none(self.tables.len() - 1))
     }
 
     pub(super) fn table_origin(&self, table: TableId) -> TableOrigin {
@@ -184,13 +184,13 @@ impl<'s> Document<'s> {
         let start = self.elements.len();
         self.elements.extend_from_slice(elements);
         self.arrays.push(Span::new(start, self.elements.len()));
-        NodeKind::Array(index_to_u32(self.arrays.len() - 1))
+        NodeKind::Array(index_to_u32_or_none(self.arrays.len() - 1))
     }
 
     /// Adds an empty list of tables.
     pub(super) fn add_table_list(&mut self) -> NodeKind {
         self.lists.push(Vec::new());
-        NodeKind::List(index_to_u32(self.lists.len() - 1))
+        NodeKind::List(index_to_u32_or_none(self.lists.len() - 1))
     }
 
     pub(super) fn table_list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
@@ -198,7 +198,7 @@ impl<'s> Document<'s> {
     }
 
     /// Stores the decoded string at `span`.
-    pub(super) fn add_text(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
+    pub(super) fn store_decoded_string(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
         let written = self.source.get(span.range()).unwrap_or_default();
         if text == written {
             return StringRef::WHOLE;
@@ -207,7 +207,7 @@ impl<'s> Document<'s> {
             return StringRef::QUOTED;
         }
         self.texts.push(text.into_owned());
-        StringRef(index_to_u32(self.texts.len() - 1))
+        StringRef(index_to_u32_or_none(self.texts.len() - 1))
     }
 
     fn resolve_string(&self, span: Span, text: StringRef) -> &str {
@@ -221,8 +221,8 @@ impl<'s> Document<'s> {
 
     /// Appends an entry to a table that does not contain its key.
     pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
-        let entry = index_to_u32(self.entries.len());
-        let text = self.add_text(name.span, name.text.clone());
+        let entry = index_to_u32_or_none(self.entries.len());
+        let text = self.store_decoded_string(name.span, name.text.clone());
         self.entries.push(TableEntry { key: name.span, text, node, next: NONE, is_removed: false });
         let TableRecord { first, last, length, .. } = &mut self.tables[table.0 as usize];
         let before = std::mem::replace(last, entry);
@@ -269,7 +269,7 @@ impl<'s> Document<'s> {
     }
 
     /// Finds the value of a key.
-    pub(super) fn find(&self, table: TableId, name: &str) -> Option<ValueNode> {
+    pub(super) fn find_in_table(&self, table: TableId, name: &str) -> Option<ValueNode> {
         self.find_entry(table, name).map(|entry| self.entries[entry as usize].node)
     }
 
@@ -278,7 +278,7 @@ impl<'s> Document<'s> {
         let Some(found) = self.find_entry(table, &name.text) else {
             return self.add_entry(table, name, node);
         };
-        let text = self.add_text(name.span, name.text);
+        let text = self.store_decoded_string(name.span, name.text);
         let entry = &mut self.entries[found as usize];
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
@@ -308,15 +308,15 @@ impl<'s> Document<'s> {
     }
 
     /// Finds the value of a key. `None` if it is absent or not a string.
-    pub(super) fn find_text(&self, table: TableId, name: &str) -> Option<&str> {
-        let node = self.find(table, name)?;
+    pub(super) fn find_string(&self, table: TableId, name: &str) -> Option<&str> {
+        let node = self.find_in_table(table, name)?;
         if let NodeKind::String(text) = node.kind { Some(self.resolve_string(node.span, text)) } else { None }
     }
 
     /// Returns the elements of an array or list. Empty for other values.
     pub(super) fn elements_of(&self, kind: NodeKind) -> Vec<ValueNode> {
         let value = Value { document: self, node: ValueNode { span: Span::default(), kind } };
-        value.array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
+        value.as_array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
     }
 
     /// Replaces an element of an array or list.
@@ -363,7 +363,7 @@ impl<'s> Document<'s> {
     }
 }
 
-fn index_to_u32(index: usize) -> u32 {
+fn index_to_u32_or_none(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
 
@@ -400,7 +400,7 @@ impl<'d> Value<'d> {
     }
 
     /// The elements of an array. `None` if the value is not an array.
-    pub(crate) fn array(&self) -> Option<Elements<'d>> {
+    pub(crate) fn as_array(&self) -> Option<Elements<'d>> {
         if let TomlValue::Array(array) = self.decode() { Some(array) } else { None }
     }
 
@@ -473,7 +473,7 @@ pub(crate) struct KeyValue<'d> {
 impl<'d> Entries<'d> {
     /// Finds the entry with this key.
     pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
-        self.document.find_entry(self.table, name).map(|entry| self.entry(entry))
+        self.document.find_entry(self.table, name).map(|entry| self.key_value_at(entry))
     }
 
     /// The entries in insertion order.
@@ -485,10 +485,10 @@ impl<'d> Entries<'d> {
         let next = |entry: &u32| Some(entries[*entry as usize].next).filter(|next| *next != NONE);
         std::iter::successors(start, next)
             .filter(|entry| !entries[*entry as usize].is_removed)
-            .map(move |entry| this.entry(entry))
+            .map(move |entry| this.key_value_at(entry))
     }
 
-    fn entry(&self, entry: u32) -> KeyValue<'d> {
+    fn key_value_at(&self, entry: u32) -> KeyValue<'d> {
         let document = self.document;
         let TableEntry { key, text, node, .. } = document.entries[entry as usize];
         KeyValue {

@@ -9,7 +9,7 @@ use super::transport::tile::TileContext;
 use super::transport::vertex::SurfaceVertex;
 use super::{FirstHitQuantity, RayCounters};
 use crate::control::Cancelled;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::TexturePoint;
 use crate::math::lanes::PortableSimd;
@@ -55,7 +55,7 @@ pub fn record_plain_first_hits(
 ) -> u32 {
     let mut left = 0;
     let mut known = None;
-    for lane in lane_indices(packet.plain) {
+    for lane in set_bit_lanes(packet.plain) {
         let Some(hit) = packet.hit(lane) else { continue };
         let index = tile.world.material_index(&hit);
         if known.is_none_or(|(own, _)| own != index) {
@@ -75,7 +75,7 @@ pub fn record_plain_first_hits(
 /// this material is a null interaction.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
-    let is_constant = !tile.world.is_textured(index) && !material.has_null_interaction();
+    let is_constant = !tile.world.material_needs_uvs_or_tangents(index) && !material.has_null_interaction();
     is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 
@@ -87,7 +87,7 @@ pub fn record_first_hit(
     counters: &mut RayCounters,
 ) {
     if let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) {
-        let vertex = SurfaceVertex::with_needed_attributes(tile, &path, &hit);
+        let vertex = SurfaceVertex::from_hit_with_needed_attributes(tile, &path, &hit);
         record_vertex(tile, path.slot, &vertex, values, counters);
     }
 }
@@ -122,7 +122,7 @@ fn first_opaque_hit(
     hit: &Hit,
     counters: &mut RayCounters,
 ) -> Option<(PathRay, Hit)> {
-    if tile.world.has_see_through() {
+    if tile.world.has_null_interaction_surfaces() {
         tile.first_opaque_path_and_hit(path, hit, counters)
     } else {
         Some((*path, *hit))
@@ -143,7 +143,7 @@ fn count_nearby_photons(
     vertex: &SurfaceVertex<'_>,
 ) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
-    let (_, _, sample) = tile.block.sample_of(slot);
+    let (_, _, sample) = tile.block.pixel_and_sample(slot);
     let pass = maps.pass_for_sample(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }

@@ -6,7 +6,7 @@ use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
-use crate::world::{RayBoxInterval, TreeNodeSummary};
+use crate::world::{RayBoxInterval, TreeNodeInfo};
 
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
@@ -29,7 +29,7 @@ const COLORS: [Vec3; 6] = [
 
 /// A box edge close to a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct BoxEdge {
+struct NearbyBoxEdge {
     is_behind: bool,
     depth: u32,
 }
@@ -46,7 +46,7 @@ pub fn draw_box_edges(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(BoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, spread) {
+        if let Some(NearbyBoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, spread) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
             *own = own.lerp(color, if is_behind { HIDDEN_OPACITY } else { 1.0 });
@@ -57,36 +57,33 @@ pub fn draw_box_edges(
 
 /// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it.
 /// Otherwise, larger boxes take priority over smaller boxes.
-fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
-    let mut best: Option<BoxEdge> = None;
-    tile.world.geometry.visit_nodes_along_ray(
-        ray,
-        |local, TreeNodeSummary { bounds, depth, .. }, stretch| {
-            let unit = local.direction.length();
-            let pixel = |t: f32| t * spread * unit;
-            let RayBoxInterval { enter, leave } = *stretch;
-            let size = bounds.extent().length();
-            if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
-                return false;
+fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<NearbyBoxEdge> {
+    let mut best: Option<NearbyBoxEdge> = None;
+    tile.world.geometry.visit_nodes_along_ray(ray, |local, TreeNodeInfo { bounds, depth, .. }, stretch| {
+        let unit = local.direction.length();
+        let pixel = |t: f32| t * spread * unit;
+        let RayBoxInterval { enter, leave } = *stretch;
+        let size = bounds.extent().length();
+        if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
+            return false;
+        }
+        for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
+            let line = NearbyBoxEdge { is_behind: t > end, depth: *depth };
+            let is_first =
+                best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
+            if is_first
+                && ray_distance_to_nearest_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
+            {
+                best = Some(line);
             }
-            for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
-                let line = BoxEdge { is_behind: t > end, depth: *depth };
-                let is_first =
-                    best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
-                if is_first
-                    && distance_to_nearest_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
-                {
-                    best = Some(line);
-                }
-            }
-            true
-        },
-    );
+        }
+        true
+    });
     best
 }
 
 /// Distance from a ray to the nearest edge of the box face that the ray crosses at t.
-fn distance_to_nearest_face_edge(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
+fn ray_distance_to_nearest_face_edge(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
     let (point, d) = (ray.at(t), ray.direction);
     let to_edge = |axis: usize| {
         let from_edge = (point[axis] - bounds.min[axis]).min(bounds.max[axis] - point[axis]).max(0.0);
@@ -106,7 +103,7 @@ mod tests {
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);
             let stretch = RayBoxInterval::new(&cube, &ray).expect("the ray should hit the cube");
-            distance_to_nearest_face_edge(&cube, &ray, stretch.enter)
+            ray_distance_to_nearest_face_edge(&cube, &ray, stretch.enter)
         };
         assert!((distance(Vec3::new(0.2, 0.7, -3.0), Vec3::Z) - 0.2).abs() < 1e-6);
         // A ray along (0, 1, 1) through (½, 0.9, 0) is 0.1·cos 45° from the upper edge.

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::direct::queue::DirectLightQueue;
+use super::direct::queue::DirectLightVertexQueue;
 use super::layers::LayerValues;
 use super::transport::accumulator::DiffuseFractions;
 use super::transport::scratch::TraceBuffers;
@@ -13,7 +13,7 @@ pub struct ThreadMemory {
     /// Queues of rays and hits.
     pub scratch: TraceBuffers,
     /// Vertices of the current bounce that await direct lighting.
-    pub direct: DirectLightQueue,
+    pub direct: DirectLightVertexQueue,
     /// Diffuse fractions of the paths, if layers are recorded.
     pub fractions: DiffuseFractions,
     /// Values of the layers, if there are any.

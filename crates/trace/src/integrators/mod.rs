@@ -36,11 +36,11 @@ use std::mem::take;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{LayerSums, NegativeLobeSamples, SelectedPixels, TileSamples};
+use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_purpose;
+pub use behavior::light_sampling_mode;
 pub use counters::RayCounters;
 pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;
@@ -48,7 +48,7 @@ pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::{Accumulator, LayerAccumulator};
 use transport::tile::{SampleBlock, TileContext};
-pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponents, ViewMode};
+pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponentMask, ViewMode};
 
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
@@ -154,7 +154,7 @@ pub fn render_tile_with_layers(
     // Return the samples.
     (memory.fractions, memory.layers) = (fractions, values);
     memory.return_to_thread();
-    let negative = weight.map(|weight| NegativeLobeSamples { weight, is_negative });
+    let negative = weight.map(|weight| NegativeLobeMask { weight, is_negative });
     let samples = block.samples.len() as u32;
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative, layers }, counters))
 }

@@ -18,22 +18,22 @@ mod vertices;
 use std::ops::Range;
 
 use super::RayCounters;
-use super::direct::queue::DirectLightQueue;
+use super::direct::queue::DirectLightVertexQueue;
 use super::memory::ThreadMemory;
 use super::photons::PhotonMaps;
-use super::photons::gather::GatherPhotons;
+use super::photons::gather::GatherPhotonsKernel;
 use super::transport::accumulator::Accumulator;
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
-use super::transport::crossing::CrossingBuffers;
+use super::transport::crossing::CoincidentSurfaceBuffers;
 use super::transport::packet::PacketSource;
 use super::transport::ray::PathRay;
-use super::transport::scatter::{ContinuationPolicy, SampleBsdf};
+use super::transport::scatter::{BsdfSampler, ContinuationPolicy};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::view::LightAov;
 use crate::control::Cancelled;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::SampledLobes;
 use crate::scene::description::ShadowMode;
@@ -83,7 +83,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.scatter()?;
-    paths.direct.flush_consecutive(slots.start, &mut paths.accumulator);
+    paths.direct.flush_consecutive_to_accumulator(slots.start, &mut paths.accumulator);
     paths.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -92,7 +92,7 @@ pub fn trace_camera_paths(
             // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
-            for places in object_order.indices().chunks(PACKET_SIZE) {
+            for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
                 paths.trace_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
@@ -101,7 +101,7 @@ pub fn trace_camera_paths(
             }
         }
         paths.scatter()?;
-        paths.direct.flush_to_accumulator(rays, &mut paths.accumulator);
+        paths.direct.add_arrived_light(rays, &mut paths.accumulator);
         paths.next_bounce(rays);
     }
     Ok(())
@@ -117,7 +117,7 @@ struct CameraWavefront<'a, 's> {
     /// Photon maps for the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
     /// This bounce's diffuse and glossy vertices.
-    direct: &'a mut DirectLightQueue,
+    direct: &'a mut DirectLightVertexQueue,
     /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfacePacket,
     accumulator: Accumulator<'s>,
@@ -127,7 +127,7 @@ struct CameraWavefront<'a, 's> {
     place: u32,
     /// Whether the layers that show the first hit of the current camera ray are not recorded yet.
     is_first_hit_pending: bool,
-    crossing: &'a mut CrossingBuffers,
+    crossing: &'a mut CoincidentSurfaceBuffers,
     counters: &'a mut RayCounters,
 }
 
@@ -137,7 +137,7 @@ impl CameraWavefront<'_, '_> {
     fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
         if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
-            tile.token.check()?;
+            tile.token.check_pause_and_cancel()?;
         }
         // Intersect the rays. The vertices of plain surfaces are ready for the queue.
         let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
@@ -148,7 +148,7 @@ impl CameraWavefront<'_, '_> {
             self.add_traversal_costs(&rays, &packet);
         }
         if are_lit {
-            self.direct.commit_spare_batch();
+            self.direct.commit_spare_vertices();
             self.store_cones(&rays, &packet);
         }
         // Add the emission of camera rays, which needs no MIS weights, and record their layers.
@@ -163,7 +163,7 @@ impl CameraWavefront<'_, '_> {
         }
         // Add the emission of the other rays and shade the surfaces that are not plain. The contributions to
         // a sample are added in path order.
-        for lane in lane_indices(unfinished) {
+        for lane in set_bit_lanes(unfinished) {
             self.place = rays.queue_index(lane);
             self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
         }
@@ -185,13 +185,13 @@ impl CameraWavefront<'_, '_> {
                 let row = self.direct.batch(number);
                 // Gather photons.
                 if let Some(maps) = self.maps {
-                    let gathered = instruction_set.run(GatherPhotons { tile, row, maps, depth, aov });
+                    let gathered = instruction_set.run(GatherPhotonsKernel { tile, row, maps, depth, aov });
                     light.add_lanes(row.used, &gathered);
                 }
                 self.counters.shadow_rays += light.rays.shadow;
                 self.counters.scattered_rays += light.rays.scattered;
                 self.counters.texture_lookups += light.rays.lookups;
-                self.direct.store_reflected_light(number, aov, &light);
+                self.direct.accumulate_reflected_light(number, aov, &light);
             }
             // Sample BSDFs, with Russian roulette.
             for number in vertices {
@@ -200,7 +200,7 @@ impl CameraWavefront<'_, '_> {
                 let fractions = self.accumulator.fractions();
                 let has_fractions = fractions.is_some() && row.only_specular_before != 0;
                 let before = self.next.len();
-                SampleBsdf { tile, row, used: row.used, continuation, has_fractions }.scatter(
+                BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.scatter(
                     self.direct.interior_lists(),
                     self.direct.cones(),
                     self.next,

@@ -105,7 +105,7 @@ impl RenderSettings {
     /// Converts a position in pixels, measured from the image's top left corner, to camera units: the offsets
     /// right of and above the image center, in units of half the image height.
     #[inline(always)]
-    pub fn pixel_to_camera(&self, from_corner: DVec2) -> DVec2 {
+    pub fn pixel_to_image_plane(&self, from_corner: DVec2) -> DVec2 {
         let RenderOptions { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * (1.0 / half_height)

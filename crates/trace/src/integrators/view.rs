@@ -51,16 +51,16 @@ choice! {
 impl ViewMode {
     /// Source of this view's values.
     pub fn aov_source(self) -> AovSource {
-        let of = |parts: RadianceComponents| AovSource::Light(LightAov::Radiance(parts));
+        let of = |parts: RadianceComponentMask| AovSource::Light(LightAov::Radiance(parts));
         let by = |paths: PathClasses| {
-            of(RadianceComponents { diffuse: true, specular: true, paths, ..RadianceComponents::NONE })
+            of(RadianceComponentMask { diffuse: true, specular: true, paths, ..RadianceComponentMask::NONE })
         };
         match self {
-            Self::Beauty => of(RadianceComponents::ALL),
-            Self::Ambient => of(RadianceComponents { ambient: true, ..RadianceComponents::NONE }),
-            Self::Diffuse => of(RadianceComponents { diffuse: true, ..RadianceComponents::NONE }),
-            Self::Specular => of(RadianceComponents { specular: true, ..RadianceComponents::NONE }),
-            Self::Emission => of(RadianceComponents { emitted: true, ..RadianceComponents::NONE }),
+            Self::Beauty => of(RadianceComponentMask::ALL),
+            Self::Ambient => of(RadianceComponentMask { ambient: true, ..RadianceComponentMask::NONE }),
+            Self::Diffuse => of(RadianceComponentMask { diffuse: true, ..RadianceComponentMask::NONE }),
+            Self::Specular => of(RadianceComponentMask { specular: true, ..RadianceComponentMask::NONE }),
+            Self::Emission => of(RadianceComponentMask { emitted: true, ..RadianceComponentMask::NONE }),
             Self::Indirect => by(PathClasses { indirect: true, ..PathClasses::NONE }),
             Self::Caustic => by(PathClasses { caustic: true, ..PathClasses::NONE }),
             Self::Photons => AovSource::FirstHit(FirstHitQuantity::Photons),
@@ -124,7 +124,7 @@ impl AovSource {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightAov {
     /// Radiance of these components.
-    Radiance(RadianceComponents),
+    Radiance(RadianceComponentMask),
     /// Fraction of the lights' radiance that is not occluded, from 0 to 1.
     LitFraction,
     /// Traversal cost of all rays in the sample: number of boxes and shapes visited.
@@ -133,7 +133,7 @@ pub enum LightAov {
 
 impl LightAov {
     /// The beauty image.
-    pub const ALL: Self = Self::Radiance(RadianceComponents::ALL);
+    pub const ALL: Self = Self::Radiance(RadianceComponentMask::ALL);
 
     /// Whether surface colors are applied to reflected light.
     pub fn has_surface_colors_applied(self) -> bool {
@@ -147,7 +147,7 @@ impl LightAov {
     #[inline(always)]
     pub fn lobes(self) -> LobeFilter {
         match self {
-            Self::Radiance(RadianceComponents { diffuse, specular, .. }) => {
+            Self::Radiance(RadianceComponentMask { diffuse, specular, .. }) => {
                 LobeFilter::Of { diffuse, specular }
             }
             Self::TraversalCost => LobeFilter::ALL,
@@ -166,7 +166,7 @@ impl LightAov {
 
 /// Components of a sample's radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RadianceComponents {
+pub struct RadianceComponentMask {
     /// Emission of surfaces, and the background.
     pub emitted: bool,
     /// The ambient term.
@@ -198,7 +198,7 @@ impl PathClasses {
     pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
-impl RadianceComponents {
+impl RadianceComponentMask {
     /// Whether any reflected light contributes.
     pub fn has_reflected(self) -> bool {
         self.diffuse || self.specular

@@ -16,7 +16,8 @@ impl World {
     pub fn new(scene: &Scene, inputs: &WorldInputs, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, inputs);
         let camera = inputs.camera.as_ref().unwrap_or(&scene.camera);
-        let camera = Camera::from_description(camera, inputs.orbiter.as_ref()).relative_to(geometry.origin());
+        let camera = Camera::from_description(camera, inputs.orbiter.as_ref())
+            .relative_to(geometry.coordinate_origin());
         let is_rough =
             |material: &Material| material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);
@@ -28,7 +29,7 @@ impl World {
             geometry,
             packet_material: materials.iter().map(PacketMaterial::from_material).collect(),
             has_directions: materials.iter().any(|material| material.bsdf.is_anisotropic()),
-            textured: materials.iter().map(Material::is_textured).collect(),
+            textured: materials.iter().map(Material::needs_uvs_or_tangents).collect(),
             mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
             materials,
             object_materials,
@@ -41,12 +42,12 @@ impl World {
             lens_glass: Vec::new(),
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
-            has_second_uvs: are_second_uvs_used(scene, inputs),
+            has_second_uvs: uses_second_uvs(scene, inputs),
             colored: vertex_color_usage_by_object(scene),
             see_through: None,
         };
         Self {
-            unlit_glass: world.find_unlit_glass(),
+            unlit_glass: world.find_shadowed_glass_interiors(),
             lens_glass: world.find_lens_glass(),
             enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),
@@ -57,7 +58,7 @@ impl World {
 }
 
 /// Whether any texture uses the second UV set and any mesh has a second UV set.
-fn are_second_uvs_used(scene: &Scene, inputs: &WorldInputs) -> bool {
+fn uses_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }

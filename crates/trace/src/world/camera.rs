@@ -2,10 +2,10 @@
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::Ray;
-use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
+use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
-use crate::scene::description::{self, Pose, Viewpoint};
+use crate::scene::description::{self, Pose, ResolvedCamera};
 
 /// A perspective camera with a plane of focus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +70,12 @@ impl Camera {
     /// Returns the camera as position, target and up vector. An orbiter camera is rounded to short decimals,
     /// precise enough to render the same view. Its target is the point on the view axis at the distance of
     /// the orbiter's center.
-    pub fn viewpoint(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Viewpoint {
+    pub fn look_at_from_description(
+        camera: &description::Camera,
+        orbiter: Option<&GkitOrbiterCamera>,
+    ) -> ResolvedCamera {
         match camera {
-            description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {
+            description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => ResolvedCamera {
                 pose: Pose { position: *position, look_at: *look_at, up: *up },
                 fov: *fov,
                 aperture: *aperture,
@@ -85,7 +88,7 @@ impl Camera {
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
                     DVec3::from_array(
-                        place.to_array().map(|at| round_to_step(at, coordinate_step_at_distance(file.size))),
+                        place.to_array().map(|at| round_to_step(at, decimal_step_at_distance(file.size))),
                     )
                 };
                 let (position, look_at) = (short(position), short(look_at));
@@ -93,7 +96,7 @@ impl Camera {
                 let is_upright = up.y > UPRIGHT;
                 let pose = Pose { position, look_at, up: if is_upright { DVec3::Y } else { up } };
                 let focus = focus.unwrap_or_else(|| pose.distance());
-                Viewpoint { pose, fov: fov.unwrap_or(file.fov), aperture, focus }
+                ResolvedCamera { pose, fov: fov.unwrap_or(file.fov), aperture, focus }
             }
         }
     }
@@ -126,7 +129,7 @@ impl Camera {
     /// height.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
-        let direction = self.direction(place);
+        let direction = self.image_point_direction(place);
         let lens = lens.as_dvec2() * self.aperture;
         let offset = self.right * lens.x + self.up * lens.y;
         let aimed = direction - offset / self.focus;
@@ -136,13 +139,13 @@ impl Camera {
     /// Like [`Camera::ray`], but through the lens center.
     #[inline(always)]
     pub fn pinhole_ray(&self, place: DVec2) -> Ray {
-        Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())
+        Ray::new(self.position.as_vec3(), self.image_point_direction(place).normalize().as_vec3())
     }
 
     /// Unnormalized direction from the lens center through an image point. Its component along the view axis
     /// is 1.
     #[inline(always)]
-    fn direction(&self, place: DVec2) -> DVec3 {
+    fn image_point_direction(&self, place: DVec2) -> DVec3 {
         let place = place * self.tan_half_fov;
         self.forward + self.right * place.x + self.up * place.y
     }
@@ -244,7 +247,7 @@ mod tests {
             let scene =
                 description::Camera::Orbiter { file: file.clone(), fov: None, aperture: 0.1, focus: None };
             let of_file = Camera::from_description(&scene, Some(&orbiter));
-            let view = Camera::viewpoint(&scene, Some(&orbiter));
+            let view = Camera::look_at_from_description(&scene, Some(&orbiter));
             let by_vectors = Camera::from_description(&view.into(), None);
             for (a, b) in [
                 (of_file.position, by_vectors.position),

@@ -7,7 +7,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::isolated::triangle_meets_box;
+use super::isolated::triangle_overlaps_box;
 use super::{Geometry, Hit, MeshInstance, Object, World};
 use crate::accel::OverlappingItem;
 use crate::geometry::ray::offset_origin;
@@ -19,7 +19,7 @@ pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
 /// the same point have no effect there.
-pub(super) type ClosedGlassShapesOfSubtree = ArrayVec<u32, MAX_INTERIORS>;
+pub(super) type SubtreeClosedGlassIds = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on each side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,14 +82,14 @@ pub struct CoincidenceQuery<'a> {
 
 /// The offset points, and the near point without the added `lead` distance.
 #[derive(Clone, Copy)]
-struct CoincidenceSegment {
+struct CoincidenceTestSegment {
     sides: OffsetPoints,
     close: Vec3,
 }
 
-impl CoincidenceSegment {
+impl CoincidenceTestSegment {
     /// Value of t at `close` along the segment.
-    fn close_point_t(&self) -> f32 {
+    fn near_point_t(&self) -> f32 {
         let way = self.sides.segment_from_before_to_beyond().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
     }
@@ -99,29 +99,29 @@ impl World {
     /// Finds all coincident surfaces at a hit, and one point on each side of them. `visit` is called in an
     /// order that depends only on the scene.
     #[inline]
-    pub fn find_coincident_surfaces(
+    pub fn find_coincident_surfaces_at(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
         visit: impl FnMut(CoincidentOrEnclosingSurface),
     ) -> OffsetPoints {
         let margin = self.geometry.coincidence_margin(at);
-        let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
+        let error = if self.geometry.is_hit_isolated(at.hit, at.surface, margin) {
             if self.is_glass_thicker_than(at, margin) {
                 return self.classify_isolated_hit(at, visit);
             }
             self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
-            self.geometry.find_candidates(at, memory, &self.enclosing_glass)
+            self.geometry.find_coincident_candidates(at, memory, &self.enclosing_glass)
         };
-        self.classify_candidates(at, (memory, error), visit)
+        self.visit_coincident_candidates(at, (memory, error), visit)
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
     fn is_glass_thicker_than(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
-            Object::Shape(shape) => shape.is_thicker_than(at.surface.point.as_dvec3(), far),
+            Object::Shape(shape) => shape.is_locally_thicker_than(at.surface.point.as_dvec3(), far),
             Object::Mesh(_) => false,
         };
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
@@ -150,7 +150,7 @@ impl World {
 
     /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose
     /// error is at most `error`.
-    pub(super) fn classify_candidates(
+    pub(super) fn visit_coincident_candidates(
         &self,
         at: &CoincidenceQuery<'_>,
         (memory, error): (&CoincidenceScratch, Vec3),
@@ -162,8 +162,8 @@ impl World {
             before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
             beyond: offset_origin(point, error, normal, -normal),
         };
-        let probe = CoincidenceSegment { sides, close: offset_origin(point, error, normal, normal) };
-        let lead_end = probe.close_point_t();
+        let probe = CoincidenceTestSegment { sides, close: offset_origin(point, error, normal, normal) };
+        let lead_end = probe.near_point_t();
         let mut is_led = false;
         let mut found = |near: CoincidentOrEnclosingSurface| {
             is_led |= match near {
@@ -176,10 +176,10 @@ impl World {
         for &id in &memory.objects {
             if let Object::Shape(shape) = &geometry.objects()[id as usize] {
                 let points = [sides.before, probe.close, sides.beyond].map(|point| point.as_dvec3());
-                let inside = shape.encloses_points(points);
+                let inside = shape.encloses_each_point(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
-                self.test_coincidence_or_enclosure(shape, id, (&sides, is_around))
+                self.shape_if_coincident_or_enclosing(shape, id, (&sides, is_around))
                     .into_iter()
                     .for_each(&mut found);
             }
@@ -199,7 +199,7 @@ impl World {
 
     /// Returns the shape if its surface is between the points, or if it is glass and encloses
     /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
-    fn test_coincidence_or_enclosure(
+    fn shape_if_coincident_or_enclosing(
         &self,
         shape: &Shape,
         object: u32,
@@ -265,7 +265,7 @@ impl World {
     }
 
     /// The [`ClosedGlassShapesOfSubtree`] of each subtree. Empty if few objects are nested.
-    pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[ClosedGlassShapesOfSubtree]> {
+    pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[SubtreeClosedGlassIds]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
@@ -315,11 +315,11 @@ impl Geometry {
     /// Collects shapes and triangles that may coincide with the hit point, and returns their error bound per
     /// axis. Shapes that enclose the point but whose surfaces are far away are included only if `enclosing`
     /// lists them for their subtree.
-    pub(super) fn find_candidates(
+    pub(super) fn find_coincident_candidates(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
-        enclosing: &[ClosedGlassShapesOfSubtree],
+        enclosing: &[SubtreeClosedGlassIds],
     ) -> Vec3 {
         let CoincidenceScratch { objects, triangles } = memory;
         objects.clear();
@@ -327,7 +327,7 @@ impl Geometry {
         let point = at.surface.point;
         let near = Aabb { min: point, max: point }.expanded(self.coincidence_margin(at));
         objects.extend(self.unbounded());
-        self.tree().visit_overlapping_surfaces(&near, |met| {
+        self.tree().visit_surfaces_overlapping_box(&near, |met| {
             match met {
                 OverlappingItem::Primitive(id) => objects.push(id),
                 OverlappingItem::Enclosing(subtree) => {
@@ -339,8 +339,8 @@ impl Geometry {
         let mut error = at.surface.error;
         for &id in &*objects {
             let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };
-            mesh.tree.triangle_tree().visit_triangles_in_box(&mesh.local_box(&near), |triangle| {
-                if triangle_meets_box(mesh.world_corners(triangle), &near) {
+            mesh.tree.triangle_tree().visit_triangles_in_box(&mesh.box_to_local(&near), |triangle| {
+                if triangle_overlaps_box(mesh.world_corners(triangle), &near) {
                     triangles.push((id, triangle));
                     error = error.max(mesh.triangle_position_error(triangle, point));
                 }
@@ -355,7 +355,7 @@ impl Geometry {
 
 impl MeshInstance {
     /// Converts a world-space box to its bounding box in mesh coordinates.
-    pub(super) fn local_box(&self, bounds: &Aabb) -> Aabb {
+    pub(super) fn box_to_local(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
             self.transform.inverse_point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
@@ -369,7 +369,7 @@ impl MeshInstance {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
-        let of_tests = self.combine_with_placement(&self.transform).point_error_bound(point, local, corners);
+        let of_tests = self.to_placed_mesh(&self.transform).point_error_bound(point, local, corners);
         of_tests + self.transform.transform_abs_bound(reach).as_vec3() * f32::EPSILON
     }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::MeshTree;
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::materials::EmissionSides;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{Scene, Shape};
@@ -125,7 +125,7 @@ impl EmissiveFaces {
     }
 
     /// Whether no light can be near a box.
-    fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
+    fn are_apart_from_box(&self, bounds: [DVec3; 2]) -> bool {
         are_boxes_apart(bounds, self.region)
     }
 
@@ -174,10 +174,12 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
                 return;
             }
             for light in lights.near(face, &mut pairs) {
-                let is_lifted = must_lift(light, face);
+                let is_lifted = must_lift_light(light, face);
                 // Report each overlap of two lights only once.
                 let is_reported = is_lifted
-                    || face.object <= light.object && !must_lift(face, light) && !light.is_duplicate_of(face);
+                    || face.object <= light.object
+                        && !must_lift_light(face, light)
+                        && !light.is_duplicate_of(face);
                 if is_reported && are_coplanar_and_overlap(light, face) {
                     record_coplanar_light(&mut found, (light, face), is_lifted);
                 }
@@ -242,7 +244,7 @@ fn record_coplanar_light(
 /// Whether to lift the light off the face along the light's normal. This hides the back of a two-sided light.
 /// The light is not lifted if the face also emits on that side, unless it is the reverse of the light in the
 /// same mesh: there, each face emits on its own side.
-fn must_lift(light: &FlatFace, face: &FlatFace) -> bool {
+fn must_lift_light(light: &FlatFace, face: &FlatFace) -> bool {
     !face.emits_along(light.normal) || light.object == face.object && light.has_opposite_normal(face)
 }
 
@@ -301,7 +303,7 @@ fn visit_flat_faces(
         }
         Shape::Triangle { a, b, c } => visit(polygon(vec![a, b, c]), emits),
         Shape::Box { center, size, rotate } => {
-            let cuboid = Cuboid::new(center, size, rotate);
+            let cuboid = OrientedBox::new(center, size, rotate);
             for face in 0..6 {
                 let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.sample(face, u));
                 let mut face = polygon(corners.map(|corner| corner.point).to_vec());
@@ -346,7 +348,7 @@ fn visit_flat_faces(
                 let [least, greatest] = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
                 let rounding = ROUNDING * local.max(least.abs().max(greatest.abs()).max_element());
                 let bounds = [least - rounding, greatest + rounding];
-                if near.is_some_and(|lights| lights.are_apart_from(bounds)) {
+                if near.is_some_and(|lights| lights.are_apart_from_box(bounds)) {
                     continue;
                 }
                 let corners = if transform.flips_handedness() { vec![a, c, b] } else { vec![a, b, c] };

@@ -8,7 +8,7 @@ use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
 use crate::lights::LightGeometry;
 use crate::math::Vec3;
-use crate::math::origin::origin_near;
+use crate::math::origin::local_coordinate_origin;
 use crate::math::random::signed_generator as random;
 use crate::scene::description::Accel;
 use crate::world::packet::tests::assert_packets;
@@ -264,7 +264,7 @@ fn lights_far_from_the_origin_are_lifted() {
             let triangles =
                 quads.flat_map(|a| [[a, a + 1, a + cells + 2], [a, a + cells + 2, a + cells + 1]]);
             let mesh = TriangleMesh { triangles: triangles.collect(), ..TriangleMesh::default() };
-            let origin = origin_near(at + x * shift[0] + y * shift[1], half);
+            let origin = local_coordinate_origin(at + x * shift[0] + y * shift[1], half);
             let positions = corners.iter().map(|corner| (*corner - origin).as_vec3()).collect();
             Arc::new(LoadedMesh { mesh: TriangleMesh { origin, positions, ..mesh }, ..LoadedMesh::default() })
         };
@@ -275,7 +275,7 @@ fn lights_far_from_the_origin_are_lifted() {
         );
         let token = CancelToken::new();
         let tree = |mesh| Arc::new(MeshTree::build(mesh, Accel::Bvh, &token).expect("never canceled"));
-        let (meshes, origin) = ([ceiling, light].map(tree), origin_near(at, 5.0));
+        let (meshes, origin) = ([ceiling, light].map(tree), local_coordinate_origin(at, 5.0));
         let geometry = Geometry::from_scene(&scene, &meshes, origin, &token).expect("never canceled");
         for _ in 0..50 {
             let target = at + (x * vector().x + y * vector().x) * 0.45;
@@ -317,7 +317,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     assert_eq!(hit.object, number, "{tables} {from}");
                     // Shadow rays that ignore the light reach it because the surface below does not occlude
                     // it.
-                    let shadow = Ray::segment(from, target);
+                    let shadow = Ray::segment_ending_before(from, target);
                     assert!(
                         !geometry.is_occluded_except_by_light(&shadow, LightGeometry::Object(number)),
                         "{tables} {from}"
@@ -328,7 +328,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     assert!(is_closed || hit.object != number, "{tables} {below}");
                     // Light samples are occluded from the same positions as hits.
                     let lift = geometry.light_lifts()[number as usize].as_vec3();
-                    let hidden = Ray::segment(below, target + lift);
+                    let hidden = Ray::segment_ending_before(below, target + lift);
                     assert!(
                         geometry.is_occluded_except_by_light(&hidden, LightGeometry::Object(number)),
                         "{tables} {below}"

@@ -99,7 +99,7 @@ fn find_triangle_lifts(
     let emissive = all.clone().filter(|id| emits(*id)).filter_map(face).collect();
     let Some(lights) = EmissiveFaces::new(emissive) else { return Ok((found, 0.0)) };
     for (other, is_light) in all.filter_map(|id| Some((face(id)?, emits(id)))) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         if pairs > MAX_PAIRS {
             break;
         }
@@ -127,7 +127,7 @@ fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, heigh
         let corners = mesh.triangles[*triangle].map(|corner| {
             *known.entry((corner, direction)).or_insert_with(|| {
                 let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
-                copy_vertex(mesh, corner as usize, at.as_vec3())
+                append_vertex_copy(mesh, corner as usize, at.as_vec3())
             })
         });
         mesh.triangles[*triangle] = corners;
@@ -135,15 +135,15 @@ fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, heigh
 }
 
 /// Adds a copy of a vertex at position `at`.
-fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
-    fn push_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+fn append_vertex_copy(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
+    fn push_vertex_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
         values.extend(values.get(vertex).copied());
     }
     mesh.positions.push(at);
-    push_copy(&mut mesh.normals, vertex);
-    push_copy(&mut mesh.normal_groups, vertex);
-    push_copy(&mut mesh.uvs, vertex);
-    push_copy(&mut mesh.second_uvs, vertex);
-    push_copy(&mut mesh.colors, vertex);
+    push_vertex_copy(&mut mesh.normals, vertex);
+    push_vertex_copy(&mut mesh.normal_groups, vertex);
+    push_vertex_copy(&mut mesh.uvs, vertex);
+    push_vertex_copy(&mut mesh.second_uvs, vertex);
+    push_vertex_copy(&mut mesh.colors, vertex);
     (mesh.positions.len() - 1) as u32
 }

@@ -13,10 +13,10 @@ use crate::lights::MeshEmitter;
 use crate::lights::delta::{PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvMapping,
-    UvTriangle, back_area_light, front_area_light, see_through_side_area_light,
+    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonEmitter, Side,
+    TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
 };
-use crate::lights::{Emitter, EmittingPart};
+use crate::lights::{Emitter, EmittingTriangleSelection};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
@@ -41,20 +41,21 @@ pub fn build_lights(
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
     let points = scene.lights.iter().filter(|light| light.has_emission());
-    let points = points.map(|light| delta_or_directional_light(light, geometry.origin()));
+    let points = points.map(|light| delta_or_directional_light(light, geometry.coordinate_origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
         let emission = emission_unless_texture_black(lower_emission(scene, images, material));
-        EmissiveMaterial::new(emission, lower_opacity(scene, images, material))
+        EmissionWithOpacity::new(emission, lower_opacity(scene, images, material))
     });
-    let emissive: Vec<EmissiveMaterial> = emissive.collect();
+    let emissive: Vec<EmissionWithOpacity> = emissive.collect();
     let environment = scene.environment.as_ref().and_then(|environment| environment_light(environment, sky));
     let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
     for ((id, object), described) in objects {
         let emissive = described.material.map(|index| &emissive[index]);
         match object {
             Object::Shape(shape) => {
-                let lights = emissive.into_iter().flat_map(|emissive| shape_lights(shape, emissive, id));
+                let lights =
+                    emissive.into_iter().flat_map(|emissive| area_lights_of_shape(shape, emissive, id));
                 all.extend(lights.map(Light::Area));
             }
             Object::Mesh(mesh) => {
@@ -66,11 +67,11 @@ pub fn build_lights(
 }
 
 /// Creates a scene's photon source. `None` if no light emits photons.
-pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
+pub fn scene_photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonEmitter> {
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
     let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
-    PhotonSource::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
+    PhotonEmitter::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
 }
 
 /// Environment light. `None` if it is black.
@@ -118,7 +119,7 @@ fn emission_unless_texture_black(emission: Emission) -> Emission {
 
 /// Emission of a material, combined with the opacity.
 #[derive(Clone)]
-struct EmissiveMaterial {
+struct EmissionWithOpacity {
     /// Emission, scaled by the opacity if it is constant.
     emission: Emission,
     /// Opacity, if it varies over the surface.
@@ -127,7 +128,7 @@ struct EmissiveMaterial {
     is_sheer: bool,
 }
 
-impl EmissiveMaterial {
+impl EmissionWithOpacity {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
         match opacity.as_ref().and_then(Opacity::as_constant) {
             Some(part) => {
@@ -148,7 +149,7 @@ impl EmissiveMaterial {
     }
 
     /// Scales light bounds by the means of the emission and opacity textures.
-    fn scale_bounds_by_mean(&self, bounds: LightBounds) -> LightBounds {
+    fn scale_light_bounds_by_texture_means(&self, bounds: LightBounds) -> LightBounds {
         let texture = self.emission.texture.as_ref();
         let bounds = texture.map_or(bounds, |texture| bounds.scaled_by(texture.mean()));
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.scaled_by(Vec3::splat(opacity.mean())))
@@ -157,25 +158,29 @@ impl EmissiveMaterial {
     /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
     fn texture(&self, chart: UvMapping) -> Option<EmissionTexture> {
         let Emission { texture, coat, .. } = &self.emission;
-        EmissionTexture::with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
+        EmissionTexture::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
 
     /// Whether emission varies with position or direction.
-    fn is_textured(&self) -> bool {
+    fn has_varying_emission(&self) -> bool {
         self.emission.texture.is_some() || self.opacity.is_some() || self.emission.coat.is_some()
     }
 }
 
 /// Creates the lights for an emitting shape, one per emitting side.
-fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl Iterator<Item = AreaLight> {
+fn area_lights_of_shape(
+    shape: &Shape,
+    emissive: &EmissionWithOpacity,
+    object: u32,
+) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
         let radiance = emissive.emission.scale;
         let light = match (emissive.is_sheer, side) {
-            (true, side) => see_through_side_area_light(shape, *side, radiance, object)?,
+            (true, side) => see_through_shape_side_light(shape, *side, radiance, object)?,
             (false, Side::Front) => front_area_light(shape, radiance, object)?,
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
-        let light = AreaLight { bounds: emissive.scale_bounds_by_mean(light.bounds), ..light };
+        let light = AreaLight { bounds: emissive.scale_light_bounds_by_texture_means(light.bounds), ..light };
         Some(match emissive.texture(UvMapping::Shape(*shape)) {
             Some(texture) => light.with_texture(texture),
             None => light,
@@ -188,16 +193,16 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
-    emissive: Option<&EmissiveMaterial>,
+    emissive: Option<&EmissionWithOpacity>,
     images: &Images,
     token: &CancelToken,
 ) -> Result<Vec<AreaLight>, Cancelled> {
     let loaded = mesh.tree.loaded();
-    let all: Vec<(Option<u32>, EmissiveMaterial)> = match emissive {
+    let all: Vec<(Option<u32>, EmissionWithOpacity)> = match emissive {
         Some(emissive) => vec![(None, emissive.clone())],
         None => {
             let of_file = |material| {
-                EmissiveMaterial::new(
+                EmissionWithOpacity::new(
                     emission_unless_texture_black(file_emission(images, material)),
                     file_opacity(images, material),
                 )
@@ -217,7 +222,7 @@ fn mesh_lights(
         HashSet::new()
     };
     let light =
-        |(own, emissive, side): (Option<u32>, &EmissiveMaterial, Side)| -> Result<Option<AreaLight>, Cancelled> {
+        |(own, emissive, side): (Option<u32>, &EmissionWithOpacity, Side)| -> Result<Option<AreaLight>, Cancelled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
@@ -226,18 +231,18 @@ fn mesh_lights(
             let triangles = distinct.map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = emissive.emission.scale;
-            let bounds = emissive.scale_bounds_by_mean(emitter.light_bounds().scaled_by(radiance));
+            let bounds = emissive.scale_light_bounds_by_texture_means(emitter.light_bounds().scaled_by(radiance));
             let patches = || {
-                let patch = |id| UvTriangle {
+                let patch = |id| TriangleWithUvs {
                     primitive: id,
                     corners: mesh.world_corners(id),
                     uvs: mesh.corner_uvs(id),
-                    second_uvs: mesh.second_corner_uvs(id),
+                    second_uvs: mesh.second_set_corner_uvs(id),
                 };
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
-            let texture = if emissive.is_textured() { emissive.texture(patches()).map(Box::new) } else { None };
-            let (shape, part) = (Emitter::Mesh(emitter), EmittingPart::Listed);
+            let texture = if emissive.has_varying_emission() { emissive.texture(patches()).map(Box::new) } else { None };
+            let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
     let of_sides = all
@@ -282,14 +287,14 @@ mod tests {
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            let emissive = EmissiveMaterial::new(Emission::from_constant(Vec3::ONE), None);
+            let emissive = EmissionWithOpacity::new(Emission::from_constant(Vec3::ONE), None);
             let lights = mesh_lights(0, &mesh, Some(&emissive), &Images::default(), &CancelToken::new())
                 .expect("never canceled");
             let lights = lights.into_iter().map(Light::Area).collect();
             let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("never canceled"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
             let geometry = geometry.expect("never canceled");
-            let source = photon_source(&geometry, &lights).expect("a photon source");
+            let source = scene_photon_source(&geometry, &lights).expect("a photon source");
             let mut next = random::unit_generator(1);
             for _ in 0..20_000 {
                 let mut pair = || [next(), next()];

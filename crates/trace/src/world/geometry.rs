@@ -137,7 +137,7 @@ impl Geometry {
     }
 
     /// Origin of the traced coordinates, in scene coordinates.
-    pub fn origin(&self) -> DVec3 {
+    pub fn coordinate_origin(&self) -> DVec3 {
         self.origin
     }
 
@@ -155,7 +155,7 @@ impl Geometry {
     /// Returns the merged meshes if they are represented by `id`, which is an id from
     /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
     #[inline(always)]
-    pub(super) fn merged_meshes_with_tree_id(&self, id: u32) -> Option<&MergedMeshes> {
+    pub(super) fn merged_meshes_by_tree_id(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
         (id as usize == self.objects.len()).then_some(&merged.meshes)
     }
@@ -221,7 +221,7 @@ impl Geometry {
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
-            match self.merged_meshes_with_tree_id(id) {
+            match self.merged_meshes_by_tree_id(id) {
                 Some(merged) => {
                     let shape = merged.closest_hit(segment)?;
                     let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
@@ -282,13 +282,13 @@ impl Geometry {
             LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
             LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        let test = |id: u32| match (self.merged_meshes_with_tree_id(id), source) {
+        let test = |id: u32| match (self.merged_meshes_by_tree_id(id), source) {
             (
                 Some(merged),
                 LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
             ) => merged.any_hit(ray, None),
             (Some(merged), LightGeometry::Primitive(own, part)) => {
-                merged.any_hit(ray, merged.tree_index(own, part))
+                merged.any_hit(ray, merged.merged_triangle_index(own, part))
             }
             (None, _) => of_object(id),
         };
@@ -318,15 +318,17 @@ impl Geometry {
     }
 
     /// Mean curvature at a hit. Positive if the surface is convex on its front side.
-    pub fn curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
+    pub fn mean_curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
         match &self.objects[hit.object as usize] {
-            Object::Shape(shape) => shape.curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32,
-            Object::Mesh(mesh) => mesh.curvature(hit.shape.primitive, surface.normal),
+            Object::Shape(shape) => {
+                shape.mean_curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32
+            }
+            Object::Mesh(mesh) => mesh.mean_curvature(hit.shape.primitive, surface.normal),
         }
     }
 
     /// Index of a triangle's material in its mesh file. `None` if the file does not assign a material.
-    pub fn file_material(&self, object: u32, triangle: u32) -> Option<u32> {
+    pub fn file_material_index(&self, object: u32, triangle: u32) -> Option<u32> {
         let mesh = self.objects[object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
@@ -355,7 +357,7 @@ impl Geometry {
     }
 
     /// Memory used by all trees, in bytes. Each mesh tree is counted once.
-    pub fn memory_bytes(&self) -> usize {
+    pub fn tree_memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.top_level_memory_bytes() - size_of_val(self.objects.as_slice());
         for mesh in self.objects.iter().filter_map(Object::mesh) {

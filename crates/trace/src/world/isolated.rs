@@ -79,9 +79,11 @@ impl IsolationTable {
 
     /// Returns the grid cell that contains a point.
     #[inline]
-    fn cell(&self, point: Vec3) -> GridCell {
+    fn grid_cell_at(&self, point: Vec3) -> GridCellIndex {
         let [start, dense] = self.cells;
-        GridCell(((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
+        GridCellIndex(
+            ((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)),
+        )
     }
 
     #[inline]
@@ -112,7 +114,7 @@ enum SurfaceRegion {
 impl Geometry {
     /// Whether there is nothing within `margin` of the point other than the hit object or, for a mesh, the
     /// hit triangle.
-    pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
+    pub(super) fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolation_cache().tables[hit.object as usize]
             .get_or_init(|| self.new_isolation_table(object));
@@ -127,7 +129,7 @@ impl Geometry {
                 state != NEVER && surface.barycentric.min_element() * STATE_STEPS >= f32::from(state)
             }
             Object::Shape(shape) => {
-                let cell = table.cell(surface.point);
+                let cell = table.grid_cell_at(surface.point);
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).expanded(Vec3::splat(table.margin));
@@ -198,10 +200,10 @@ impl Geometry {
     /// Whether no other objects are near a region. Every object near the region must overlap `around`.
     fn has_no_neighbors(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
-            Object::Shape(shape) => shape_is_near(shape, around, region),
+            Object::Shape(shape) => shape_may_overlap_region(shape, around, region),
             Object::Mesh(mesh) => {
-                let is_far = |other: u32| !region.is_near(mesh.world_corners(other), around);
-                !mesh.tree.triangle_tree().visit_triangles_in_box_while(&mesh.local_box(around), is_far)
+                let is_far = |other: u32| !region.is_triangle_near(mesh.world_corners(other), around);
+                !mesh.tree.triangle_tree().visit_triangles_in_box_while(&mesh.box_to_local(around), is_far)
             }
         };
         let is_near = |id: u32| id != own && is_near(id);
@@ -209,7 +211,7 @@ impl Geometry {
             return false;
         }
         let mut is_clear = true;
-        self.tree().visit_overlapping_surfaces(around, |met| {
+        self.tree().visit_surfaces_overlapping_box(around, |met| {
             is_clear = match met {
                 OverlappingItem::Primitive(id) => !is_near(id),
                 OverlappingItem::Enclosing(_) => false,
@@ -230,7 +232,7 @@ fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], 
 }
 
 /// Whether a shape may intersect a region or enclose it.
-fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
+fn shape_may_overlap_region(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
     if shape.bounds().is_some_and(|bounds| !bounds.overlaps(around)) {
         return false;
     }
@@ -246,10 +248,11 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
     }
     if let Shape::Quad(quad) = shape {
         let (a, c) = (quad.corner, quad.corner + quad.u + quad.v);
-        return region.is_near([a, a + quad.u, c], around) || region.is_near([a, c, a + quad.v], around);
+        return region.is_triangle_near([a, a + quad.u, c], around)
+            || region.is_triangle_near([a, c, a + quad.v], around);
     }
     if let Shape::Triangle(own) = shape {
-        return region.is_near([own.a, own.b, own.c], around);
+        return region.is_triangle_near([own.a, own.b, own.c], around);
     }
     // Other shapes are considered near if their bounding boxes overlap.
     true
@@ -257,9 +260,9 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
 
 impl SurfaceRegion {
     /// Whether a triangle may be near the region. Triangles that do not overlap `around` are not near.
-    fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
+    fn is_triangle_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {
-            Self::GridCell(cell) => triangle_meets_box(triangle, cell),
+            Self::GridCell(cell) => triangle_overlaps_box(triangle, cell),
             Self::Triangle { corners, apart } => {
                 Aabb::from_points_f64(triangle).overlaps(around)
                     && !are_triangles_apart(*corners, triangle, *apart)
@@ -269,9 +272,9 @@ impl SurfaceRegion {
 }
 
 /// A grid cell of a shape's bounding box, identified by its indices along the axes.
-struct GridCell([usize; 3]);
+struct GridCellIndex([usize; 3]);
 
-impl GridCell {
+impl GridCellIndex {
     fn index(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x
@@ -287,7 +290,7 @@ impl GridCell {
 
 /// Whether a triangle intersects a box, up to rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap
 /// Testing*, 2001).
-pub(super) fn triangle_meets_box(corners: [DVec3; 3], bounds: &Aabb) -> bool {
+pub(super) fn triangle_overlaps_box(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     if !Aabb::from_points_f64(corners).overlaps(bounds) {
         return false;
     }

@@ -269,19 +269,19 @@ fn isolated_regions_match_the_full_search() {
                 let error = if only_hit {
                     world.geometry.set_hit_as_only_candidate(&at, &mut memory)
                 } else {
-                    world.geometry.find_candidates(&at, &mut memory, &world.enclosing_glass)
+                    world.geometry.find_coincident_candidates(&at, &mut memory, &world.enclosing_glass)
                 };
-                (world.classify_candidates(&at, (&memory, error), |one| near.push(one)), near)
+                (world.visit_coincident_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
             let is_isolated =
-                world.geometry.is_isolated(&hit, at.surface, world.geometry.coincidence_margin(&at));
+                world.geometry.is_hit_isolated(&hit, at.surface, world.geometry.coincidence_margin(&at));
             if is_isolated {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
             let mut near = Vec::new();
-            let sides =
-                world.find_coincident_surfaces(&at, &mut CoincidenceScratch::default(), |one| near.push(one));
+            let sides = world
+                .find_coincident_surfaces_at(&at, &mut CoincidenceScratch::default(), |one| near.push(one));
             assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             let is_other = |near: &CoincidentOrEnclosingSurface| match near {
                 CoincidentOrEnclosingSurface::Around { object, .. }
@@ -320,7 +320,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             let at = CoincidenceQuery { hit: &hit, surface: &surface, normal, lead };
             let mut around = Vec::new();
             let mut found = 0_u32;
-            let sides = world.find_coincident_surfaces(&at, &mut memory, |near| {
+            let sides = world.find_coincident_surfaces_at(&at, &mut memory, |near| {
                 found += 1;
                 if let CoincidentOrEnclosingSurface::Around { object, .. } = near {
                     around.push(object);

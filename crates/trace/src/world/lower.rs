@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use super::textures::{
-    CutoffBits, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_use, file_opacity_use,
-    file_texture_source, material_texture_source,
+    AlphaCutoffKey, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_interpretation, file_opacity_use,
+    image_file_and_encoding, material_texture_source,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{ColorParameter, ScaleAndOffset, Texture, TextureFilter, UvTransform, Wrap};
+use crate::materials::texture::{
+    ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
+};
 use crate::materials::{
     Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
     NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled, PrincipledInputs,
@@ -90,7 +92,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
         return None;
     }
     let (value, cutoff) = match source.texture_index_and_channel() {
-        None => (ScalarParameter::Constant(source.value.constant()?), source.cutoff),
+        None => (ScalarParameter::Constant(source.value.as_constant()?), source.cutoff),
         Some((index, number)) => {
             let of = SceneTextureLookup { scene, images, material };
             let texture = of.texture(index, TextureRole::Opacity(number));
@@ -98,7 +100,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
             let coverage = coverage_cutoff(scene, index, source.cutoff);
             let factor = texture.factor.filter(|_| coverage.is_none());
             let texture = Arc::new(Texture { factor, ..(*texture).clone() });
-            (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, CutoffBits::value))
+            (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, AlphaCutoffKey::value))
         }
     };
     Some(Opacity { value, cutoff })
@@ -119,13 +121,13 @@ fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: Scal
 }
 
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
-fn plastic(diffuse: ColorParameter, specular: ColorParameter, roughness: ScalarParameter, ior: f32) -> Bsdf {
+fn plastic(diffuse: ColorOrTexture, specular: ColorOrTexture, roughness: ScalarParameter, ior: f32) -> Bsdf {
     let is_smooth = roughness.as_constant() == Some(0.0);
     let base = NonSpecular::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
     if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::NonSpecular(base) }
 }
 
-fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorParameter) -> ConductorFresnel {
+fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOrTexture) -> ConductorFresnel {
     match source {
         FresnelSource::Schlick(reflectance) => ConductorFresnel::Schlick(color(reflectance)),
         FresnelSource::Index { eta, k } => ConductorFresnel::Index { eta: color(eta), k: color(k) },
@@ -156,7 +158,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     match &own.emission_texture {
         None => Emission::from_constant(own.emission),
         // If the emission map could not be read, do not emit. Otherwise, the whole surface would emit.
-        Some(texture) => match file_texture(images, texture, file_color_use(own, texture)) {
+        Some(texture) => match file_texture(images, texture, file_color_interpretation(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::from_constant(own.emission) },
         },
@@ -182,7 +184,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (own.kind(), file_glass_properties(own)) {
         (FileMaterialKind::Mirror, _) => {
-            Bsdf::Mirror(Mirror::Constant(ColorParameter::Constant(own.specular.min(Vec3::ONE))))
+            Bsdf::Mirror(Mirror::Constant(ColorOrTexture::Constant(own.specular.min(Vec3::ONE))))
         }
         (FileMaterialKind::Coated, _) => file_mirror_over_diffuse(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
@@ -206,7 +208,7 @@ fn file_rough_material(images: &Images, own: &FileMaterial, rough: NonSpecular) 
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Gray images are height maps. Ignore them because the file does not specify the scale.
-    let normals = normals.filter(|map| !map.texture.texels.is_gray());
+    let normals = normals.filter(|map| !map.texture.texels.are_all_gray());
     Material {
         bsdf: Bsdf::NonSpecular(rough),
         emission: file_emission(images, own),
@@ -215,14 +217,15 @@ fn file_rough_material(images: &Images, own: &FileMaterial, rough: NonSpecular) 
     }
 }
 
-fn file_color(
+fn file_material_color_parameter(
     images: &Images,
     own: &FileMaterial,
     texture: Option<&FileTexture>,
     constant: Vec3,
-) -> ColorParameter {
-    let texture = texture.and_then(|texture| file_texture(images, texture, file_color_use(own, texture)));
-    texture.map_or(ColorParameter::Constant(constant), ColorParameter::Texture)
+) -> ColorOrTexture {
+    let texture =
+        texture.and_then(|texture| file_texture(images, texture, file_color_interpretation(own, texture)));
+    texture.map_or(ColorOrTexture::Constant(constant), ColorOrTexture::Texture)
 }
 
 /// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
@@ -230,26 +233,29 @@ fn file_color(
 fn file_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
     let specular = own.specular.min(Vec3::ONE);
     let root = specular.max_element().min(FileMaterial::MAX_COAT).sqrt();
-    let diffuse = file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
-    let tint = ColorParameter::Constant(specular / specular.max_element());
+    let diffuse =
+        file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
+    let tint = ColorOrTexture::Constant(specular / specular.max_element());
     plastic(diffuse, tint, ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root))
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
     let scale = 2.0 / (own.shininess + 2.0);
     let specular = match own.has_highlight() {
-        true => match file_color(images, own, own.specular_texture.as_ref(), own.specular) {
-            ColorParameter::Constant(specular) => ColorParameter::Constant(specular * scale),
-            ColorParameter::Texture(texture) => {
+        true => match file_material_color_parameter(images, own, own.specular_texture.as_ref(), own.specular)
+        {
+            ColorOrTexture::Constant(specular) => ColorOrTexture::Constant(specular * scale),
+            ColorOrTexture::Texture(texture) => {
                 let mut texture = Arc::unwrap_or_clone(texture);
-                texture.factor = Some(texture.factor.unwrap_or(ScaleAndOffset::IDENTITY).scaled_by(scale));
-                ColorParameter::Texture(Arc::new(texture))
+                texture.factor =
+                    Some(texture.factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale));
+                ColorOrTexture::Texture(Arc::new(texture))
             }
         },
-        false => ColorParameter::Constant(Vec3::ZERO),
+        false => ColorOrTexture::Constant(Vec3::ZERO),
     };
     NonSpecular::Phong(Phong {
-        diffuse: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse),
+        diffuse: file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), own.diffuse),
         specular,
         shininess: own.shininess,
         ambient: None,
@@ -263,12 +269,17 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
         texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
     };
     NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
-        color: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE)),
+        color: file_material_color_parameter(
+            images,
+            own,
+            own.diffuse_texture.as_ref(),
+            own.diffuse.min(Vec3::ONE),
+        ),
         metallic: number(&physical.metallic_texture, physical.metallic),
         roughness: number(&physical.roughness_texture, physical.roughness),
         ior: if own.ior > 1.0 { own.ior.min(FileMaterial::MAX_IOR) } else { FileMaterial::DEFAULT_IOR },
         specular: ScalarParameter::Constant(1.0),
-        specular_color: ColorParameter::Constant(Vec3::ONE),
+        specular_color: ColorOrTexture::Constant(Vec3::ONE),
         transmission: ScalarParameter::Constant(0.0),
         clearcoat: ScalarParameter::Constant(physical.clearcoat),
         clearcoat_roughness: ScalarParameter::Constant(physical.clearcoat_roughness),
@@ -278,8 +289,8 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
 /// Material for triangles to which the mesh file does not assign a material.
 pub fn fallback_material() -> Material {
     let phong = Phong {
-        diffuse: ColorParameter::Constant(Vec3::splat(0.7)),
-        specular: ColorParameter::Constant(Vec3::ZERO),
+        diffuse: ColorOrTexture::Constant(Vec3::splat(0.7)),
+        specular: ColorOrTexture::Constant(Vec3::ZERO),
         shininess: 1.0,
         ambient: None,
     };
@@ -300,17 +311,17 @@ struct SceneTextureLookup<'a> {
 }
 
 impl SceneTextureLookup<'_> {
-    fn color(self, source: &ColorSource) -> ColorParameter {
+    fn color(self, source: &ColorSource) -> ColorOrTexture {
         match source {
-            ColorSource::Constant(color) => ColorParameter::Constant(*color),
+            ColorSource::Constant(color) => ColorOrTexture::Constant(*color),
             // Textures are used in the same way for all color roles.
-            ColorSource::Texture(index) => ColorParameter::Texture(self.texture(*index, TextureRole::Facets)),
+            ColorSource::Texture(index) => ColorOrTexture::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
 
     /// Scalar parameter. Uses the texture's luminance if the scene does not specify a channel.
     fn number(self, source: &NumberSource, role: fn(ChannelSelector) -> TextureRole) -> ScalarParameter {
-        match (source.constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
+        match (source.as_constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
             (Some(number), _) => ScalarParameter::Constant(number),
             (None, Some((texture, number))) => ScalarParameter::Texture(self.texture(texture, role(number))),
             (None, None) => ScalarParameter::Constant(1.0),
@@ -330,7 +341,7 @@ impl SceneTextureLookup<'_> {
         let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
         let factor = match role.pixel_interpretation() {
             PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-                ScaleAndOffset::from_scale(factor)
+                ValueScaleAndOffset::from_scale(factor)
             }
             PixelInterpretation::Normal => None,
         };
@@ -341,11 +352,11 @@ impl SceneTextureLookup<'_> {
 /// Texture from a mesh file. `None` if the image was not loaded, either because it is not needed or because
 /// it could not be read.
 fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretation) -> Option<Arc<Texture>> {
-    let texels = images.get(&file_texture_source(texture, used))?.texels.clone();
+    let texels = images.get(&image_file_and_encoding(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
     let factor = match used {
         PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-            ScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base))
+            ValueScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base))
         }
         PixelInterpretation::Normal => None,
     };

@@ -9,7 +9,7 @@ use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
+use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
 use crate::geometry::triangle_list::{self, TriangleList};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -81,7 +81,7 @@ impl MergedMeshes {
             total = if has_room { with_it } else { total };
             has_room
         });
-        let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel())) else {
+        let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel_kind())) else {
             return Ok(None);
         };
         if total < MIN_FACETS || chosen.len() < 2 && total > MAX_FACETS {
@@ -151,7 +151,7 @@ impl MergedMeshes {
 
     /// Tree index of an object's triangle, or `None` if the object is not merged.
     #[inline(always)]
-    pub fn tree_index(&self, object: u32, primitive: u32) -> Option<u32> {
+    pub fn merged_triangle_index(&self, object: u32, primitive: u32) -> Option<u32> {
         let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
         Some(first + primitive)
     }
@@ -192,7 +192,7 @@ impl MergedMeshes {
     #[cold]
     #[inline(never)]
     fn closest_hit_one_by_one(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
-        for lane in lane_indices(these) {
+        for lane in set_bit_lanes(these) {
             if let Some(hit) = self.tree.closest_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 found.set(lane, &hit);
             }
@@ -244,7 +244,7 @@ impl MergedMeshes {
             let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
             self.tree.any_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
         };
-        lane_indices(these).filter(is_hit).fold(0, |bits, lane| bits | 1 << lane)
+        set_bit_lanes(these).filter(is_hit).fold(0, |bits, lane| bits | 1 << lane)
     }
 
     #[inline(never)]
@@ -344,7 +344,7 @@ impl SimdKernel for IncoherentAnyFacetKernel<'_> {
 #[inline]
 fn unpack_rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
-    for lane in lane_indices(met & met.wrapping_sub(1)) {
+    for lane in set_bit_lanes(met & met.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);
     }
     rays
@@ -419,7 +419,11 @@ pub(super) mod tests {
         let mut vector = || Vec3::new(next(), next(), next());
         (0..4000)
             .map(|i| {
-                if i % 2 == 0 { Ray::new(vector() * 3.0, vector()) } else { Ray::segment(vector(), vector()) }
+                if i % 2 == 0 {
+                    Ray::new(vector() * 3.0, vector())
+                } else {
+                    Ray::segment_ending_before(vector(), vector())
+                }
             })
             .collect()
     }
@@ -527,7 +531,7 @@ pub(super) mod tests {
         let (mut started, mut again) = (0, 0);
         for _ in 0..4000 {
             let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
-            let ray = Ray { t_max: f32::INFINITY, ..Ray::segment(vector(1.0), vector(0.02)) };
+            let ray = Ray { t_max: f32::INFINITY, ..Ray::segment_ending_before(vector(1.0), vector(0.02)) };
             let Some(hit) = geometry.closest_hit(&ray) else { continue };
             let surface = geometry.surface(&ray, &hit);
             for side in [1.0, -1.0] {

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::mesh_packet::uv_between;
+use super::mesh_packet::interpolate_triangle_uv;
 use super::mesh_tree::MeshTree;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::{EDGE_MARGIN, PlacedMesh, TrianglePoint};
 use crate::accel::{F32x16, PACKET_SIZE};
-use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
+use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::materials::UvSet;
 use crate::math::transform::Transform;
@@ -126,7 +126,7 @@ impl MeshInstance {
 
     /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
-    pub(super) fn vertex_uvs(&self, set: UvSet) -> &[Vec2] {
+    pub(super) fn uvs_in_set(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
         match set {
             UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
@@ -136,7 +136,7 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.values_in_corner_order(triangle, self.vertex_uvs(UvSet::First)).unwrap_or([
+        self.values_in_corner_order(triangle, self.uvs_in_set(UvSet::First)).unwrap_or([
             Vec2::ZERO,
             Vec2::X,
             Vec2::Y,
@@ -144,7 +144,7 @@ impl MeshInstance {
     }
 
     /// UVs of a triangle's corners in the second UV set. `None` without a second set.
-    pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
+    pub fn second_set_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
         self.values_in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
     }
 
@@ -172,7 +172,7 @@ impl MeshInstance {
 
     /// Mean curvature of the surface approximated by a triangle, estimated from the vertex normals
     /// (Akenine-Möller et al. 2021, section 4). Positive if the surface is convex on its front side.
-    pub(super) fn curvature(&self, triangle: u32, normal: Vec3) -> f32 {
+    pub(super) fn mean_curvature(&self, triangle: u32, normal: Vec3) -> f32 {
         if !self.smooth {
             return 0.0;
         }
@@ -192,7 +192,7 @@ impl MeshInstance {
 
     /// Combines this mesh with `placement`, which must represent the mesh's transform.
     #[inline(always)]
-    pub(super) fn combine_with_placement<P>(&self, placement: P) -> PlacedMesh<P> {
+    pub(super) fn to_placed_mesh<P>(&self, placement: P) -> PlacedMesh<P> {
         PlacedMesh {
             placement,
             edge_margin: self.edge_margin,
@@ -203,16 +203,12 @@ impl MeshInstance {
     /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => {
-                self.surface_with_placement(self.combine_with_placement(&self.transform), ray, hit, asked)
-            }
-            false => {
-                self.surface_with_placement(self.combine_with_placement(IdentityPlacement), ray, hit, asked)
-            }
+            true => self.surface_using_placement(self.to_placed_mesh(&self.transform), ray, hit, asked),
+            false => self.surface_using_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, asked),
         }
     }
 
-    fn surface_with_placement(
+    fn surface_using_placement(
         &self,
         placed: PlacedMesh<impl MeshPlacement>,
         ray: &RayF64,
@@ -267,7 +263,7 @@ impl MeshInstance {
             return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));
         }
         let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
-        let uv = uv_between([a, b, c], barycentric);
+        let uv = interpolate_triangle_uv([a, b, c], barycentric);
         let (duv_b, duv_c) = ((b - a).as_dvec2(), (c - a).as_dvec2());
         let determinant = duv_b.perp_dot(duv_c);
         if determinant == 0.0 || !determinant.is_finite() {
@@ -311,7 +307,7 @@ impl MeshInstance {
             return self.tree.triangle_tree().any_hit_packet(&local, ends, &[]);
         };
         let mut parts = [None; PACKET_SIZE];
-        lane_indices(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
+        set_bit_lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
         self.tree.triangle_tree().any_hit_packet(&local, ends, &parts)
     }
 
@@ -325,7 +321,7 @@ impl MeshInstance {
             if self.is_transformed { self.transform_ray_to_mesh(&ray) } else { ray }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
-        for lane in lane_indices(met & met.wrapping_sub(1)) {
+        for lane in set_bit_lanes(met & met.wrapping_sub(1)) {
             rays[lane] = local(lane);
         }
         rays

@@ -4,7 +4,7 @@ use super::MeshInstance;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::PlacedMesh;
 use crate::accel::{PACKET_SIZE, SimdKernel};
-use crate::geometry::packet::{HitPacket, RayPacket, lane_indices};
+use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::UvSet;
 use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
@@ -23,7 +23,7 @@ impl MeshInstance {
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
     ) {
-        simd.call_out_of_line(FillSurfaces { mesh: self, surface, rays, hits, of, asked_uvs });
+        simd.call_out_of_line(FillSurfacesKernel { mesh: self, surface, rays, hits, of, asked_uvs });
     }
 
     #[inline(always)]
@@ -74,19 +74,22 @@ impl MeshInstance {
                 let lifted = placed.lifted_shadow_origin(&facet, &normals_of(i), direction);
                 set_lane(&mut found.shadow_point, i, lifted);
             }
-            for i in lane_indices(on_ray) {
+            for i in set_bit_lanes(on_ray) {
                 set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
             surface.copy_shading_normals_from(of, &found);
         }
         if let Some(set) = asked_uvs {
-            let all = self.vertex_uvs(set);
+            let all = self.uvs_in_set(set);
             for i in 0..PACKET_SIZE {
                 let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
                     uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
                 };
-                let uv = uv_between(uvs, Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]));
+                let uv = interpolate_triangle_uv(
+                    uvs,
+                    Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]),
+                );
                 let is_own = of & 1 << i != 0;
                 surface.uv[0][i] = if is_own { f64::from(uv.x) } else { surface.uv[0][i] };
                 surface.uv[1][i] = if is_own { f64::from(uv.y) } else { surface.uv[1][i] };
@@ -96,7 +99,7 @@ impl MeshInstance {
 }
 
 /// Kernel of [`MeshInstance::fill_surfaces`].
-struct FillSurfaces<'a> {
+struct FillSurfacesKernel<'a> {
     mesh: &'a MeshInstance,
     surface: &'a mut SurfacePacket,
     rays: &'a RayPacket,
@@ -105,7 +108,7 @@ struct FillSurfaces<'a> {
     asked_uvs: Option<UvSet>,
 }
 
-impl SimdKernel for FillSurfaces<'_> {
+impl SimdKernel for FillSurfacesKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -113,7 +116,7 @@ impl SimdKernel for FillSurfaces<'_> {
         let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
         if mesh.is_transformed {
             mesh.fill_placed_surfaces(
-                mesh.combine_with_placement(&mesh.transform),
+                mesh.to_placed_mesh(&mesh.transform),
                 surface,
                 (rays, hits),
                 of,
@@ -122,7 +125,7 @@ impl SimdKernel for FillSurfaces<'_> {
             );
         } else {
             mesh.fill_placed_surfaces(
-                mesh.combine_with_placement(IdentityPlacement),
+                mesh.to_placed_mesh(IdentityPlacement),
                 surface,
                 (rays, hits),
                 of,
@@ -145,7 +148,7 @@ fn correct_doubtful_points(
     found: &mut SurfacePacket,
 ) -> u32 {
     let mut on_ray = 0;
-    for i in lane_indices(doubtful) {
+    for i in set_bit_lanes(doubtful) {
         let (ray, uv) = (rays.ray(i).to_f64(), [hits.u[i], hits.v[i]]);
         let facet =
             placed.triangle_point([lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)], uv);
@@ -159,7 +162,7 @@ fn correct_doubtful_points(
 
 /// Interpolates the UVs of a triangle's corners.
 #[inline(always)]
-pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
+pub(super) fn interpolate_triangle_uv([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
     a * barycentric.x + b * barycentric.y + c * barycentric.z
 }
 

@@ -40,7 +40,7 @@ impl MeshTree {
     }
 
     /// Tree type.
-    pub fn accel(&self) -> Accel {
+    pub fn accel_kind(&self) -> Accel {
         self.accel
     }
 

@@ -32,7 +32,7 @@ mod unlit_glass;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeSummary};
+pub use crate::accel::{PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeInfo};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{
@@ -40,7 +40,7 @@ pub use contact::{
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
 pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
-pub use emitters::{build_environment_map, build_lights, photon_source};
+pub use emitters::{build_environment_map, build_lights, scene_photon_source};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;
@@ -51,14 +51,14 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    CutoffBits, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
+    AlphaCutoffKey, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
     material_texture_source, textures_needed,
 };
 pub use unlit_glass::LightBoundingBoxPair;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint};
@@ -124,7 +124,7 @@ pub struct World {
     /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
-    enclosing_glass: Box<[contact::ClosedGlassShapesOfSubtree]>,
+    enclosing_glass: Box<[contact::SubtreeClosedGlassIds]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
@@ -157,7 +157,7 @@ impl World {
         match self.object_materials[hit.object as usize] {
             ObjectMaterial::One(index) => index as usize,
             ObjectMaterial::OfFile { first, fallback } => {
-                let own = self.geometry.file_material(hit.object, hit.shape.primitive);
+                let own = self.geometry.file_material_index(hit.object, hit.shape.primitive);
                 own.map_or(fallback, |own| first + own) as usize
             }
         }
@@ -165,7 +165,7 @@ impl World {
 
     /// Name of the hit triangle's material in the mesh file. `None` if the file does not assign a material.
     pub fn file_material_name(&self, hit: &Hit) -> Option<&str> {
-        let own = self.geometry.file_material(hit.object, hit.shape.primitive)?;
+        let own = self.geometry.file_material_index(hit.object, hit.shape.primitive)?;
         let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
         mesh.tree.loaded().materials.get(own as usize).map(|material| material.name.as_str())
     }
@@ -195,8 +195,8 @@ impl World {
             ObjectMaterial::One(index) => [index; PACKET_SIZE],
             ObjectMaterial::OfFile { first, fallback } => {
                 let mut materials = [fallback; PACKET_SIZE];
-                for lane in lane_indices(of) {
-                    let own = self.geometry.file_material(object, primitives[lane]);
+                for lane in set_bit_lanes(of) {
+                    let own = self.geometry.file_material_index(object, primitives[lane]);
                     materials[lane] = own.map_or(fallback, |own| first + own);
                 }
                 materials
@@ -206,26 +206,26 @@ impl World {
 
     /// Whether a material is textured; see [`Material::is_textured`].
     #[inline(always)]
-    pub fn is_textured(&self, material: usize) -> bool {
+    pub fn material_needs_uvs_or_tangents(&self, material: usize) -> bool {
         self.textured[material]
     }
 
     /// Whether a material is mipmapped; see [`Material::is_mipmapped`].
     #[inline(always)]
-    pub fn is_mipmapped(&self, material: usize) -> bool {
+    pub fn is_material_mipmapped(&self, material: usize) -> bool {
         self.mipmapped[material]
     }
 
     /// Whether an object's vertex colors are used.
     #[inline]
-    pub fn are_vertex_colors_used(&self, object: u32) -> bool {
+    pub fn object_uses_vertex_colors(&self, object: u32) -> bool {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
     /// The vertex color that tints the material at a hit. `None` if vertex colors are not used.
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
-        self.are_vertex_colors_used(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
+        self.object_uses_vertex_colors(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
     /// Texture coordinates at a hit. `footprint` computes their footprint from the tangents.
@@ -291,6 +291,6 @@ impl World {
 
     /// Memory used by all acceleration structures, in bytes. Shared structures are counted once.
     pub fn accel_memory_bytes(&self) -> usize {
-        self.geometry.memory_bytes()
+        self.geometry.tree_memory_bytes()
     }
 }

@@ -8,7 +8,7 @@
 use super::packet::OcclusionTest;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
 use crate::accel::{AnyHitCallback, F32x16};
-use crate::geometry::packet::{RayPacket, lane_indices};
+use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::lights::{LightGeometry, LightGeometryPacket};
@@ -74,7 +74,7 @@ impl ShadowTransmittancePacket {
 impl World {
     /// Whether any surface may be a null interaction.
     #[inline(always)]
-    pub fn has_see_through(&self) -> bool {
+    pub fn has_null_interaction_surfaces(&self) -> bool {
         self.see_through.is_some()
     }
 
@@ -93,7 +93,7 @@ impl World {
     }
 
     /// Whether a shadow ray's transmittance is zero.
-    pub fn has_zero_transmittance(&self, ray: &Ray, source: LightGeometry) -> bool {
+    pub fn has_zero_transmittance_along(&self, ray: &Ray, source: LightGeometry) -> bool {
         self.transmittance(ray, source, &mut 0) == Vec3::ZERO
     }
 
@@ -115,10 +115,10 @@ impl World {
     }
 
     /// Transmittance of the surface at a hit, and the ray's continuation beyond the surface.
-    pub fn continue_ray_past(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
+    pub fn transmittance_and_continued_ray(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];
-        let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
+        let asked = SurfaceRequest { uv: self.material_needs_uvs_or_tangents(index), shadow_point: false };
         let surface = self.geometry.requested_surface(ray, hit, asked);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);
@@ -149,7 +149,7 @@ impl World {
             if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
-            let (part, beyond) = self.continue_ray_past(&ray, &hit, lookups);
+            let (part, beyond) = self.transmittance_and_continued_ray(&ray, &hit, lookups);
             ray = beyond;
             // A light does not occlude itself.
             if source == LightGeometry::Primitive(hit.object, hit.shape.primitive) {
@@ -191,7 +191,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
             see_through.is_any_merged || traced & geometry.rays_to_merged_mesh_lights(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
-            for lane in lane_indices(traced) {
+            for lane in set_bit_lanes(traced) {
                 let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
                 let left = world.transmittance(&ray, sources.geometry(lane), &mut transmittance.lookups);
                 transmittance.set(lane, left);
@@ -203,7 +203,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
         transmittance.occluded =
             tree.any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
         // Trace the rays that may cross see-through surfaces.
-        for lane in lane_indices(traced & !transmittance.occluded & solid.near) {
+        for lane in set_bit_lanes(traced & !transmittance.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
             let left = world.transmittance_along_ray(
                 see_through,

@@ -3,7 +3,7 @@
 use super::Camera;
 use crate::assets::GkitOrbiterCamera;
 use crate::math::DVec3;
-use crate::math::origin::origin_near;
+use crate::math::origin::local_coordinate_origin;
 use crate::scene::description;
 
 /// Chooses an origin near the camera's target, so that `f32` coordinates are as precise there as near 0. The
@@ -15,5 +15,5 @@ pub fn choose_origin_near_camera_target(
     orbiter: Option<&GkitOrbiterCamera>,
 ) -> DVec3 {
     let (aim, distance) = Camera::target_and_distance(camera, orbiter);
-    origin_near(aim, distance)
+    local_coordinate_origin(aim, distance)
 }

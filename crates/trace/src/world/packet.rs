@@ -4,7 +4,7 @@ use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
-use crate::geometry::packet::{HitPacket, RayPacket, lane_indices, nonnegative_end_mask};
+use crate::geometry::packet::{HitPacket, RayPacket, nonnegative_end_mask, set_bit_lanes};
 use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
@@ -79,7 +79,7 @@ impl Geometry {
         traced: u32,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
         let (mut hits, mut objects) = (HitPacket::without_hits(), [NONE; PACKET_SIZE]);
-        for lane in lane_indices(traced) {
+        for lane in set_bit_lanes(traced) {
             if let Some(hit) = self.closest_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 hits.set(lane, &hit.shape);
                 (objects[lane], ends[lane]) = (hit.object, hit.shape.t);
@@ -104,7 +104,7 @@ impl Geometry {
                 sources.geometry(lane),
             )
         };
-        lane_indices(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
+        set_bit_lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
     }
 }
 
@@ -169,7 +169,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
-        match self.geometry.merged_meshes_with_tree_id(id) {
+        match self.geometry.merged_meshes_by_tree_id(id) {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
                 merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
@@ -227,14 +227,14 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
         sources: &'a LightGeometryPacket,
         simd: F,
     ) -> Self {
-        Self { geometry, rows, sources, in_part: rays_to_single_primitive_lights(sources, simd), simd }
+        Self { geometry, rows, sources, in_part: single_primitive_light_ray_mask(sources, simd), simd }
     }
 }
 
 impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
-        if let Some(merged) = self.geometry.merged_meshes_with_tree_id(id) {
+        if let Some(merged) = self.geometry.merged_meshes_by_tree_id(id) {
             let these = masked_ends(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_hit_packet(
@@ -245,8 +245,8 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
                 );
             }
             let mut own = [MergedMeshes::NO_TRIANGLE; PACKET_SIZE];
-            for lane in lane_indices(self.in_part & met) {
-                let number = merged.tree_index(self.sources.object[lane], self.sources.part[lane]);
+            for lane in set_bit_lanes(self.in_part & met) {
+                let number = merged.merged_triangle_index(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
             return merged.any_hit_packet(
@@ -256,7 +256,7 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
                 Some(&own),
             );
         }
-        let own = rays_to_light_on(self.sources, id, self.simd);
+        let own = object_light_ray_mask(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
         if met == 0 {
@@ -270,7 +270,7 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn rays_to_single_primitive_lights(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
+fn single_primitive_light_ray_mask(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -283,7 +283,7 @@ fn rays_to_single_primitive_lights(sources: &LightGeometryPacket, simd: impl Sim
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn rays_to_light_on(sources: &LightGeometryPacket, id: u32, simd: impl Simd) -> u32 {
+fn object_light_ray_mask(sources: &LightGeometryPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -313,7 +313,7 @@ pub(super) mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::Shape;
-    use crate::geometry::cuboid::Cuboid;
+    use crate::geometry::cuboid::OrientedBox;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
@@ -343,7 +343,7 @@ pub(super) mod tests {
             let center = DVec3::new(f64::from(i % 5), f64::from(i / 5 % 3), f64::from(i / 15)) * 1.5
                 - DVec3::splat(2.0);
             objects.push(Object::Shape(match i % 3 {
-                0 => Shape::Box(Cuboid::new(center, DVec3::splat(0.9), DVec3::splat(f64::from(i)))),
+                0 => Shape::Box(OrientedBox::new(center, DVec3::splat(0.9), DVec3::splat(f64::from(i)))),
                 1 => Shape::Quad(Parallelogram::new(center, DVec3::X, DVec3::new(0.0, 0.8, 0.4))),
                 _ => Shape::Sphere(Sphere { center, radius: 0.6 }),
             }));
@@ -408,7 +408,7 @@ pub(super) mod tests {
             let spread = [0.001, 0.1, 4.0][i % 3];
             let mut ray = || {
                 let to = target + Vec3::new(next(), next(), next()) * spread;
-                if i % 2 == 0 { Ray::segment(eye, to) } else { Ray::new(eye, to - eye) }
+                if i % 2 == 0 { Ray::segment_ending_before(eye, to) } else { Ray::new(eye, to - eye) }
             };
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
             // Let some rays ignore the triangle they would hit.

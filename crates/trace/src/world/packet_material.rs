@@ -56,7 +56,7 @@ impl PacketMaterial {
 impl World {
     /// A plain material and its BSDF. `None` if the material is not plain.
     #[inline(always)]
-    pub fn packet_material_and_bsdf(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
+    pub fn material_for_packet_shading(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let packet_material = self.packet_material[material].as_ref()?;
         Some((packet_material, non_specular_bsdf(&self.materials[material].bsdf)?))
     }

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::accel::{InstructionSet, SimdKernel};
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -49,7 +49,7 @@ impl HostileRandom {
             0 => Ray::new(self.hostile_vector(), self.hostile_vector()),
             1 => Ray::new(self.hostile_vector() * scale, self.vector()),
             2 => Ray::new(self.vector() * 0.5 * scale, self.vector()),
-            3 => Ray::segment(self.vector() * 4.0 * scale, self.vector() * scale),
+            3 => Ray::segment_ending_before(self.vector() * 4.0 * scale, self.vector() * scale),
             _ => {
                 let from = self.vector() * 4.0 * scale;
                 Ray::new(from, self.vector() * scale - from)
@@ -73,8 +73,8 @@ fn test_shapes(scale: f64) -> Vec<Object> {
         quad(askew * -1.5, DVec3::new(2.0, 0.5, 0.1), DVec3::new(0.3, 1.0, 2.0)),
         Shape::Sphere(Sphere { center: DVec3::ZERO, radius: scale }),
         Shape::Sphere(Sphere { center, radius: 0.7 * scale }),
-        Shape::Box(Cuboid::new(DVec3::ZERO, DVec3::splat(2.0 * scale), DVec3::ZERO)),
-        Shape::Box(Cuboid::new(center, DVec3::new(0.5, 1.0, 1.5) * scale, DVec3::new(10.0, 20.0, 30.0))),
+        Shape::Box(OrientedBox::new(DVec3::ZERO, DVec3::splat(2.0 * scale), DVec3::ZERO)),
+        Shape::Box(OrientedBox::new(center, DVec3::new(0.5, 1.0, 1.5) * scale, DVec3::new(10.0, 20.0, 30.0))),
         triangle(DVec3::ZERO, DVec3::X, DVec3::Y),
         triangle(DVec3::new(-1.0, 0.1, -0.6), DVec3::new(1.0, 0.3, -0.9), DVec3::new(0.0, -0.2, 1.1)),
         Shape::Disk(Disk::new(DVec3::ZERO, DVec3::Z, scale)),

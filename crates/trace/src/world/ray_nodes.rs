@@ -1,7 +1,7 @@
 //! Visits the tree nodes intersected by a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{RayBoxInterval, TreeNodeSummary};
+use crate::accel::{RayBoxInterval, TreeNodeInfo};
 use crate::geometry::Ray;
 
 impl Geometry {
@@ -11,7 +11,7 @@ impl Geometry {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&Ray, &TreeNodeSummary, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&Ray, &TreeNodeInfo, &RayBoxInterval) -> bool,
     ) {
         let mut below = Vec::new();
         self.traced_tree().visit_nodes_along_ray(
@@ -21,7 +21,7 @@ impl Geometry {
         );
         for (id, above) in below {
             let (local, tree) = match (
-                self.merged_meshes_with_tree_id(id),
+                self.merged_meshes_by_tree_id(id),
                 self.objects().get(id as usize).and_then(Object::mesh),
             ) {
                 (Some(merged), _) => (*ray, merged.tree()),
@@ -29,7 +29,7 @@ impl Geometry {
                 (None, None) => continue,
             };
             tree.visit_nodes_along_ray(&local, |cell, stretch| {
-                visit(&local, &TreeNodeSummary { depth: above + cell.depth, ..*cell }, stretch)
+                visit(&local, &TreeNodeInfo { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }

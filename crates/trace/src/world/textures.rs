@@ -23,14 +23,14 @@ pub struct TextureSource {
     /// Encoding of the pixel values.
     pub encoding: ImageEncoding,
     /// Alpha cutoff at which mip levels preserve coverage. `None` for ordinary mip levels.
-    pub coverage: Option<CutoffBits>,
+    pub coverage: Option<AlphaCutoffKey>,
 }
 
 /// An alpha cutoff, stored as the bits of an `f32` so that it can be hashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct CutoffBits(u32);
+pub struct AlphaCutoffKey(u32);
 
-impl CutoffBits {
+impl AlphaCutoffKey {
     /// Converts a cutoff for opacity to a cutoff for pixel values. `factor` is the factor applied to the
     /// image.
     pub fn from_opacity_cutoff(cutoff: f32, factor: f32) -> Self {
@@ -186,7 +186,7 @@ pub fn textures_needed(
             let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
-                source: file_texture_source(texture, used),
+                source: image_file_and_encoding(texture, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
@@ -265,9 +265,9 @@ pub fn material_texture_source(
 }
 
 /// Cutoff at which an opacity texture's mip levels preserve coverage. `None` without a cutoff or mip levels.
-pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<CutoffBits> {
+pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<AlphaCutoffKey> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
-    is_covered.then(|| CutoffBits::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
+    is_covered.then(|| AlphaCutoffKey::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
 }
 
 /// How a scene material's texture is used in this role.
@@ -340,7 +340,7 @@ pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpreta
 }
 
 /// Image file and encoding for a mesh file's texture with this use.
-pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
+pub fn image_file_and_encoding(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
     let encoding = match used {
         PixelInterpretation::Color => ImageEncoding::Color,
         PixelInterpretation::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
@@ -356,7 +356,7 @@ pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> 
 pub const FILE_NUMBER: PixelInterpretation = PixelInterpretation::Number(ChannelSelector::Luminance);
 
 /// How a mesh file material's color texture is used.
-pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> PixelInterpretation {
+pub fn file_color_interpretation(own: &FileMaterial, texture: &FileTexture) -> PixelInterpretation {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
         None | Some(ChannelSelector::Opacity | ChannelSelector::Channel(Channel::Alpha)) => true,
         Some(ChannelSelector::Luminance | ChannelSelector::Channel(_) | ChannelSelector::Mask { .. }) => {
@@ -403,7 +403,9 @@ fn file_textures(
     looked_up.filter_map(|(texture, role)| {
         let texture = texture.as_ref()?;
         let used = match role.pixel_interpretation() {
-            PixelInterpretation::Color | PixelInterpretation::CutOut => file_color_use(own, texture),
+            PixelInterpretation::Color | PixelInterpretation::CutOut => {
+                file_color_interpretation(own, texture)
+            }
             PixelInterpretation::Number(ChannelSelector::Opacity) => file_opacity_use(own, texture),
             used @ (PixelInterpretation::Number(_) | PixelInterpretation::Normal) => used,
         };

@@ -109,13 +109,14 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             normal: self.placement.normal_to_world(across).normalize().as_vec3(),
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_near_edge,
-            is_coarse: f64::from(point.abs().max_element()) * COARSE < self.max_coordinate(corners),
+            is_coarse: f64::from(point.abs().max_element()) * COARSE
+                < self.triangle_coordinate_bound(corners),
         }
     }
 
     /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
-    fn max_coordinate(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+    fn triangle_coordinate_bound(&self, [a, b, c]: [DVec3; 3]) -> f64 {
         let greatest = self.placement.abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         (greatest + self.placement.mesh_origin().abs()).max_element()
     }
@@ -150,7 +151,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             return None;
         }
         let [a, b, c] = facet.corners;
-        let greatest = self.max_coordinate(facet.corners);
+        let greatest = self.triangle_coordinate_bound(facet.corners);
         let normal = self.placement.normal_to_world((b - a).cross(c - a));
         let t = (self.placement.point_to_world(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
         let point = ray.at(t);

@@ -1,7 +1,7 @@
 //! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{F32x16, KdTree, RayBoxInterval, TreeNodeSummary, WideBvh};
+use crate::accel::{F32x16, KdTree, RayBoxInterval, TreeNodeInfo, WideBvh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -27,7 +27,7 @@ impl TriangleTree {
         Ok(match accel {
             Accel::Bvh => Self::Boxes(WideBvh::build(count, corners, token)?),
             Accel::BvhHigh => Self::Boxes(WideBvh::build_with_quality(Quality::High, count, corners, token)?),
-            Accel::KdTree => Self::Planes(KdTree::build(count, corners, token)?),
+            Accel::KdTree => Self::Planes(KdTree::from_triangles(count, corners, token)?),
         })
     }
 
@@ -67,7 +67,7 @@ impl TriangleTree {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+        visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
     ) {
         match self {
             Self::Boxes(tree) => tree.visit_nodes_along_ray(ray, visit),

@@ -21,7 +21,7 @@ pub struct LightBoundingBoxPair {
 
 impl LightBoundingBoxPair {
     /// Whether the light may intersect a box.
-    pub fn meets(&self, bounds: &Aabb) -> bool {
+    pub fn may_intersect_box(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
@@ -39,11 +39,11 @@ impl LightBoundingBoxPair {
 impl World {
     /// Finds the closed glass solids that are not touched by a light. The result is empty if no glass is
     /// rough.
-    pub(super) fn find_unlit_glass(&self) -> Box<[bool]> {
+    pub(super) fn find_shadowed_glass_interiors(&self) -> Box<[bool]> {
         if !self.has_rough_glass() {
             return Box::default();
         }
-        let (objects, lamps) = (self.geometry.objects(), self.light_boxes());
+        let (objects, lamps) = (self.geometry.objects(), self.finite_light_boxes());
         let everywhere = Aabb::from_points([Vec3::NEG_INFINITY, Vec3::INFINITY]);
         // Compute the bounding box of each solid.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
@@ -55,7 +55,7 @@ impl World {
             }
         }
         // Keep the closed solids that cannot be touched by a light.
-        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
+        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.may_intersect_box(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed =
                 bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open_solid(body));
@@ -65,7 +65,7 @@ impl World {
     }
 
     /// Bounding boxes of all finite lights, with a margin for rounding.
-    pub fn light_boxes(&self) -> Vec<LightBoundingBoxPair> {
+    pub fn finite_light_boxes(&self) -> Vec<LightBoundingBoxPair> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
             let bounds = light.bounds().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
@@ -85,7 +85,7 @@ impl World {
 
     /// Whether light samples taken from inside a glass solid are always occluded.
     #[inline]
-    pub fn is_unlit_glass(&self, body: u32) -> bool {
+    pub fn is_glass_interior_shadowed(&self, body: u32) -> bool {
         self.unlit_glass.get(body as usize).copied().unwrap_or(false)
     }
 }

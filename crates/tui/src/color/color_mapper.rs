@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::bayer::bayer_threshold;
 use super::oklab::linear_to_oklab;
 use super::palette::{self, AnsiColors};
-use super::recipes::{DitherColor, PatternDither};
+use super::recipes::{DitherColor, DitherRecipeCache};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{BlockPattern, FittedCell};
@@ -41,16 +41,16 @@ struct AnsiColorMix {
 #[derive(Debug)]
 pub(crate) struct ColorMapper {
     depth: ColorDepth,
-    plain: RefCell<PatternDither>,
+    plain: RefCell<DitherRecipeCache>,
     /// Ditherer for cells drawn with shade characters on 16-color terminals.
-    mixed: RefCell<PatternDither>,
+    mixed: RefCell<DitherRecipeCache>,
     pairs: Vec<AnsiColorMix>,
 }
 
 impl ColorMapper {
     /// Creates a mapper for this color depth. `ansi` are the terminal's 16 ANSI colors.
     pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
-        let none = || RefCell::new(PatternDither::default());
+        let none = || RefCell::new(DitherRecipeCache::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
@@ -58,7 +58,7 @@ impl ColorMapper {
                 let inks = (palette::FIRST_FIXED..=u8::MAX)
                     .filter_map(palette::fixed_palette_color)
                     .map(DitherColor::solid);
-                shades.plain = RefCell::new(PatternDither::new(inks.collect(), CALM_256));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
                 let inks: Vec<DitherColor> = ansi.iter().copied().map(DitherColor::solid).collect();
@@ -67,8 +67,8 @@ impl ColorMapper {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
                     pair.level.map_or(*front, |level| DitherColor::from_pattern(front, back, LEVELS[level]))
                 });
-                shades.mixed = RefCell::new(PatternDither::new(mixed.collect(), CALM_16));
-                shades.plain = RefCell::new(PatternDither::new(inks, CALM_EDGES));
+                shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CALM_16));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks, CALM_EDGES));
             }
         }
         shades

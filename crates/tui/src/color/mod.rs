@@ -20,7 +20,7 @@ use crate::choice;
 
 choice! {
     /// Which colors to use.
-    pub enum ColorChoice {
+    pub enum ColorDepthChoice {
         /// As many colors as the terminal supports.
         Auto = "auto",
         /// 24-bit color.
@@ -48,13 +48,16 @@ pub enum ColorDepth {
 }
 
 /// Resolves the user's choice, consulting environment variables for `Auto`.
-pub(super) fn resolve_depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+pub(super) fn resolve_depth(
+    choice: ColorDepthChoice,
+    variable: impl Fn(&str) -> Option<String>,
+) -> ColorDepth {
     match choice {
-        ColorChoice::TrueColor => ColorDepth::TrueColor,
-        ColorChoice::Indexed256 => ColorDepth::Indexed256,
-        ColorChoice::Ansi16 => ColorDepth::Ansi16,
-        ColorChoice::None => ColorDepth::None,
-        ColorChoice::Auto => detect_depth(variable),
+        ColorDepthChoice::TrueColor => ColorDepth::TrueColor,
+        ColorDepthChoice::Indexed256 => ColorDepth::Indexed256,
+        ColorDepthChoice::Ansi16 => ColorDepth::Ansi16,
+        ColorDepthChoice::None => ColorDepth::None,
+        ColorDepthChoice::Auto => detect_depth(variable),
     }
 }
 
@@ -71,7 +74,7 @@ fn detect_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     let says_true = matches!(get("COLORTERM").as_str(), "truecolor" | "24bit");
     if in_screen {
         ColorDepth::Indexed256
-    } else if says_true || is_true_color(&term, &get("TERM_PROGRAM")) {
+    } else if says_true || is_known_true_color_terminal(&term, &get("TERM_PROGRAM")) {
         ColorDepth::TrueColor
     } else if ["256color", "tmux", "screen", "xterm", "rxvt"].iter().any(|name| term.contains(name)) {
         ColorDepth::Indexed256
@@ -84,7 +87,7 @@ fn is_terminal_without_colors(term: &str) -> bool {
     term == "dumb" || term.starts_with("vt1") || term.starts_with("vt2") || term.ends_with("-mono")
 }
 
-fn is_true_color(term: &str, program: &str) -> bool {
+fn is_known_true_color_terminal(term: &str, program: &str) -> bool {
     const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
     // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's name does not affect the result.
     term.ends_with("-direct")
@@ -123,7 +126,7 @@ mod tests {
     use super::*;
 
     fn auto(pairs: &[(&str, &str)]) -> ColorDepth {
-        resolve_depth(ColorChoice::Auto, |name| {
+        resolve_depth(ColorDepthChoice::Auto, |name| {
             pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
@@ -154,6 +157,6 @@ mod tests {
     fn no_color_is_honored_unless_overridden() {
         assert_eq!(auto(&[("NO_COLOR", "1"), ("COLORTERM", "truecolor")]), ColorDepth::None);
         assert_eq!(auto(&[("NO_COLOR", ""), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
-        assert_eq!(resolve_depth(ColorChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
+        assert_eq!(resolve_depth(ColorDepthChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
     }
 }

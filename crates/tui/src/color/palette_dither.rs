@@ -1,7 +1,7 @@
 //! Dithering with an arbitrary palette.
 
 use super::bayer::bayer_threshold;
-use super::recipes::{DitherColor, PatternDither};
+use super::recipes::{DitherColor, DitherRecipeCache};
 
 /// How strongly dithering favors palette colors close to the target color. Applies to palettes computed from
 /// an image.
@@ -9,12 +9,12 @@ const CALM: f32 = 1.0;
 
 /// A ditherer for one palette.
 #[derive(Debug)]
-pub(crate) struct PaletteDither(PatternDither);
+pub(crate) struct PaletteDither(DitherRecipeCache);
 
 impl PaletteDither {
     /// Creates a ditherer for these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
-        Self(PatternDither::new(colors.iter().copied().map(DitherColor::solid).collect(), CALM))
+        Self(DitherRecipeCache::new(colors.iter().copied().map(DitherColor::solid).collect(), CALM))
     }
 
     /// Returns the index of the palette color to use for `rgb` at this pixel.

@@ -50,14 +50,14 @@ impl DitherColor {
 
 /// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
-pub(super) struct PatternDither {
+pub(super) struct DitherRecipeCache {
     inks: Vec<DitherColor>,
     /// Weight given to an ink's distance from the color, relative to the error in the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
 
-impl PatternDither {
+impl DitherRecipeCache {
     /// Creates a ditherer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks
     /// near the color.
     pub(super) fn new(inks: Vec<DitherColor>, calm: f32) -> Self {
@@ -121,8 +121,8 @@ mod tests {
     use super::*;
     use crate::color::palette;
 
-    fn cube() -> PatternDither {
-        PatternDither::new(
+    fn cube() -> DitherRecipeCache {
+        DitherRecipeCache::new(
             (16..=255).filter_map(palette::fixed_palette_color).map(DitherColor::solid).collect(),
             0.1,
         )

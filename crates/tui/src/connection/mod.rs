@@ -87,7 +87,7 @@ pub(super) struct TerminalConnection {
     window: f64,
     /// Time at which the window last shrank. Slices sent before that do not shrink it again.
     shrunk: Option<Instant>,
-    round_trips: RoundTrips,
+    round_trips: MinRoundTripTracker,
     /// Round-trip times of the last slices. Small slices count too: after a slowdown, only small slices are
     /// sent, so only their replies can show that the connection has recovered.
     recent: VecDeque<Duration>,
@@ -109,7 +109,7 @@ impl TerminalConnection {
             in_flight: 0,
             window: INITIAL_WINDOW,
             shrunk: None,
-            round_trips: RoundTrips::default(),
+            round_trips: MinRoundTripTracker::default(),
             recent: VecDeque::with_capacity(RECENT_SLICES),
             heard: now,
             bucket: TokenBucket::full(now),
@@ -286,12 +286,12 @@ const QUERY_BYTES: usize = 4;
 
 /// Tracks the minimum of recent round-trip times.
 #[derive(Debug, Default)]
-struct RoundTrips {
+struct MinRoundTripTracker {
     current: Option<(Instant, Duration)>,
     before: Option<Duration>,
 }
 
-impl RoundTrips {
+impl MinRoundTripTracker {
     fn add(&mut self, round_trip: Duration, now: Instant) {
         self.current = match self.current {
             Some((since, least)) if now < since + ROUND_TRIP_AGE => Some((since, least.min(round_trip))),

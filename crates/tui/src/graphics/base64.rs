@@ -3,7 +3,7 @@
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 /// Encodes bytes in padded base64.
-pub(crate) fn encoded(bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn encode_base64(bytes: &[u8]) -> Vec<u8> {
     let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {
         let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
@@ -45,7 +45,7 @@ mod tests {
             ("foob", "Zm9vYg=="),
             ("foobar", "Zm9vYmFy"),
         ] {
-            assert_eq!(encoded(bytes.as_bytes()), text.as_bytes());
+            assert_eq!(encode_base64(bytes.as_bytes()), text.as_bytes());
             assert_eq!(decoded(text.as_bytes()), bytes.as_bytes());
         }
     }

@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::base64::encoded;
+use super::base64::encode_base64;
 use super::png::encode_png;
 use crate::film::Srgb8Image;
 
@@ -15,5 +15,5 @@ pub(super) fn encode(picture: &Srgb8Image, cells: Rect) -> Vec<u8> {
         cells.width,
         cells.height
     );
-    [keys.as_bytes(), &encoded(&png), b"\x07"].concat()
+    [keys.as_bytes(), &encode_base64(&png), b"\x07"].concat()
 }

@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::base64::encoded;
+use super::base64::encode_base64;
 use super::png::encode_png;
 use crate::film::Srgb8Image;
 
@@ -15,7 +15,7 @@ const CHUNK: usize = 4096;
 /// previous image.
 pub(super) fn encode(picture: &Srgb8Image, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
-    let data = encoded(&encode_png(picture));
+    let data = encode_base64(&encode_png(picture));
     let count = data.len().div_ceil(CHUNK);
     let mut commands = Vec::with_capacity(count);
     for (i, chunk) in data.chunks(CHUNK).enumerate() {

@@ -35,14 +35,14 @@ pub(super) enum ImageProtocol {
 
 /// An image and the cells it covers.
 #[derive(Clone, Debug)]
-pub(super) struct TerminalImage {
+pub(super) struct PlacedImage {
     pub(super) picture: Arc<Srgb8Image>,
     pub(super) cells: Rect,
     /// Width and height of a cell in pixels.
     pub(super) cell: (u16, u16),
 }
 
-impl PartialEq for TerminalImage {
+impl PartialEq for PlacedImage {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.picture, &other.picture) && (self.cells, self.cell) == (other.cells, other.cell)
     }
@@ -62,9 +62,9 @@ pub(super) struct TerminalImages {
     protocol: ImageProtocol,
     /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
-    wanted: Option<TerminalImage>,
+    wanted: Option<PlacedImage>,
     /// The image that is shown once all pieces have arrived.
-    shown: Option<TerminalImage>,
+    shown: Option<PlacedImage>,
     is_still: bool,
     /// Whether the displayed image was downscaled to save bytes.
     is_coarse: bool,
@@ -96,7 +96,7 @@ impl TerminalImages {
 
     /// Sets the image to show. `is_still` marks a final image. Returns cells that no image covers any more,
     /// which must be redrawn.
-    pub(super) fn set_target(&mut self, wanted: Option<TerminalImage>, is_still: bool) -> Option<Rect> {
+    pub(super) fn set_target(&mut self, wanted: Option<PlacedImage>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
         if self.wanted.as_ref().is_some_and(|wanted| wanted.cells == shown) {

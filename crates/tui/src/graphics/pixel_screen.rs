@@ -40,7 +40,7 @@ impl TestImageTerminal {
     }
 
     /// Number of images shown so far.
-    pub fn images_shown_so_far_count(&self) -> usize {
+    pub fn shown_image_count(&self) -> usize {
         self.count
     }
 

@@ -5,10 +5,10 @@ fn noise(level: u8, i: u32) -> [u8; 3] {
     [level, (hash >> 13) as u8, (hash >> 22) as u8]
 }
 
-fn placement(level: u8, x: u16) -> TerminalImage {
+fn placement(level: u8, x: u16) -> PlacedImage {
     let pixels = (0..64 * 48).map(|i| noise(level, i)).collect();
     let picture = Arc::new(Srgb8Image { width: 64, height: 48, pixels });
-    TerminalImage { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
+    PlacedImage { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
 }
 
 fn all(images: &mut TerminalImages) -> String {

@@ -8,12 +8,12 @@ use crate::terminals::TerminalId;
 /// A device control string (DCS) being received.
 #[derive(Debug, Default)]
 pub(super) struct DeviceControlString {
-    kind: ControlStringKind,
+    kind: DcsReplyKind,
     text: Vec<u8>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum ControlStringKind {
+enum DcsReplyKind {
     #[default]
     Other,
     /// The terminal's name and version (XTVERSION).
@@ -29,9 +29,9 @@ impl DeviceControlString {
     /// Starts a control string with these parameters.
     pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
         let kind = match (intermediates, action) {
-            (b">", '|') => ControlStringKind::Name,
-            (b"+", 'r') if first == 1 => ControlStringKind::Capability,
-            _ => ControlStringKind::Other,
+            (b">", '|') => DcsReplyKind::Name,
+            (b"+", 'r') if first == 1 => DcsReplyKind::Capability,
+            _ => DcsReplyKind::Other,
         };
         Self { kind, text: Vec::new() }
     }
@@ -44,10 +44,10 @@ impl DeviceControlString {
 
     pub(super) fn parse_reply(&self) -> TerminalReply {
         match self.kind {
-            ControlStringKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
+            DcsReplyKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
                 .map_or(TerminalReply::Other, TerminalReply::Name),
-            ControlStringKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
-            ControlStringKind::Capability | ControlStringKind::Other => TerminalReply::Other,
+            DcsReplyKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
+            DcsReplyKind::Capability | DcsReplyKind::Other => TerminalReply::Other,
         }
     }
 }

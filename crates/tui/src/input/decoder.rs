@@ -9,7 +9,7 @@ use crossterm::event::KeyCode;
 
 use super::decoded::DecodedInput;
 use super::keys::InputPerformer;
-use super::paste::Paste;
+use super::paste::PasteScanner;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
@@ -63,7 +63,7 @@ enum PendingSequence {
     /// Either the rest of a sequence whose escape character was treated as a key press, or separate key
     /// presses.
     Doubtful(Vec<u8>),
-    Paste(Paste),
+    Paste(PasteScanner),
 }
 
 impl Decoder {
@@ -103,7 +103,7 @@ impl Decoder {
 
     fn expire_pending(&mut self, now: Instant) {
         if self.deadline().is_some_and(|deadline| now >= deadline) {
-            match self.drop_and_return_sequence() {
+            match self.take_pending_sequence() {
                 PendingSequence::Escape => {
                     self.escaped = Some(now);
                     self.push_escape_key();
@@ -136,7 +136,7 @@ impl Decoder {
             PendingSequence::Sequence { bytes: 2, introducer, .. }
                 if are_three_key_presses(introducer, byte) =>
             {
-                self.drop_and_return_sequence();
+                self.take_pending_sequence();
                 self.push_escape_key();
                 self.replay(&[introducer]);
                 self.begin_sequence(byte, now);
@@ -147,9 +147,9 @@ impl Decoder {
                 }
                 self.continue_sequence(byte, (begin, bytes + 1, introducer), now);
             }
-            PendingSequence::Doubtful(bytes) => self.continue_ambiguous(bytes, byte, now),
+            PendingSequence::Doubtful(bytes) => self.continue_ambiguous_sequence(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
-                if paste.push(byte, now) {
+                if paste.scan_byte(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
                 } else {
                     self.held = PendingSequence::Paste(paste);
@@ -182,7 +182,7 @@ impl Decoder {
             }
             // Not the start of any terminal sequence.
             byte if !INTRODUCERS.contains(&byte) => {
-                self.drop_and_return_sequence();
+                self.take_pending_sequence();
                 self.push_escape_key();
                 self.begin_sequence(byte, now);
             }
@@ -200,15 +200,15 @@ impl Decoder {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
-            self.held = PendingSequence::Paste(Paste::new(now));
+            self.held = PendingSequence::Paste(PasteScanner::new(now));
         } else if bytes >= MAX_BYTES {
-            self.drop_and_return_sequence();
+            self.take_pending_sequence();
         } else if !self.meaning.has_ended {
             self.held = PendingSequence::Sequence { begin, bytes, introducer };
         }
     }
 
-    fn continue_ambiguous(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
+    fn continue_ambiguous_sequence(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
             self.continue_sequence(byte, (now, bytes.len(), b'['), now);
@@ -222,14 +222,14 @@ impl Decoder {
             bytes.push(byte);
             self.held = PendingSequence::Doubtful(bytes);
         } else {
-            self.drop_and_return_sequence();
+            self.take_pending_sequence();
             self.replay(&bytes);
             self.begin_sequence(byte, now);
         }
     }
 
     /// Drops the current sequence and returns it.
-    fn drop_and_return_sequence(&mut self) -> PendingSequence {
+    fn take_pending_sequence(&mut self) -> PendingSequence {
         self.meaning.reset();
         self.command.clear();
         self.parser = vte::Parser::default();

@@ -42,13 +42,13 @@ impl InputPerformer {
         self.is_paste = false;
     }
 
-    fn push_key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
+    fn push_decoded_key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
         self.found.push(DecodedInput::Key(KeyPress { code, modifiers }));
     }
 
     /// Handles a complete application program command.
     pub(super) fn handle_apc(&mut self, text: &[u8]) {
-        self.push_reply(control_strings::parse_apc(text));
+        self.push_decoded_reply(control_strings::parse_apc(text));
     }
 
     /// Handles a mouse report in SGR format (mode 1006). The report contains the button, its modifier bits
@@ -62,13 +62,13 @@ impl InputPerformer {
             (64, true) => MouseEventKind::WheelUp,
             (65, true) => MouseEventKind::WheelDown,
             // Other buttons are ignored.
-            _ => return self.push_reply(TerminalReply::Other),
+            _ => return self.push_decoded_reply(TerminalReply::Other),
         };
         let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
         self.found.push(DecodedInput::Mouse(MouseEvent { kind, column, row }));
     }
 
-    fn push_reply(&mut self, answer: TerminalReply) {
+    fn push_decoded_reply(&mut self, answer: TerminalReply) {
         self.found.push(DecodedInput::TerminalReply(answer));
     }
 }
@@ -82,17 +82,17 @@ impl Perform for InputPerformer {
                     '\x7f' => KeyCode::Backspace,
                     character => KeyCode::Char(character),
                 };
-                self.push_key(key, KeyModifiers::NONE);
+                self.push_decoded_key(key, KeyModifiers::NONE);
             }
             NextCharacterMode::SingleShift => {
-                if let Some(code) = letter_key(character) {
-                    self.push_key(code, KeyModifiers::NONE);
+                if let Some(code) = key_for_final_byte(character) {
+                    self.push_decoded_key(code, KeyModifiers::NONE);
                 }
             }
             NextCharacterMode::Console => {
                 if let Some(number @ 1..=5) = u8::try_from(character).ok().and_then(|it| it.checked_sub(b'@'))
                 {
-                    self.push_key(KeyCode::F(number), KeyModifiers::NONE);
+                    self.push_decoded_key(KeyCode::F(number), KeyModifiers::NONE);
                 }
             }
             NextCharacterMode::Mouse(left) => {
@@ -107,12 +107,14 @@ impl Perform for InputPerformer {
     fn execute(&mut self, byte: u8) {
         self.next = NextCharacterMode::Character;
         match byte {
-            b'\r' => self.push_key(KeyCode::Enter, KeyModifiers::NONE),
-            b'\t' => self.push_key(KeyCode::Tab, KeyModifiers::NONE),
-            0 => self.push_key(KeyCode::Char(' '), KeyModifiers::CONTROL),
-            1..=0x1a => self.push_key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL),
+            b'\r' => self.push_decoded_key(KeyCode::Enter, KeyModifiers::NONE),
+            b'\t' => self.push_decoded_key(KeyCode::Tab, KeyModifiers::NONE),
+            0 => self.push_decoded_key(KeyCode::Char(' '), KeyModifiers::CONTROL),
+            1..=0x1a => {
+                self.push_decoded_key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL)
+            }
             0x1c..=0x1f => {
-                self.push_key(KeyCode::Char(char::from(byte - 0x1c + b'4')), KeyModifiers::CONTROL);
+                self.push_decoded_key(KeyCode::Char(char::from(byte - 0x1c + b'4')), KeyModifiers::CONTROL);
             }
             _ => {}
         }
@@ -135,27 +137,27 @@ impl Perform for InputPerformer {
         let (first, second) = (number(0), number(1));
         self.has_ended = true;
         match (intermediates, action) {
-            ([], 'n') if first == 0 => self.push_reply(TerminalReply::Ready),
+            ([], 'n') if first == 0 => self.push_decoded_reply(TerminalReply::Ready),
             (b"<", 'M' | 'm') => self.push_mouse(first, (second, number(2)), action == 'M'),
             (b"?", 'c') => {
                 if params.iter().any(|param| param == [4]) {
-                    self.push_reply(TerminalReply::Images(ImageProtocol::Sixel));
+                    self.push_decoded_reply(TerminalReply::Images(ImageProtocol::Sixel));
                 }
-                self.push_reply(TerminalReply::Attributes);
+                self.push_decoded_reply(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
                 // 1 means set and 2 means reset. Other values mean unknown or permanent.
-                self.push_reply(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
+                self.push_decoded_reply(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
             // The end marker of a paste that has already expired.
             ([], '~') if first == 201 => {}
             ([], '~') => {
                 if let Some(code) = key_from_csi_number(first) {
-                    self.push_key(code, modifiers(second));
+                    self.push_decoded_key(code, modifiers(second));
                 }
             }
-            ([], 'Z') => self.push_key(KeyCode::BackTab, KeyModifiers::SHIFT),
+            ([], 'Z') => self.push_decoded_key(KeyCode::BackTab, KeyModifiers::SHIFT),
             ([], '[') => {
                 self.next = NextCharacterMode::Console;
                 self.has_ended = false;
@@ -165,22 +167,22 @@ impl Perform for InputPerformer {
                 self.has_ended = false;
             }
             // With two parameters, this is a cursor position report rather than F3.
-            ([], 'R') if params.len() > 1 => self.push_reply(TerminalReply::Other),
-            ([], 'I' | 'O') => self.push_reply(TerminalReply::Focus { is_here: action == 'I' }),
+            ([], 'R') if params.len() > 1 => self.push_decoded_reply(TerminalReply::Other),
+            ([], 'I' | 'O') => self.push_decoded_reply(TerminalReply::Focus { is_here: action == 'I' }),
             // A window size report.
-            ([], 't') => self.push_reply(TerminalReply::Other),
+            ([], 't') => self.push_decoded_reply(TerminalReply::Other),
             ([], letter) => {
-                if let Some(code) = letter_key(letter) {
-                    self.push_key(code, modifiers(second));
+                if let Some(code) = key_for_final_byte(letter) {
+                    self.push_decoded_key(code, modifiers(second));
                 }
             }
-            _ => self.push_reply(TerminalReply::Other),
+            _ => self.push_decoded_reply(TerminalReply::Other),
         }
     }
 
     fn osc_dispatch(&mut self, params: &[&[u8]], _bell_terminated: bool) {
         self.has_ended = true;
-        self.push_reply(control_strings::parse_osc(params));
+        self.push_decoded_reply(control_strings::parse_osc(params));
     }
 
     fn hook(&mut self, params: &Params, intermediates: &[u8], _ignore: bool, action: char) {
@@ -195,12 +197,12 @@ impl Perform for InputPerformer {
     fn unhook(&mut self) {
         self.has_ended = true;
         let answer = std::mem::take(&mut self.report).parse_reply();
-        self.push_reply(answer);
+        self.push_decoded_reply(answer);
     }
 }
 
 /// The key for a CSI or SS3 sequence with this final letter.
-fn letter_key(letter: char) -> Option<KeyCode> {
+fn key_for_final_byte(letter: char) -> Option<KeyCode> {
     Some(match letter {
         'A' => KeyCode::Up,
         'B' => KeyCode::Down,

@@ -21,7 +21,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 pub(super) use self::decoded::DecodedInput;
 pub(super) use self::decoder::Decoder;
-use super::event::{Event, EventSource};
+use super::event::{Event, RequiredEventSource};
 use crate::system::threads::spawn;
 
 /// Starts a thread that reads standard input. At the end of input, it reports the loss of
@@ -40,7 +40,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
                 }
             }
         }
-        let _ = events.send(Event::Lost(EventSource::Keys));
+        let _ = events.send(Event::Lost(RequiredEventSource::Keys));
     };
     spawn("keys", read)?;
     Ok(())

@@ -197,12 +197,12 @@ pub(super) struct CellDivision {
 
 impl CellGrid {
     /// Pixels per cell, horizontally.
-    pub(crate) fn columns(self) -> u32 {
+    pub(crate) fn columns_per_cell(self) -> u32 {
         if self == Self::Halves { 1 } else { 2 }
     }
 
     /// Pixels per cell, vertically. This is enough to distinguish all divisions.
-    pub(crate) fn rows(self) -> u32 {
+    pub(crate) fn rows_per_cell(self) -> u32 {
         match self {
             Self::Halves | Self::Quadrants => 2,
             Self::Sextants => 6,
@@ -212,10 +212,10 @@ impl CellGrid {
 
     /// Lists all divisions of a two-column cell, starting with halves. Successive divisions usually differ in
     /// only one part of the grid.
-    pub(super) fn divisions(self) -> &'static [CellDivision] {
-        static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
-        static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
-        static OCTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(4, &[4]));
+    pub(super) fn two_color_patterns(self) -> &'static [CellDivision] {
+        static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(2, &[2]));
+        static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(6, &[2, 3]));
+        static OCTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(4, &[4]));
         match self {
             Self::Halves => &[],
             Self::Quadrants => &QUADRANTS,
@@ -227,7 +227,7 @@ impl CellGrid {
 
 /// Lists all divisions along two-column grids for a cell with `pixel_rows` rows of pixels. `part_rows` lists
 /// the number of rows in each grid.
-fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
+fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: BlockPattern::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
@@ -253,10 +253,14 @@ mod tests {
         for (grid, count) in
             [(CellGrid::Quadrants, 7), (CellGrid::Sextants, 31 + 6), (CellGrid::Octants, 127)]
         {
-            let divisions = grid.divisions();
+            let divisions = grid.two_color_patterns();
             let mut seen = std::collections::HashSet::new();
             for CellDivision { first, tile } in divisions {
-                assert_eq!(tile.first, expand_rows(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
+                assert_eq!(
+                    tile.first,
+                    expand_rows(*first, grid.rows_per_cell(), GRID_ROWS),
+                    "{grid:?} {first:b}"
+                );
                 let [front, back] = tile.symbols();
                 assert_eq!(block_pattern_for_symbol(front), Some((*tile, false)), "{front}");
                 assert_eq!(block_pattern_for_symbol(back), Some((*tile, true)), "{back}");

@@ -24,7 +24,7 @@ pub(super) struct CandidateColors {
 
 /// Returns candidates for the first of `cells`, each of which also fits as many of the following cells as
 /// possible.
-pub(super) fn cell_color_candidates(
+pub(super) fn color_candidates_for_cell_run(
     cells: &[Option<TwoColorCell>],
     model: RateDistortion,
 ) -> CandidateColors {
@@ -57,7 +57,7 @@ fn candidate_colors_for_run(
         add(TerminalColor::Rgb(box_.shortest_encoding()));
         let index = nearest_256(box_.mean());
         let fixed = TerminalColor::Palette(index);
-        if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.contains(rgb)) {
+        if index >= FIRST_UNTOUCHED && fixed.to_rgb().is_some_and(|rgb| box_.contains(rgb)) {
             add(fixed);
         }
     }
@@ -65,7 +65,7 @@ fn candidate_colors_for_run(
 }
 
 /// The range of colors that fit every cell in a run.
-struct SharedColorRange {
+struct RunColorRange {
     low: [u8; 3],
     high: [u8; 3],
     sum: [u32; 3],
@@ -74,8 +74,8 @@ struct SharedColorRange {
 
 /// Intersects the ranges of colors within `span` of each wanted color, stopping before the intersection
 /// becomes empty.
-fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> SharedColorRange {
-    let mut common = SharedColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
+fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> RunColorRange {
+    let mut common = RunColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
         let TerminalColor::Rgb(rgb) = shade else { break };
         let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
@@ -90,7 +90,7 @@ fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> 
     common
 }
 
-impl SharedColorRange {
+impl RunColorRange {
     fn mean(&self) -> [u8; 3] {
         let count = self.count.max(1);
         let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
@@ -118,7 +118,7 @@ mod tests {
 
     fn row(values: &[u8]) -> Vec<Option<TwoColorCell>> {
         let halves = |value: &u8| {
-            TwoColorCell::halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
+            TwoColorCell::from_halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
         };
         values.iter().map(|value| Some(halves(value))).collect()
     }
@@ -126,27 +126,29 @@ mod tests {
     #[test]
     fn candidates_cover_many_following_cells() {
         // 21 is within the tolerance of 20, 21 and 22, but not of 24.
-        let found = cell_color_candidates(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
+        let found = color_candidates_for_cell_run(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
         let grays = [Some(TwoColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
-            cell_color_candidates(&grays, RateDistortion::EXACT).first,
+            color_candidates_for_cell_run(&grays, RateDistortion::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
         );
     }
 
     #[test]
     fn palette_colors_are_kept_unchanged() {
-        let cells =
-            [Some(TwoColorCell::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
-        let found = cell_color_candidates(&cells, RateDistortion::MOVING);
+        let cells = [
+            Some(TwoColorCell::from_halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])),
+            None,
+        ];
+        let found = color_candidates_for_cell_run(&cells, RateDistortion::MOVING);
         assert_eq!(
             (found.first, found.second),
             (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
-        let found = cell_color_candidates(&[None], RateDistortion::MOVING);
+        let found = color_candidates_for_cell_run(&[None], RateDistortion::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

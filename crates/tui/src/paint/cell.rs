@@ -36,13 +36,13 @@ impl TwoColorCell {
         Self { tile: if pair[0] == pair[1] { BlockPattern::HALVES } else { tile }, pair }
     }
 
-    pub(super) fn halves(pair: [TerminalColor; 2]) -> Self {
+    pub(super) fn from_halves(pair: [TerminalColor; 2]) -> Self {
         Self { tile: BlockPattern::HALVES, pair }
     }
 
     /// A cell with a single color.
     pub(super) fn uniform(shade: TerminalColor) -> Self {
-        Self::halves([shade; 2])
+        Self::from_halves([shade; 2])
     }
 
     /// The mosaic for a block character. `None` for other characters.
@@ -89,7 +89,7 @@ impl TextCell {
 
 /// The four ways to fill a cell's two parts with the pen's two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum CellFill {
+pub(super) enum ForegroundParts {
     Blank,
     First,
     Second,
@@ -103,7 +103,7 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
     .union(Modifier::RAPID_BLINK)
     .union(Modifier::CROSSED_OUT);
 
-impl CellFill {
+impl ForegroundParts {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
     /// The character that draws this tile.
@@ -141,7 +141,7 @@ impl CellFill {
     }
 
     /// Whether this glyph can show these colors.
-    pub(super) fn can_show(self, pair: [TerminalColor; 2]) -> bool {
+    pub(super) fn can_show_colors(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.part_layers();
         pair[0].is_allowed_in_layer(first)
             && pair[1].is_allowed_in_layer(second)

@@ -27,7 +27,7 @@ impl RateDistortion {
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// Returns the model with a different cost per byte, but at least the cost in [`RateDistortion::MOVING`].
-    pub(super) fn with_byte_cost(self, byte: f32) -> Self {
+    pub(super) fn with_cost_per_byte(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
             ..40.0 => Self::MOVING.spans,
@@ -39,11 +39,11 @@ impl RateDistortion {
     }
 
     /// Returns the error from showing one color instead of another. Infinite if this is not allowed.
-    pub(super) fn error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
+    pub(super) fn color_error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;
         }
-        let (Some(shown), Some(wanted)) = (shown.rgb(), wanted.rgb()) else { return f32::INFINITY };
+        let (Some(shown), Some(wanted)) = (shown.to_rgb(), wanted.to_rgb()) else { return f32::INFINITY };
         let apart: [u8; 3] = std::array::from_fn(|i| shown[i].abs_diff(wanted[i]));
         if apart.iter().any(|apart| *apart > self.most) {
             return f32::INFINITY;
@@ -59,19 +59,20 @@ mod tests {
     #[test]
     fn error_is_a_bounded_sum_of_squares() {
         let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
-        assert_eq!(RateDistortion::MOVING.error(a, b), 5.0);
-        assert_eq!(RateDistortion::EXACT.error(a, b), f32::INFINITY);
-        assert_eq!(RateDistortion::EXACT.error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(RateDistortion::MOVING.color_error(a, b), 5.0);
+        assert_eq!(RateDistortion::EXACT.color_error(a, b), f32::INFINITY);
+        assert_eq!(RateDistortion::EXACT.color_error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
         assert_eq!(
-            RateDistortion::MOVING.error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
+            RateDistortion::MOVING.color_error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
             2.0
         );
         assert_eq!(
-            RateDistortion::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
+            RateDistortion::MOVING.color_error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
             f32::INFINITY
         );
         assert_eq!(
-            RateDistortion::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
+            RateDistortion::MOVING
+                .color_error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
             0.0
         );
     }

@@ -8,14 +8,14 @@ use super::terminal_color::{ColorLayer, TerminalColor};
 
 /// Converts a buffer's rows to lines without trailing blanks. Each line starts and ends with the terminal's
 /// default colors. Without colors, the output contains no escape sequences.
-pub fn as_text_lines(buffer: &Buffer, is_colored: bool) -> String {
+pub fn buffer_to_text_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
-        let length = row.iter().rposition(is_visible).map_or(0, |last| last + 1);
+        let length = row.iter().rposition(is_visible_cell).map_or(0, |last| last + 1);
         let mut pen = Pen::RESET;
         for cell in &row[..length] {
             if is_colored {
-                pen.switch_to(&pen_of(cell).exact_requirements(), &mut bytes);
+                pen.switch_to(&pen_of_cell(cell).exact_requirements(), &mut bytes);
             }
             bytes.extend_from_slice(cell.symbol().as_bytes());
         }
@@ -25,11 +25,11 @@ pub fn as_text_lines(buffer: &Buffer, is_colored: bool) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn is_visible(cell: &Cell) -> bool {
+fn is_visible_cell(cell: &Cell) -> bool {
     cell.symbol() != " " || cell.bg != Color::Reset
 }
 
-fn pen_of(cell: &Cell) -> Pen {
+fn pen_of_cell(cell: &Cell) -> Pen {
     Pen {
         fg: TerminalColor::from_ratatui(cell.fg, ColorLayer::Foreground),
         bg: TerminalColor::from_ratatui(cell.bg, ColorLayer::Background),
@@ -51,7 +51,7 @@ mod tests {
         buffer.set_string(0, 0, "ab", Style::new().fg(Color::Red));
         buffer.set_string(2, 2, "▀", Style::new().fg(Color::Rgb(1, 2, 3)).bg(Color::Indexed(9)));
         let colored = "\u{1b}[31mab\u{1b}[0m\n\n  \u{1b}[38;2;1;2;3;101m▀\u{1b}[0m\n";
-        assert_eq!(as_text_lines(&buffer, true), colored);
-        assert_eq!(as_text_lines(&buffer, false), "ab\n\n  ▀\n");
+        assert_eq!(buffer_to_text_lines(&buffer, true), colored);
+        assert_eq!(buffer_to_text_lines(&buffer, false), "ab\n\n  ▀\n");
     }
 }

@@ -36,13 +36,13 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::fidelity::Fidelity;
-pub use self::frame_pacing::{PacingAdvice, PacingInputs, advise};
+pub use self::frame_pacing::{PacingAdvice, PacingInputs, advise_on_preview};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
-pub use self::lines::as_text_lines;
+pub use self::lines::buffer_to_text_lines;
 use self::picture::FirstPreviewByteBudget;
 pub use self::rep_support::can_repeat;
-use self::screen::{OutputSlice, ScreenModel, Stroke};
+use self::screen::{LimitedOutputSlice, ScreenModel, Stroke};
 use self::stable_cells::StableCells;
 use self::target_screen::{ScreenRegion, TargetScreen};
 use super::color::ColorDepth;
@@ -60,9 +60,9 @@ pub struct Painter {
     links: UrlTable,
     budget: FirstPreviewByteBudget,
     /// Remaining drawing steps, in order.
-    parts: vec::IntoIter<DrawStep>,
+    parts: vec::IntoIter<RowDrawStep>,
     /// The drawing step in progress.
-    part: Option<DrawStep>,
+    part: Option<RowDrawStep>,
     strokes: vec::IntoIter<Stroke>,
     /// Drawing progress for each row of the preview.
     rows: Vec<RowProgress>,
@@ -71,7 +71,7 @@ pub struct Painter {
 
 /// A step in drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum DrawStep {
+enum RowDrawStep {
     /// Draw a row's text.
     Words(u16),
     /// Draw a row of the preview.
@@ -106,7 +106,7 @@ impl Painter {
             can_repeat: false,
             screen: None,
             memory: StableCells::default(),
-            wanted: TargetScreen::empty(depth),
+            wanted: TargetScreen::without_cells(depth),
             links: UrlTable::default(),
             budget: FirstPreviewByteBudget::default(),
             parts: Vec::new().into_iter(),
@@ -129,11 +129,11 @@ impl Painter {
     /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
     /// targets change faster than they can be drawn.
     pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        self.set_target_with(wanted, picture, fidelity, &LinksAndDelayedText::default());
+        self.set_target_with_extras(wanted, picture, fidelity, &LinksAndDelayedText::default());
     }
 
     /// Like [`Painter::set_target`], but with hyperlinks and with text to be drawn after the preview.
-    pub fn set_target_with(
+    pub fn set_target_with_extras(
         &mut self,
         wanted: &Buffer,
         picture: Rect,
@@ -141,7 +141,7 @@ impl Painter {
         extras: &LinksAndDelayedText,
     ) {
         let mut wanted =
-            TargetScreen::new(wanted, picture, fidelity, self.depth).with_delayed_text(extras.later);
+            TargetScreen::new(wanted, picture, fidelity, self.depth).with_delayed_text_area(extras.later);
         for Hyperlink { cells, address } in &extras.links {
             wanted.link_cells(*cells, self.links.assign_url_number(address));
         }
@@ -153,7 +153,7 @@ impl Painter {
             self.rows = vec![RowProgress::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
-            row.is_done = row.is_done && self.wanted.row_also_satisfies(&wanted, y);
+            row.is_done = row.is_done && self.wanted.row_also_satisfies_other(&wanted, y);
             if fidelity == Fidelity::First && !row.is_done {
                 row.aim = 0;
             }
@@ -161,16 +161,16 @@ impl Painter {
         self.memory.set_target(&wanted, self.screen.as_ref());
         self.wanted = wanted;
         self.aim += 1;
-        self.restart_drawing();
+        self.requeue_draw_steps();
     }
 
-    fn restart_drawing(&mut self) {
+    fn requeue_draw_steps(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
-        let words = (0..self.wanted.rows).map(DrawStep::Words);
-        let later =
-            (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows)).map(DrawStep::Later);
-        let picture = rows.into_iter().map(DrawStep::Picture);
+        let words = (0..self.wanted.rows).map(RowDrawStep::Words);
+        let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
+            .map(RowDrawStep::Later);
+        let picture = rows.into_iter().map(RowDrawStep::Picture);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
@@ -187,7 +187,7 @@ impl Painter {
     /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before each
     /// row because planning a whole preview would delay the response to a key press too much.
     pub fn next_slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
-        let mut slice = OutputSlice { bytes: Vec::new(), most: most_bytes };
+        let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
         }
@@ -198,15 +198,16 @@ impl Painter {
         });
         loop {
             while let Some(stroke) = self.strokes.as_slice().first() {
-                if !screen.draw_if_fits(stroke, &self.links, &mut slice) {
+                if !screen.draw_stroke_if_output_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(DrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {
+                if let (Some(RowDrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke)
+                {
                     self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }
-            if let Some(DrawStep::Picture(y)) = self.part {
+            if let Some(RowDrawStep::Picture(y)) = self.part {
                 self.memory.record_row_done(y);
                 self.rows[usize::from(y)] = RowProgress { aim: self.aim, is_done: true };
             }
@@ -216,21 +217,21 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(DrawStep::Words(y)) => {
+                Some(RowDrawStep::Words(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Words)
                 }
-                Some(DrawStep::Later(y)) => {
+                Some(RowDrawStep::Later(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
                 }
-                Some(DrawStep::Picture(y))
+                Some(RowDrawStep::Picture(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
                 {
                     Vec::new()
                 }
-                Some(DrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
+                Some(RowDrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
                 }
-                Some(DrawStep::Picture(y)) => picture::plan_preview_row(
+                Some(RowDrawStep::Picture(y)) => picture::plan_preview_row(
                     screen,
                     &self.wanted,
                     &self.memory,
@@ -252,7 +253,7 @@ impl Painter {
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
             screen.damage(cells);
-            self.restart_drawing();
+            self.requeue_draw_steps();
         }
     }
 
@@ -261,6 +262,6 @@ impl Painter {
         self.screen = None;
         self.memory.invalidate();
         self.rows.fill(RowProgress::default());
-        self.restart_drawing();
+        self.requeue_draw_steps();
     }
 }

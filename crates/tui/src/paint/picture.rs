@@ -39,7 +39,7 @@ impl FirstPreviewByteBudget {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
-            self.model = self.model.with_byte_cost(self.model.byte / STEP);
+            self.model = self.model.with_cost_per_byte(self.model.byte / STEP);
         }
         loop {
             let found = plan_row(targets, start, self.model);
@@ -48,7 +48,7 @@ impl FirstPreviewByteBudget {
                 self.bytes = self.bytes.saturating_sub(bytes);
                 return found;
             }
-            self.model = self.model.with_byte_cost(self.model.byte * STEP);
+            self.model = self.model.with_cost_per_byte(self.model.byte * STEP);
         }
     }
 }
@@ -83,7 +83,7 @@ pub(super) fn plan_preview_row(
         count: 1,
     };
     let strokes: Vec<Stroke> = row.ops.into_iter().map(stroke).collect();
-    if can_repeat { Stroke::merge_repeats(&strokes) } else { strokes }
+    if can_repeat { Stroke::merge_repeated_blanks(&strokes) } else { strokes }
 }
 
 fn target_cell(

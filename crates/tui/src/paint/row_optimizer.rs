@@ -4,8 +4,8 @@
 //! colors. The cost depends on the pen and the cursor position, so the search keeps the best path for each of
 //! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
-use super::candidates::{CandidateColors, cell_color_candidates};
-use super::cell::{CellFill, TwoColorCell};
+use super::candidates::{CandidateColors, color_candidates_for_cell_run};
+use super::cell::{ForegroundParts, TwoColorCell};
 use super::cost_model::RateDistortion;
 use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
 use crate::mosaic::{BlockPattern, PLACES};
@@ -39,13 +39,13 @@ pub(super) struct RowStart {
 pub(super) struct DrawOp {
     /// Column relative to the first target cell.
     pub(super) column: usize,
-    pub(super) glyph: CellFill,
+    pub(super) glyph: ForegroundParts,
     pub(super) mosaic: TwoColorCell,
 }
 
 /// A path through the row up to some cell.
 #[derive(Clone, Copy, Debug)]
-struct PartialRowPlan {
+struct RowPrefixPlan {
     fg: TerminalColor,
     bg: TerminalColor,
     /// Both colors of the pen, packed into one key.
@@ -57,7 +57,7 @@ struct PartialRowPlan {
     /// Index of the path to the previous cell.
     parent: usize,
     /// The glyph drawn in the cell. `None` if the cell was kept.
-    glyph: Option<CellFill>,
+    glyph: Option<ForegroundParts>,
 }
 
 /// Packs two colors into one key.
@@ -74,7 +74,7 @@ enum CursorGap {
 }
 
 impl CursorGap {
-    fn move_bytes(self) -> u32 {
+    fn move_byte_count(self) -> u32 {
         match self {
             Self::Far => 8,
             Self::Cells(0) => 0,
@@ -103,7 +103,7 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDisto
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
     let first =
-        PartialRowPlan { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+        RowPrefixPlan { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut paths = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
@@ -115,23 +115,23 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDisto
 
 /// Extends the paths by one cell.
 fn extend_plans(
-    last: &[PartialRowPlan],
+    last: &[RowPrefixPlan],
     target: TargetCell,
     wanted: &[Option<TwoColorCell>],
     model: RateDistortion,
-) -> Vec<PartialRowPlan> {
+) -> Vec<RowPrefixPlan> {
     let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
             .overlapping_colors(wanted)
-            .map(|(shown, wanted, part)| part * model.error(shown, wanted))
+            .map(|(shown, wanted, part)| part * model.color_error(shown, wanted))
             .sum(),
         (Some(_), None) => f32::INFINITY,
     };
     if leave.is_finite() {
         for (parent, path) in last.iter().enumerate() {
-            beam.add(PartialRowPlan {
+            beam.add(RowPrefixPlan {
                 gap: path.gap.plus_one_cell(),
                 cost: path.cost + leave,
                 parent,
@@ -143,14 +143,17 @@ fn extend_plans(
     let Some(mosaic) = target.wanted else { return beam.paths };
     // A cell that is close enough to its target is not worth a color change, but redrawing it may be cheaper
     // than skipping it.
-    let changes =
-        if leave <= model.byte { CandidateColors::default() } else { cell_color_candidates(wanted, model) };
+    let changes = if leave <= model.byte {
+        CandidateColors::default()
+    } else {
+        color_candidates_for_cell_run(wanted, model)
+    };
     let changes = ColorChanges::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
         changes.try_single_changes(parent, path, &mut beam);
     }
     // If both colors are set, the previous pen does not matter, so extend only the cheapest path.
-    let base = |path: &PartialRowPlan| path.cost + path.gap.move_bytes() as f32 * model.byte;
+    let base = |path: &RowPrefixPlan| path.cost + path.gap.move_byte_count() as f32 * model.byte;
     if let Some((parent, path)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
         changes.try_paired_changes(parent, path, &mut beam);
@@ -160,14 +163,14 @@ fn extend_plans(
 
 /// The best paths found so far for a cell.
 struct SearchBeam {
-    paths: Vec<PartialRowPlan>,
+    paths: Vec<RowPrefixPlan>,
     /// Paths whose cost exceeds the best one by more than this are dropped.
     limit: f32,
 }
 
 impl SearchBeam {
-    fn add(&mut self, path: PartialRowPlan) {
-        let is_same = |other: &PartialRowPlan| other.pen == path.pen && other.gap == path.gap;
+    fn add(&mut self, path: RowPrefixPlan) {
+        let is_same = |other: &RowPrefixPlan| other.pen == path.pen && other.gap == path.gap;
         if let Some(other) = self.paths.iter_mut().find(|other| is_same(other)) {
             if path.cost < other.cost {
                 *other = path;
@@ -182,7 +185,7 @@ impl SearchBeam {
     }
 
     /// Returns the cost above which a path cannot enter the beam.
-    fn cost_bound(&self) -> f32 {
+    fn pruning_cost_threshold(&self) -> f32 {
         let (mut best, mut worst) = (f32::INFINITY, 0.0_f32);
         for path in &self.paths {
             (best, worst) = (best.min(path.cost), worst.max(path.cost));
@@ -219,39 +222,39 @@ impl ColorChanges {
         let change = |shade: &TerminalColor| ColorChange {
             shade: *shade,
             bytes: shade.sgr_length(),
-            errors: changes.errors(*shade),
+            errors: changes.color_error_per_part(*shade),
         };
         changes.all = first.iter().chain(second).chain(both).map(change).collect();
         changes
     }
 
     /// Returns the area-weighted error that a color causes in each part.
-    fn errors(&self, shade: TerminalColor) -> [f32; 2] {
+    fn color_error_per_part(&self, shade: TerminalColor) -> [f32; 2] {
         let sizes = self.mosaic.tile.part_sizes();
         std::array::from_fn(|part| {
             let share = 2.0 * sizes[part] as f32 / PLACES as f32;
-            share * self.model.error(shade, self.mosaic.pair[part])
+            share * self.model.color_error(shade, self.mosaic.pair[part])
         })
     }
 
     /// Extends a path by drawing with the current pen or after changing one of its colors. A color chosen for
     /// one part is used only there.
-    fn try_single_changes(&self, parent: usize, path: &PartialRowPlan, beam: &mut SearchBeam) {
+    fn try_single_changes(&self, parent: usize, path: &RowPrefixPlan, beam: &mut SearchBeam) {
         let mut ends = PlanExtension::new(self, parent, path, beam);
         if !ends.can_enter_beam() {
             return;
         }
-        let (fg_errors, bg_errors) = (self.errors(path.fg), self.errors(path.bg));
+        let (fg_errors, bg_errors) = (self.color_error_per_part(path.fg), self.color_error_per_part(path.bg));
         let pen = PenWithErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
-        for glyph in CellFill::ALL {
+        for glyph in ForegroundParts::ALL {
             ends.try_glyph(pen, 0, glyph);
         }
         for (index, change) in self.all.iter().enumerate() {
             let bytes = change.bytes + 3;
             let (as_fg, as_bg) = match index {
-                _ if index < self.first => (CellFill::First, CellFill::Second),
-                _ if index < self.second => (CellFill::Second, CellFill::First),
-                _ => (CellFill::Full, CellFill::Blank),
+                _ if index < self.first => (ForegroundParts::First, ForegroundParts::Second),
+                _ if index < self.second => (ForegroundParts::Second, ForegroundParts::First),
+                _ => (ForegroundParts::Full, ForegroundParts::Blank),
             };
             if change.shade.is_allowed_in_layer(ColorLayer::Foreground) {
                 ends.try_glyph(pen.with_fg(change), bytes, as_fg);
@@ -263,12 +266,14 @@ impl ColorChanges {
     }
 
     /// Extends a path by changing both colors of the pen.
-    fn try_paired_changes(&self, parent: usize, path: &PartialRowPlan, beam: &mut SearchBeam) {
+    fn try_paired_changes(&self, parent: usize, path: &RowPrefixPlan, beam: &mut SearchBeam) {
         let mut ends = PlanExtension::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
-                for (fg, bg, glyph) in [(first, second, CellFill::First), (second, first, CellFill::Second)] {
+                for (fg, bg, glyph) in
+                    [(first, second, ForegroundParts::First), (second, first, ForegroundParts::Second)]
+                {
                     if fg.shade.is_allowed_in_layer(ColorLayer::Foreground)
                         && bg.shade.is_allowed_in_layer(ColorLayer::Background)
                     {
@@ -296,12 +301,12 @@ struct PlanExtension<'a> {
 }
 
 impl<'a> PlanExtension<'a> {
-    fn new(changes: &ColorChanges, parent: usize, path: &PartialRowPlan, beam: &'a mut SearchBeam) -> Self {
+    fn new(changes: &ColorChanges, parent: usize, path: &RowPrefixPlan, beam: &'a mut SearchBeam) -> Self {
         let byte = changes.model.byte;
         let error = path.cost - path.bytes as f32 * byte;
-        let bound = beam.cost_bound();
+        let bound = beam.pruning_cost_threshold();
         let tile = changes.mosaic.tile;
-        Self { parent, bytes: path.bytes + path.gap.move_bytes(), error, byte, tile, beam, bound }
+        Self { parent, bytes: path.bytes + path.gap.move_byte_count(), error, byte, tile, beam, bound }
     }
 
     /// Whether any glyph drawn here could be cheap enough to enter the beam.
@@ -309,9 +314,9 @@ impl<'a> PlanExtension<'a> {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
-    fn try_glyph(&mut self, ends: PenWithErrors, sgr: u32, glyph: CellFill) {
+    fn try_glyph(&mut self, ends: PenWithErrors, sgr: u32, glyph: ForegroundParts) {
         // Inverting the medium shade yields a different pattern but the same character.
-        if glyph == CellFill::Second && self.tile == BlockPattern::MEDIUM {
+        if glyph == ForegroundParts::Second && self.tile == BlockPattern::MEDIUM {
             return;
         }
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
@@ -320,8 +325,8 @@ impl<'a> PlanExtension<'a> {
             let PenWithErrors { fg, bg, .. } = ends;
             let parent = self.parent;
             let (pen, gap, glyph) = (pen_key(fg, bg), CursorGap::Cells(0), Some(glyph));
-            self.beam.add(PartialRowPlan { fg, bg, pen, gap, bytes, cost, parent, glyph });
-            self.bound = self.beam.cost_bound();
+            self.beam.add(RowPrefixPlan { fg, bg, pen, gap, bytes, cost, parent, glyph });
+            self.bound = self.beam.pruning_cost_threshold();
         }
     }
 }
@@ -348,7 +353,7 @@ impl PenWithErrors {
         Self { bg: change.shade, bg_errors: change.errors, ..self }
     }
 
-    fn error(&self, glyph: CellFill) -> f32 {
+    fn error(&self, glyph: ForegroundParts) -> f32 {
         let of = |part: usize| match glyph.part_layers()[part] {
             ColorLayer::Foreground => self.fg_errors[part],
             ColorLayer::Background => self.bg_errors[part],
@@ -358,7 +363,7 @@ impl PenWithErrors {
 }
 
 /// Traces the cheapest path back from the last cell.
-fn trace_back(paths: &[Vec<PartialRowPlan>], wanted: &[Option<TwoColorCell>]) -> PlannedRow {
+fn trace_back(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoColorCell>]) -> PlannedRow {
     let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));
@@ -392,7 +397,7 @@ mod tests {
         halves
             .iter()
             .map(|halves| TargetCell {
-                wanted: Some(TwoColorCell::halves(*halves)),
+                wanted: Some(TwoColorCell::from_halves(*halves)),
                 shown: Some(TwoColorCell::uniform(TerminalColor::DefaultBackground)),
             })
             .collect()
@@ -409,8 +414,8 @@ mod tests {
             start(BLACK, TerminalColor::DefaultBackground),
             RateDistortion::EXACT,
         );
-        let glyphs: Vec<CellFill> = found.ops.iter().map(|op| op.glyph).collect();
-        assert_eq!(glyphs, [CellFill::Blank, CellFill::Blank, CellFill::First]);
+        let glyphs: Vec<ForegroundParts> = found.ops.iter().map(|op| op.glyph).collect();
+        assert_eq!(glyphs, [ForegroundParts::Blank, ForegroundParts::Blank, ForegroundParts::First]);
         // ESC [ 48;2;200;0;0 m, followed by the glyphs.
         assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
     }
@@ -419,7 +424,7 @@ mod tests {
     fn unchanged_cells_are_skipped() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
-            target.shown = Some(TwoColorCell::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
+            target.shown = Some(TwoColorCell::from_halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
         let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
@@ -438,7 +443,7 @@ mod tests {
             [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultForeground; 2],
         ] {
-            let targets = [TargetCell { wanted: Some(TwoColorCell::halves(halves)), shown: None }];
+            let targets = [TargetCell { wanted: Some(TwoColorCell::from_halves(halves)), shown: None }];
             let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
@@ -481,7 +486,7 @@ mod tests {
             let mut screen: Vec<Option<TwoColorCell>> = targets.iter().map(|target| target.shown).collect();
             for op in &found.ops {
                 prop_assert!(targets[op.column].wanted.is_some(), "not part of the preview");
-                prop_assert!(op.glyph.can_show(op.mosaic.pair));
+                prop_assert!(op.glyph.can_show_colors(op.mosaic.pair));
                 screen[op.column] = Some(op.mosaic);
             }
             for (shown, target) in screen.iter().zip(&targets) {
@@ -490,7 +495,7 @@ mod tests {
                 for (shown, wanted, part) in shown.overlapping_colors(wanted) {
                     // Larger errors in a single channel should be avoided at any cost.
                     let most = if is_exact { 3.0 } else { RateDistortion::MOVING.byte * 120.0 };
-                    prop_assert!(part * model.error(shown, wanted) <= most);
+                    prop_assert!(part * model.color_error(shown, wanted) <= most);
                 }
             }
         }

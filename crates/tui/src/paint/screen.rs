@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, CellFill, TextCell, TwoColorCell};
+use super::cell::{CellContent, ForegroundParts, TextCell, TwoColorCell};
 use super::cursor_moves::{self, CellPosition};
 use super::hyperlinks::{LINK_OFF, UrlTable};
 use super::pen::Pen;
@@ -10,7 +10,7 @@ use super::terminal_color::TerminalColor;
 
 /// Bytes to be written together.
 #[derive(Debug)]
-pub(super) struct OutputSlice {
+pub(super) struct LimitedOutputSlice {
     pub(super) bytes: Vec<u8>,
     /// Maximum length, unless a single cell needs more.
     pub(super) most: usize,
@@ -22,7 +22,7 @@ pub(super) enum Stroke {
     /// A character.
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
-    Mosaic { at: CellPosition, glyph: CellFill, mosaic: TwoColorCell, count: u16 },
+    Mosaic { at: CellPosition, glyph: ForegroundParts, mosaic: TwoColorCell, count: u16 },
     /// `count` blanks with the terminal's default background, or a sequence that erases to the end of the row
     /// if `count` is `None`.
     Erase { at: CellPosition, count: Option<u16> },
@@ -38,14 +38,14 @@ impl Stroke {
 
     /// Replaces runs of equal blanks with REP where this is shorter. Only blanks are repeated because some
     /// terminals support REP only for ASCII characters.
-    pub(super) fn merge_repeats(strokes: &[Self]) -> Vec<Self> {
+    pub(super) fn merge_repeated_blanks(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::is_repeated_by) {
             let count = run.len() as u16;
-            if let [Self::Mosaic { at, glyph: CellFill::Blank, mosaic, .. }, _, ..] = run
+            if let [Self::Mosaic { at, glyph: ForegroundParts::Blank, mosaic, .. }, _, ..] = run
                 && run.len() > 1 + cursor_moves::csi_with_count(count - 1, b'b').len()
             {
-                shorter.push(Self::Mosaic { at: *at, glyph: CellFill::Blank, mosaic: *mosaic, count });
+                shorter.push(Self::Mosaic { at: *at, glyph: ForegroundParts::Blank, mosaic: *mosaic, count });
             } else {
                 shorter.extend_from_slice(run);
             }
@@ -91,7 +91,7 @@ impl ScreenModel {
     }
 
     /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
-    pub(super) fn push_clear_sequence(links: &UrlTable, slice: &mut OutputSlice) {
+    pub(super) fn push_clear_sequence(links: &UrlTable, slice: &mut LimitedOutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
         }
@@ -124,14 +124,14 @@ impl ScreenModel {
     }
 
     /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
-    pub(super) fn draw_if_fits(
+    pub(super) fn draw_stroke_if_output_fits(
         &mut self,
         stroke: &Stroke,
         links: &UrlTable,
-        slice: &mut OutputSlice,
+        slice: &mut LimitedOutputSlice,
     ) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
-        self.push_stroke(stroke, links, &mut slice.bytes);
+        self.encode_stroke(stroke, links, &mut slice.bytes);
         if start > 0 && slice.bytes.len() > slice.most {
             slice.bytes.truncate(start);
             self.pen = pen;
@@ -141,12 +141,12 @@ impl ScreenModel {
         true
     }
 
-    fn push_stroke(&mut self, stroke: &Stroke, links: &UrlTable, bytes: &mut Vec<u8>) {
+    fn encode_stroke(&mut self, stroke: &Stroke, links: &UrlTable, bytes: &mut Vec<u8>) {
         let (at, requirements) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
             Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.pen_requirements(mosaic.pair)),
             Stroke::Erase { at, .. } => {
-                (at, CellFill::Blank.pen_requirements([TerminalColor::DefaultBackground; 2]))
+                (at, ForegroundParts::Blank.pen_requirements([TerminalColor::DefaultBackground; 2]))
             }
         };
         cursor_moves::push_shortest_move(self.cursor, *at, bytes);
@@ -177,13 +177,14 @@ impl ScreenModel {
             Stroke::Text { at, text } => {
                 self.store_cell(*at, CellContent::Text(text.clone()), text.columns);
                 // Terminals disagree about the width of other characters.
-                self.cursor = if text.is_single_narrow_char() { self.position_after(*at, 1) } else { None };
+                self.cursor =
+                    if text.is_single_narrow_char() { self.position_after_columns(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
                 for x in at.x..at.x + count {
                     self.store_cell(CellPosition { x, ..*at }, CellContent::Mosaic(*mosaic), 1);
                 }
-                self.cursor = self.position_after(*at, *count);
+                self.cursor = self.position_after_columns(*at, *count);
             }
             Stroke::Erase { at, count } => {
                 for x in at.x..count.map_or(self.columns, |count| at.x + count) {
@@ -196,7 +197,7 @@ impl ScreenModel {
 
     /// Returns the cursor position `columns` to the right. `None` past the last column, where terminals
     /// differ.
-    fn position_after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
+    fn position_after_columns(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }
 

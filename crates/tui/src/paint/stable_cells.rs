@@ -70,7 +70,7 @@ impl StableCells {
         self.newest = places.map(|(x, y)| wanted.preview_cell(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
-            *steady = first.zip(*newest).is_some_and(|(a, b)| color_difference(a, b) <= ALIKE);
+            *steady = first.zip(*newest).is_some_and(|(a, b)| max_channel_difference(a, b) <= ALIKE);
         }
     }
 
@@ -85,7 +85,7 @@ impl StableCells {
                     screen.content(CellPosition { x, y }),
                     wanted.preview_cell(x, y),
                 ) {
-                    counts[usize::from(color_difference(*shown, wanted))] += 1;
+                    counts[usize::from(max_channel_difference(*shown, wanted))] += 1;
                 }
             }
         }
@@ -108,7 +108,7 @@ impl StableCells {
         shown
             .filter(|shown| {
                 self.is_steady(at)
-                    && (self.noise == u8::MAX || color_difference(*shown, wanted) <= self.noise)
+                    && (self.noise == u8::MAX || max_channel_difference(*shown, wanted) <= self.noise)
             })
             .unwrap_or(wanted)
     }
@@ -156,8 +156,8 @@ fn noise_threshold(median: usize) -> u8 {
 }
 
 /// The largest channel difference between two mosaics. 255 if their colors cannot be compared.
-fn color_difference(a: TwoColorCell, b: TwoColorCell) -> u8 {
-    let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
+fn max_channel_difference(a: TwoColorCell, b: TwoColorCell) -> u8 {
+    let one = |a: TerminalColor, b: TerminalColor| match (a.to_rgb(), b.to_rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
         _ => u8::MAX,

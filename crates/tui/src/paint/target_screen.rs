@@ -31,7 +31,7 @@ pub(super) enum ScreenRegion {
 
 impl TargetScreen {
     /// A target screen without cells.
-    pub(super) fn empty(depth: ColorDepth) -> Self {
+    pub(super) fn without_cells(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
     }
 
@@ -41,7 +41,7 @@ impl TargetScreen {
         Self {
             columns,
             rows,
-            contents: buffer_contents(buffer, depth),
+            contents: cell_contents(buffer, depth),
             picture,
             later: Rect::ZERO,
             fidelity,
@@ -59,7 +59,7 @@ impl TargetScreen {
     }
 
     /// Whether a row drawn for this target would also satisfy `other`.
-    pub(super) fn row_also_satisfies(&self, other: &Self, y: u16) -> bool {
+    pub(super) fn row_also_satisfies_other(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
                 && other.fidelity == Fidelity::Moving);
@@ -80,7 +80,7 @@ impl TargetScreen {
     }
 
     /// Sets the cells whose text is drawn after the preview. Blank cells are not delayed.
-    pub(super) fn with_delayed_text(self, later: Rect) -> Self {
+    pub(super) fn with_delayed_text_area(self, later: Rect) -> Self {
         Self { later, ..self }
     }
 
@@ -96,7 +96,7 @@ impl TargetScreen {
     }
 
     /// The region that a cell belongs to.
-    pub(super) fn region(&self, x: u16, y: u16) -> ScreenRegion {
+    pub(super) fn region_at(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
             () if self.is_preview(x, y) => ScreenRegion::Picture,
             () if !self.later.contains((x, y).into()) => ScreenRegion::Words,
@@ -134,7 +134,7 @@ impl TargetScreen {
 }
 
 /// Contents of a buffer's cells.
-pub(super) fn buffer_contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
+pub(super) fn cell_contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
     let mut contents: Vec<CellContent> =
         buffer.content.iter().map(|cell| CellContent::from_cell(cell, depth)).collect();

@@ -73,7 +73,7 @@ impl TerminalColor {
     }
 
     /// The sRGB value, if known.
-    pub(super) fn rgb(self) -> Option<[u8; 3]> {
+    pub(super) fn to_rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),
             Self::Palette(index) => fixed_palette_color(index),
@@ -168,10 +168,10 @@ mod tests {
 
     #[test]
     fn fixed_colors_match_xterm() {
-        assert_eq!(TerminalColor::Palette(16).rgb(), Some([0, 0, 0]));
-        assert_eq!(TerminalColor::Palette(67).rgb(), Some([95, 135, 175]));
-        assert_eq!(TerminalColor::Palette(231).rgb(), Some([255, 255, 255]));
-        assert_eq!(TerminalColor::Palette(255).rgb(), Some([238, 238, 238]));
-        assert_eq!(TerminalColor::Palette(15).rgb(), None);
+        assert_eq!(TerminalColor::Palette(16).to_rgb(), Some([0, 0, 0]));
+        assert_eq!(TerminalColor::Palette(67).to_rgb(), Some([95, 135, 175]));
+        assert_eq!(TerminalColor::Palette(231).to_rgb(), Some([255, 255, 255]));
+        assert_eq!(TerminalColor::Palette(255).to_rgb(), Some([238, 238, 238]));
+        assert_eq!(TerminalColor::Palette(15).to_rgb(), None);
     }
 }

@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 use super::cell::CellContent;
-use super::target_screen::buffer_contents;
+use super::target_screen::cell_contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
@@ -51,7 +51,7 @@ impl TestTerminal {
     /// differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
-        let contents = buffer_contents(wanted, depth);
+        let contents = cell_contents(wanted, depth);
         for (i, look) in contents.iter().enumerate() {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
@@ -74,7 +74,7 @@ fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     if a == b {
         return Some(0);
     }
-    let (a, b) = (a.rgb()?, b.rgb()?);
+    let (a, b) = (a.to_rgb()?, b.to_rgb()?);
     a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
 }
 
@@ -352,7 +352,7 @@ fn delayed_text_is_drawn_after_the_preview() {
         [LinksAndDelayedText { later, ..LinksAndDelayedText::default() }, LinksAndDelayedText::default()]
     {
         let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        test.painter.set_target_with(&buffer, PICTURE, Fidelity::Still, &extras);
+        test.painter.set_target_with_extras(&buffer, PICTURE, Fidelity::Still, &extras);
         let mut cells_before = None;
         while test.slice(60) {
             let text = test.terminal.screen().contents();
@@ -382,7 +382,7 @@ fn hyperlink_covers_only_its_cells() {
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
     let mut sent = |extras: &LinksAndDelayedText| {
-        painter.set_target_with(&buffer, PICTURE, Fidelity::Still, extras);
+        painter.set_target_with_extras(&buffer, PICTURE, Fidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
             let slice = painter.next_slice(100);

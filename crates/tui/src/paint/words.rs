@@ -1,6 +1,6 @@
 //! Plans the drawing of text, which is always exact.
 
-use super::cell::{CellContent, CellFill};
+use super::cell::{CellContent, ForegroundParts};
 use super::cursor_moves::{self, CellPosition};
 use super::screen::{ScreenModel, Stroke};
 use super::target_screen::{ScreenRegion, TargetScreen};
@@ -22,7 +22,7 @@ pub(super) fn plan_text_row(
     for x in 0..wanted.columns {
         let at = CellPosition { x, y };
         let look = &wanted.row(y)[usize::from(x)];
-        if screen.content(at) == look || wanted.region(x, y) != region {
+        if screen.content(at) == look || wanted.region_at(x, y) != region {
             continue;
         }
         if let Some(stroke) = stroke_for_cell(at, look) {
@@ -37,7 +37,7 @@ fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     match look {
         CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
-            let glyph = CellFill::ALL.into_iter().find(|glyph| glyph.can_show(mosaic.pair))?;
+            let glyph = ForegroundParts::ALL.into_iter().find(|glyph| glyph.can_show_colors(mosaic.pair))?;
             Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         CellContent::Unknown | CellContent::Covered => None,
@@ -61,7 +61,7 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
                 if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() =>
             {
                 bytes += 1;
-                between.push(Stroke::Mosaic { at, glyph: CellFill::Blank, mosaic: *mosaic, count: 1 });
+                between.push(Stroke::Mosaic { at, glyph: ForegroundParts::Blank, mosaic: *mosaic, count: 1 });
             }
             CellContent::Text(_) | CellContent::Mosaic(_) | CellContent::Unknown | CellContent::Covered => {
                 return;

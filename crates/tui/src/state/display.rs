@@ -7,13 +7,13 @@ use crate::color::{AnsiColors, ColorDepth, ColorMapper};
 use crate::event::{PreviewSendReport, WindowSize};
 use crate::graphics::ImageProtocol;
 use crate::mosaic::CellGrid;
-use crate::pixel_request::ImageProtocolRequest;
+use crate::pixel_request::UnconfirmedImageProtocol;
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
-use crate::terminals::Capabilities;
+use crate::terminals::DesktopCapabilities;
 
 /// Window size, terminal capabilities and preview settings.
-pub(crate) struct DisplayState {
+pub(crate) struct TerminalDisplayState {
     pub window: WindowSize,
     pub kind: PreviewKind,
     pub depth: ColorDepth,
@@ -23,7 +23,7 @@ pub(crate) struct DisplayState {
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text.
-    pub capabilities: Capabilities,
+    pub capabilities: DesktopCapabilities,
     /// How long a render must run before its end triggers a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Whether the window is focused, according to the terminal.
@@ -31,14 +31,14 @@ pub(crate) struct DisplayState {
     /// Whether the terminal's background is light.
     pub is_light: bool,
     /// The user's request to draw pixels, while the terminal has not confirmed it.
-    pub pixels: Option<ImageProtocolRequest>,
+    pub pixels: Option<UnconfirmedImageProtocol>,
     /// Time at which a missing confirmation is reported.
     pub pixels_until: Option<Instant>,
     /// Bytes and round-trip time for sending the last preview.
     pub frame: Option<PreviewSendReport>,
 }
 
-impl DisplayState {
+impl TerminalDisplayState {
     pub(super) fn new(setup: &InitialState, now: Instant) -> Self {
         let pixels = setup.ask.pixels.filter(|request| !request.is_known);
         Self {
@@ -78,7 +78,7 @@ impl DisplayState {
                 let affordable = (most / squares.max(1.0)).sqrt() as u32;
                 u32::from(window.cell_pixels.0).min(affordable).clamp(1, MAX)
             }
-            kind => kind.grid().map_or(1, CellGrid::columns),
+            kind => kind.grid().map_or(1, CellGrid::columns_per_cell),
         }
     }
 

@@ -11,19 +11,19 @@ mod work;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-pub(super) use self::display::DisplayState;
-pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, Pane, ViewList};
+pub(super) use self::display::TerminalDisplayState;
+pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewList};
 pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, KeyOverrides, RequestState, format_stops};
-pub(super) use self::saving::{SavingState, SceneImageProgress, UndisplayedChange, WrittenFile};
-pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
+pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
+pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
 pub(super) use self::work::{AssetProgressBar, RenderState, WorkState, WorkerActivity};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::WindowSize;
 use super::options::ExternalChange;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
-use super::terminals::Capabilities;
+use super::terminals::DesktopCapabilities;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -41,7 +41,7 @@ pub(super) struct InitialState {
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text, according to environment variables.
-    pub capabilities: Capabilities,
+    pub capabilities: DesktopCapabilities,
     /// How long a render must run before its end triggers a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }
@@ -50,10 +50,10 @@ pub(super) struct InitialState {
 pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
-    pub display: DisplayState,
+    pub display: TerminalDisplayState,
     pub picture: PictureState,
-    pub saving: SavingState,
-    pub selection: SelectionState,
+    pub saving: SavedFilesState,
+    pub selection: PointerState,
     pub overlays: OverlayState,
 
     /// Time when the newest event arrived.
@@ -68,12 +68,12 @@ pub(super) struct State {
 impl State {
     pub(super) fn new(setup: InitialState, now: Instant) -> Self {
         Self {
-            display: DisplayState::new(&setup, now),
+            display: TerminalDisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
             work: WorkState::new(now),
             picture: PictureState::default(),
-            saving: SavingState::new(),
-            selection: SelectionState::new(),
+            saving: SavedFilesState::new(),
+            selection: PointerState::new(),
             overlays: OverlayState::default(),
             now,
             dirty: true,

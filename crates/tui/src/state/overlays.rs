@@ -25,7 +25,7 @@ pub(crate) struct ViewList {
 
 /// A scrollable pane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Pane {
+pub(crate) struct PaneState {
     pub open: bool,
     /// Index of the first line shown.
     pub scroll: usize,
@@ -52,8 +52,8 @@ pub(crate) struct OverlayState {
     /// Whether the warnings belong to the newest request.
     pub are_warnings_known: bool,
     /// The pane that lists errors and warnings.
-    pub diagnostics: Pane,
-    pub help: Pane,
+    pub diagnostics: PaneState,
+    pub help: PaneState,
     pub views: Option<ViewList>,
 }
 

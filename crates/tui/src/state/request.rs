@@ -7,8 +7,8 @@ use std::time::Instant;
 use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FileRead;
-use crate::pipeline::protocol::{NormalizedRect, PreviewSize, Viewpoint};
-use crate::pipeline::settings::{AdjustableSettings, CameraChange, EffectiveSettings, Overrides, ViewMode};
+use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
+use crate::pipeline::settings::{CameraOverrides, EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{has_mesh_extension, list_changes};
@@ -21,17 +21,17 @@ pub(crate) struct KeyOverrides {
     pub dof: Option<bool>,
     pub photons: Option<bool>,
     pub view: Option<ViewMode>,
-    pub camera: CameraChange,
+    pub camera: CameraOverrides,
     pub exposure: Option<f32>,
 }
 
 impl KeyOverrides {
     /// Formats the settings as command-line options. A camera position replaces the scene's orbiter camera,
     /// so the options then also include the field of view and focus of `orbiter`.
-    pub(crate) fn as_command_line_options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
+    pub(crate) fn as_command_line_options(&self, orbiter: Option<ResolvedCamera>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
-        let CameraChange { pose, fov, focus } = self.camera;
+        let CameraOverrides { pose, fov, focus } = self.camera;
         let mut options: Vec<String> = [
             self.integrator.map(|it| format!("--integrator {}", it.name())),
             self.shadows.map(|it| format!("--shadows {}", it.name())),
@@ -59,7 +59,7 @@ impl KeyOverrides {
 
     /// Describes settings that differ from `before`. If `is_camera_written`, a camera reset is omitted
     /// because it only reflects the camera's move into the scene.
-    pub(crate) fn describe_differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
+    pub(crate) fn describe_changes_since(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.has_changes().then(|| "moved".to_owned());
         let name = |name: &str| name.to_owned();
@@ -168,7 +168,7 @@ pub(crate) struct RequestState {
     /// Whether the newest request differs from the previous one only in exposure.
     pub is_exposure_only: bool,
     /// Preview size in the newest request.
-    pub preview_size: Option<PreviewSize>,
+    pub preview_size: Option<MaxPreviewSize>,
     /// Time when a new preview size will be requested.
     pub resize_due: Option<Instant>,
     /// Section of the image to render first.
@@ -177,7 +177,7 @@ pub(crate) struct RequestState {
     /// The first request whose camera was moved with keys.
     pub moved_since: Option<u64>,
     /// Values that the moved camera parts had in the scene before the first move.
-    pub moved_from: CameraChange,
+    pub moved_from: CameraOverrides,
 
     /// Text of the scene file for the newest valid request.
     pub text: Option<Arc<str>>,
@@ -186,11 +186,11 @@ pub(crate) struct RequestState {
     /// Effective settings, as reported by the worker.
     pub effective: Option<EffectiveSettings>,
     /// The scene's own camera for the newest valid request.
-    pub camera: Option<Viewpoint>,
+    pub camera: Option<ResolvedCamera>,
     /// The scene's own exposure in stops.
     pub exposure: Option<f32>,
     /// Other scene settings that keys can change.
-    pub own: Option<AdjustableSettings>,
+    pub own: Option<KeyboardSettings>,
 }
 
 impl RequestState {
@@ -207,7 +207,7 @@ impl RequestState {
             first_section: None,
             camera_step: CameraStepStatus::default(),
             moved_since: None,
-            moved_from: CameraChange::default(),
+            moved_from: CameraOverrides::default(),
             text: None,
             files: Arc::default(),
             effective: None,
@@ -249,13 +249,13 @@ impl RequestState {
 
     /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
     pub(crate) fn overrides_for_scene_image(&self) -> Option<Box<Overrides>> {
-        (!self.has_no_key_overrides()).then(|| Box::new(self.command_line.clone()))
+        (!self.has_no_keyboard_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 
     /// Drops key changes that have been saved to the scene.
     pub(crate) fn drop_saved_changes(&mut self) {
         let (shadows, integrator, photons) =
-            (self.base_shadows(), self.base_integrator(), self.base_photons());
+            (self.base_shadows(), self.base_integrator(), self.base_photons_enabled());
         let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
         let KeyOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
@@ -267,7 +267,7 @@ impl RequestState {
     }
 
     /// The camera, including changes made with keys. `None` until a valid scene has been read.
-    pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
+    pub(crate) fn viewpoint(&self) -> Option<ResolvedCamera> {
         self.camera.map(|camera| camera.with_change(&self.toggles.camera))
     }
 
@@ -276,7 +276,7 @@ impl RequestState {
     pub(crate) fn record_original_camera(&mut self) {
         let Some(own) = self.camera else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
-        self.moved_from = CameraChange {
+        self.moved_from = CameraOverrides {
             pose: moved.pose.and(from.pose.or(Some(own.pose))),
             fov: moved.fov.and(from.fov.or(Some(own.fov))),
             focus: moved.focus.and(from.focus.or(Some(own.focus))),
@@ -284,8 +284,8 @@ impl RequestState {
     }
 
     /// Makes the scene's current camera the starting point for camera movement.
-    pub(crate) fn rebase_moves_on_scene(&mut self) {
-        self.moved_from = CameraChange::default();
+    pub(crate) fn reset_move_origin_to_scene_camera(&mut self) {
+        self.moved_from = CameraOverrides::default();
         self.record_original_camera();
     }
 
@@ -316,8 +316,8 @@ impl RequestState {
     }
 
     /// Describes camera, focus and exposure changes made with keys, which may not be obvious from the image.
-    pub(crate) fn describe_key_changes(&self) -> Vec<String> {
-        let CameraChange { pose, fov, focus } = self.toggles.camera;
+    pub(crate) fn describe_keyboard_changes(&self) -> Vec<String> {
+        let CameraOverrides { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
         let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
@@ -327,17 +327,17 @@ impl RequestState {
 
     /// Whether this is the scene's own image, without changes made with keys. Only this image is written
     /// automatically.
-    pub(crate) fn has_no_key_overrides(&self) -> bool {
+    pub(crate) fn has_no_keyboard_overrides(&self) -> bool {
         self.toggles == KeyOverrides::default()
     }
 
     /// The initial view, before any key changes it.
-    pub(crate) fn base_view(&self) -> ViewMode {
+    pub(crate) fn base_view_mode(&self) -> ViewMode {
         self.command_line.view.unwrap_or(ViewMode::Beauty)
     }
 
     pub(crate) fn view_mode(&self) -> ViewMode {
-        self.toggles.view.unwrap_or_else(|| self.base_view())
+        self.toggles.view.unwrap_or_else(|| self.base_view_mode())
     }
 
     /// Shadows set by the scene or the command line. `None` until a valid scene has been read.
@@ -346,19 +346,19 @@ impl RequestState {
     }
 
     /// The current shadow type.
-    pub(crate) fn shadows(&self) -> ShadowMode {
+    pub(crate) fn shadow_mode(&self) -> ShadowMode {
         self.toggles.shadows.or(self.base_shadows()).unwrap_or(ShadowMode::Soft)
     }
 
     /// Whether photons are enabled by the scene or the command line. `None` until a valid scene has been
     /// read.
-    pub(crate) fn base_photons(&self) -> Option<bool> {
+    pub(crate) fn base_photons_enabled(&self) -> Option<bool> {
         self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
     /// Whether photons are currently enabled.
-    pub(crate) fn photons(&self) -> bool {
-        self.toggles.photons.or(self.base_photons()).unwrap_or(false)
+    pub(crate) fn are_photons_enabled(&self) -> bool {
+        self.toggles.photons.or(self.base_photons_enabled()).unwrap_or(false)
     }
 
     /// Integrator set by the scene or the command line. `None` until a valid scene has been read.

@@ -7,7 +7,7 @@ use super::request::KeyOverrides;
 use crate::event::WriteFailure;
 use crate::messages;
 use crate::options::ExternalChange;
-use crate::pipeline::protocol::{SavedSceneImageState, SceneFileEdit, Viewpoint};
+use crate::pipeline::protocol::{ResolvedCamera, SavedCameraEdit, SavedSceneImageState};
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// A saved change that is not on the screen yet.
@@ -46,7 +46,7 @@ pub(crate) struct WrittenFile {
 
 impl WrittenFile {
     /// The file's path, safe to display.
-    pub(crate) fn display_path(&self) -> String {
+    pub(crate) fn escaped_path(&self) -> String {
         escape_invisible_chars(&self.path.to_string_lossy()).into_owned()
     }
 
@@ -59,17 +59,17 @@ impl WrittenFile {
                 messages::output_modified_externally
             }
         };
-        self.lost.map(|lost| describe(lost)(&self.display_path(), lost.describe()))
+        self.lost.map(|lost| describe(lost)(&self.escaped_path(), lost.describe()))
     }
 
     /// Describes the changes made with keys that the file includes.
-    pub(crate) fn describe_key_changes(&self) -> Vec<String> {
-        self.shows.unwrap_or_default().describe_differences(&KeyOverrides::default(), false)
+    pub(crate) fn describe_keyboard_changes(&self) -> Vec<String> {
+        self.shows.unwrap_or_default().describe_changes_since(&KeyOverrides::default(), false)
     }
 }
 
 /// State of saved scene files and written images.
-pub(crate) struct SavingState {
+pub(crate) struct SavedFilesState {
     /// Number of times the scene's files have changed.
     pub edits: u64,
     /// Generation of the request that followed the last edit.
@@ -90,11 +90,11 @@ pub(crate) struct SavingState {
     /// Whether an older render was displayed when the camera was last saved.
     pub is_camera_of_newest: bool,
     /// Camera edits in the scene file that can be undone, from oldest to newest.
-    pub camera_edits: Vec<SceneFileEdit>,
+    pub camera_edits: Vec<SavedCameraEdit>,
     /// Whether there is a scene file next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
     /// Camera in the scene file that `c` wrote for the model.
-    pub camera_of_model: Option<Viewpoint>,
+    pub camera_of_model: Option<ResolvedCamera>,
     /// Time when glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
@@ -111,7 +111,7 @@ pub(crate) struct SavingState {
     pub write_results: u64,
 }
 
-impl SavingState {
+impl SavedFilesState {
     /// The file, if any, to which the user wrote an image that includes changes made with keys. The scene's
     /// own image does not replace it until the scene is saved or the user writes another image.
     pub(crate) fn manually_written_image(&self) -> Option<&WrittenFile> {
@@ -121,7 +121,7 @@ impl SavingState {
     }
 
     /// Whether all files were written before the scene was last saved.
-    pub(crate) fn is_older_than_edit(&self) -> bool {
+    pub(crate) fn are_images_outdated(&self) -> bool {
         self.written.iter().all(|written| written.generation < self.saved_at)
     }
 

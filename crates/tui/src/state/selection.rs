@@ -24,7 +24,7 @@ pub(crate) enum PickPurpose {
 }
 
 /// State of the mouse, the crosshair and the inspected object.
-pub(crate) struct SelectionState {
+pub(crate) struct PointerState {
     pub is_mouse_on: bool,
     pub press: Option<MousePress>,
     /// Whether the next click sets the focus.
@@ -43,7 +43,7 @@ pub(crate) struct SelectionState {
     pub picked: Option<FilePosition>,
 }
 
-impl SelectionState {
+impl PointerState {
     pub(super) const fn new() -> Self {
         Self {
             is_mouse_on: true,

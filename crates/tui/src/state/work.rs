@@ -106,7 +106,7 @@ impl WorkState {
     }
 
     /// Restores the curve if an earlier request rendered the same image.
-    pub(crate) fn restore_noise_curve(&mut self, origin: &ImageProvenance) {
+    pub(crate) fn restore_noise_curve_for_image(&mut self, origin: &ImageProvenance) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }

@@ -4,12 +4,12 @@ use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Viewpoint, WriteMode};
+use crate::pipeline::protocol::{self, Command, ResolvedCamera, WriteRequirement};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::Pose;
 use crate::scene::diagnostic::Severity;
-use crate::{ColorDepth, ContentChange};
+use crate::{ColorDepth, ContentChangeTime};
 use crossterm::event::KeyCode;
 
 fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
@@ -30,18 +30,18 @@ fn moved_camera_is_shown_but_not_written() {
     ui.finish_render(RED);
     let effects = ui.press_character('l');
     let moved = find_render_request(&effects).expect("a request");
-    assert_eq!((moved.write, moved.force), (WriteMode::No, false));
+    assert_eq!((moved.write, moved.force), (WriteRequirement::No, false));
     let text = ui.screen_text();
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
-    let effects = ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let edited = find_render_request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving should not reset the camera");
-    assert_eq!(edited.write, WriteMode::No);
+    assert_eq!(edited.write, WriteRequirement::No);
     let effects = ui.press_character('0');
     let own = find_render_request(&effects).expect("a request");
-    assert_eq!((own.write, own.overrides.camera.has_changes()), (WriteMode::Try, false));
+    assert_eq!((own.write, own.overrides.camera.has_changes()), (WriteRequirement::Try, false));
     assert!(!ui.screen_text().contains(messages::CAMERA_MOVED));
 }
 
@@ -180,7 +180,7 @@ fn reverted_changes_are_not_sent() {
         assert_eq!(last.overrides == Overrides::default(), is_back, "{keys}: {:?}", last.overrides);
         assert_eq!(
             (last.write, last.own.is_none()),
-            if is_back { (WriteMode::Try, true) } else { (WriteMode::No, false) }
+            if is_back { (WriteRequirement::Try, true) } else { (WriteRequirement::No, false) }
         );
         let line = ui.screen_text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
@@ -237,8 +237,8 @@ fn model_scene_is_written_once() {
 }
 
 /// Simulates saving a scene with this camera.
-fn save(ui: &mut TestUi, camera: Viewpoint) {
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+fn save(ui: &mut TestUi, camera: ResolvedCamera) {
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     ui.worker_event(protocol::Event::Settings {
@@ -252,7 +252,7 @@ fn save(ui: &mut TestUi, camera: Viewpoint) {
 }
 
 /// Presses `c` and returns the camera that the worker is asked to write. `None` if nothing is written.
-fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
+fn kept(ui: &mut TestUi) -> Option<ResolvedCamera> {
     let is_order = |effect: Effect| match effect {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
         _ => None,
@@ -260,16 +260,17 @@ fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     ui.press_character('c').into_iter().find_map(is_order)
 }
 
-fn viewpoint_at(position: [f64; 3]) -> Viewpoint {
+fn viewpoint_at(position: [f64; 3]) -> ResolvedCamera {
     let camera = camera();
-    Viewpoint { pose: Pose { position: position.into(), ..camera.pose }, ..camera }
+    ResolvedCamera { pose: Pose { position: position.into(), ..camera.pose }, ..camera }
 }
 
 #[test]
 fn first_c_lists_conflicting_saves() {
-    let wide = |fov| Viewpoint { fov, ..camera() };
-    let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
-    let both = Viewpoint { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
+    let wide = |fov| ResolvedCamera { fov, ..camera() };
+    let look_at =
+        ResolvedCamera { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
+    let both = ResolvedCamera { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
     for (keys, saved, words) in [
         ("h", viewpoint_at([0.0, 2.0, 4.0]), "camera.position = [0, 2, 4]"),
         ("h", look_at, "camera.look_at = [0, 0.5, 0]"),
@@ -315,7 +316,7 @@ fn later_conflicting_saves_are_also_listed() {
 
 #[test]
 fn saving_keeps_camera_settings_that_did_not_move() {
-    let saved = Viewpoint { fov: 25.0, ..camera() };
+    let saved = ResolvedCamera { fov: 25.0, ..camera() };
     let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
     ui.press_character('h');

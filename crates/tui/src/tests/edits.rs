@@ -1,7 +1,7 @@
 //! Tests for edits and typos: history, render numbers and render times.
 
 use super::{BLUE, RED, cells_of};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
@@ -16,7 +16,7 @@ const GREEN: [u8; 3] = [10, 200, 20];
 
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
 }

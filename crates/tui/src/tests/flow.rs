@@ -3,21 +3,21 @@
 use std::time::Duration;
 
 use super::{BLUE, RED, cells_of};
-use crate::event::{Effect, Event, EventSource, KeyPress, Signal};
+use crate::event::{Effect, Event, KeyPress, RequiredEventSource, Signal};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, WriteMode};
+use crate::pipeline::protocol::{self, Command, Failure, MaxPreviewSize, WriteRequirement};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::state::WorkerActivity;
-use crate::{ContentChange, ExitStatus};
+use crate::{ContentChangeTime, ExitStatus};
 
 #[test]
 fn first_request_includes_the_preview_size() {
     let mut state = state(80, 24);
     let effects = crate::update::request_first_render(&mut state);
     let request = find_render_request(&effects).expect("a request");
-    assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42, around: None }));
-    assert_eq!((request.generation, request.write, request.force), (1, WriteMode::Try, false));
+    assert_eq!(request.preview, Some(MaxPreviewSize { width: 56, height: 42, around: None }));
+    assert_eq!((request.generation, request.write, request.force), (1, WriteRequirement::Try, false));
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn first_change_is_timed_from_the_save() {
     ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_millis(3);
-    let effects = ui.handle_event(Event::Changed(ContentChange { noticed }));
+    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
     assert_eq!(find_render_request(&effects).map(|it| it.generation), Some(2));
     ui.handle_event(Event::Shown { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
@@ -90,7 +90,7 @@ fn only_the_first_preview_is_urgent() {
     };
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(!picture(&mut ui, 1), "an outdated preview is not urgent");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
@@ -134,7 +134,7 @@ fn preview_is_resized_after_a_delay() {
     let effects = ui.advance_clock(50);
     assert!(matches!(
         effects[..],
-        [Effect::Send(Command::Preview(Some(PreviewSize { width: 152, height: 114, around: None })))]
+        [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 152, height: 114, around: None })))]
     ));
     ui.handle_event(Event::Picture {
         generation: 1,
@@ -170,7 +170,7 @@ fn resize_does_not_restart_the_render() {
 fn editing_a_comment_reports_unchanged() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.worker_event(protocol::Event::Started { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.screen_text().contains("unchanged"));
@@ -193,12 +193,12 @@ fn signals_quit_suspend_or_redraw() {
 #[test]
 fn lost_event_sources_are_handled() {
     let mut ui = TestUi::new();
-    assert!(matches!(ui.handle_event(Event::Lost(EventSource::Worker))[..], [Effect::GiveUp]));
+    assert!(matches!(ui.handle_event(Event::Lost(RequiredEventSource::Worker))[..], [Effect::GiveUp]));
     assert!(matches!(
-        ui.handle_event(Event::Lost(EventSource::Keys))[..],
+        ui.handle_event(Event::Lost(RequiredEventSource::Keys))[..],
         [Effect::Quit(ExitStatus::HANGUP)]
     ));
-    assert!(ui.handle_event(Event::Lost(EventSource::Watcher)).is_empty());
+    assert!(ui.handle_event(Event::Lost(RequiredEventSource::Watcher)).is_empty());
     assert!(ui.screen_text().contains(messages::NOT_WATCHING));
 }
 
@@ -244,12 +244,12 @@ fn error_with(message: &str) -> Vec<Diagnostic> {
 fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(error_with("half"));
     let text = ui.screen_text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(error_with("more"));
     assert!(!ui.screen_text().contains("more") && !ui.screen_text().contains("broken"));
     assert!(ui.handle_event(Event::Settled).is_empty());
@@ -262,9 +262,9 @@ fn errors_in_incomplete_files_are_deferred() {
 fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(error_with("half"));
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.handle_event(Event::Settled);
     ui.advance_clock(5000);
@@ -278,7 +278,7 @@ fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.fail_render(error_with("first"));
     assert!(ui.screen_text().contains("error: first"), "without a save, errors should not be deferred");
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.handle_event(Event::Settled);
     ui.fail_render(error_with("late"));
     assert!(ui.screen_text().contains("error: late"));
@@ -290,9 +290,9 @@ fn errors_in_stable_files_are_shown_immediately() {
 #[test]
 fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(error_with("half"));
-    ui.handle_event(Event::Lost(EventSource::Watcher));
+    ui.handle_event(Event::Lost(RequiredEventSource::Watcher));
     assert!(ui.screen_text().contains("error: half"), "{}", ui.screen_text());
     ui.press_character('r');
     ui.fail_render(error_with("again"));
@@ -302,7 +302,7 @@ fn errors_are_shown_if_the_watcher_is_lost() {
 #[test]
 fn render_failures_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
     ui.worker_event(protocol::Event::Failed { generation: ui.state.request.generation, failure });
     assert!(ui.screen_text().contains("no memory"), "{}", ui.screen_text());
@@ -316,12 +316,12 @@ fn time_spent_in_the_editor_is_not_counted() {
     ui.now += Duration::from_secs(9);
     ui.handle_event(Event::Back);
     ui.now += Duration::from_millis(2);
-    ui.handle_event(Event::Changed(ContentChange { noticed }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::Shown { generation: 2 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(22)));
     let noticed = ui.now;
-    ui.handle_event(Event::Changed(ContentChange { noticed }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
     ui.now += Duration::from_millis(30);
     ui.handle_event(Event::Shown { generation: 3 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(30)));

@@ -15,7 +15,7 @@ use crate::event::Event;
 use crate::film::Srgb8Image;
 use crate::fixtures::*;
 use crate::mosaic::filled_squares;
-use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
+use crate::pipeline::protocol::{self, PreviewSlot, PreviewUpdate};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 
@@ -284,7 +284,7 @@ impl WatchedRender {
     fn put_picture(&mut self, samples: f64) {
         let generation = self.ui.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
-        *self.slot.lock().expect("a slot") = Some(LatestPreview {
+        *self.slot.lock().expect("a slot") = Some(PreviewUpdate {
             generation,
             picture,
             range: None,

@@ -3,12 +3,12 @@
 use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{CameraSaveResult, Command, Event as WorkerEvent, PickResult};
+use crate::pipeline::protocol::{CameraSaveResult, Command, Event as WorkerEvent, PickedPixel};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 
@@ -45,7 +45,7 @@ fn older_render_cannot_be_inspected() {
     assert!(!asks(&ui.handle_event(mouse(MouseEventKind::Release))));
     assert!(ui.screen_text().contains(messages::OLDER_RENDER), "{}", ui.screen_text());
     // A late reply is not shown for the older render.
-    let picked = PickResult { pixel: [3, 4], thing: None, color: None };
+    let picked = PickedPixel { pixel: [3, 4], thing: None, color: None };
     ui.worker_event(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.screen_text().contains("pixel 3, 4"), "{}", ui.screen_text());
     ui.press_character('b');
@@ -90,7 +90,7 @@ fn c_saves_the_newest_camera() {
         ui.press_character('n');
         assert!(!ui.press_character('c').is_empty());
         if is_noticed {
-            ui.handle_event(Event::Changed(crate::ContentChange { noticed: ui.now }));
+            ui.handle_event(Event::Changed(crate::ContentChangeTime { noticed: ui.now }));
         }
         let kept =
             CameraSaveResult { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
@@ -152,7 +152,7 @@ fn age_is_shown_once_and_updated() {
 fn save_time_is_cleared_by_the_next_render() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     let generation = ui.state.request.generation;
     ui.handle_event(Event::Shown { generation });

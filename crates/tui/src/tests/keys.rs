@@ -9,12 +9,12 @@ use crate::fixtures::*;
 use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, ImagePosition, SceneFileEdit, WriteMode};
-use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, ViewMode};
+use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
+use crate::pipeline::settings::{EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
-use crate::{ContentChange, ExitStatus};
+use crate::{ContentChangeTime, ExitStatus};
 
 /// Checks that each key does what its table row says. `check` covers every action.
 #[test]
@@ -45,7 +45,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             ] {
                 let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").shadows, by_key);
-                assert_eq!(ui.state.request.shadows(), wanted);
+                assert_eq!(ui.state.request.shadow_mode(), wanted);
             }
         }
         Action::ToggleDepthOfField => {
@@ -58,7 +58,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             for (wanted, by_key) in [(true, Some(true)), (false, None)] {
                 let effects = ui.press_key(key);
                 assert_eq!(overrides(&effects).expect("a request").photons, by_key);
-                assert_eq!(ui.state.request.photons(), wanted);
+                assert_eq!(ui.state.request.are_photons_enabled(), wanted);
             }
             ui.press_character('i');
             assert!(ui.press_key(key).is_empty(), "the path integrator does not use photons");
@@ -88,7 +88,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let effects = ui.press_key(key);
             let wanted = if action == Action::NextView { ViewMode::Normal } else { ViewMode::Error };
             let request = find_render_request(&effects).expect("a request");
-            assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteMode::No));
+            assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteRequirement::No));
             assert!(ui.screen_text().contains(&messages::view_chosen(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
@@ -116,7 +116,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let effects = ui.press_key(key);
             assert_eq!(
                 find_render_request(&effects).map(|it| (it.overrides.exposure, it.write)),
-                Some((Some(stops), WriteMode::No))
+                Some((Some(stops), WriteRequirement::No))
             );
             assert!(
                 ui.screen_text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
@@ -139,7 +139,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         }
         Action::UndoCamera => {
             assert!(ui.press_key(key).is_empty(), "no camera has been saved");
-            let edit = SceneFileEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
+            let edit = SavedCameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
             ui.state.saving.camera_edits.push(edit.clone());
             assert!(
                 matches!(&ui.press_key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit)
@@ -184,7 +184,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         }
         Action::Edit => assert!(matches!(ui.press_key(key)[..], [Effect::Edit(_)])),
         Action::CompareLastEdit => {
-            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
             ui.finish_render(BLUE);
             for (color, other) in [(RED, BLUE), (BLUE, RED)] {
                 ui.press_key(key);
@@ -233,7 +233,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert_eq!(cells_of(ui, RED), cells);
         }
         Action::ToggleHelp => {
-            let help = keymap::binding_for(action).expect("a binding").help;
+            let help = keymap::binding_for_action(action).expect("a binding").help;
             ui.press_key(key);
             assert!(ui.screen_text().contains(help));
             ui.press_key(key);
@@ -331,10 +331,10 @@ fn toggles_start_from_the_command_line() {
     assert!(bottom(&mut ui).starts_with("s off  p off") && bottom(&mut ui).contains("v depth"));
     let effects = ui.press_character('s');
     let soft = find_render_request(&effects).expect("a request");
-    assert_eq!((soft.overrides.shadows, soft.write), (Some(ShadowMode::Soft), WriteMode::No));
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(ShadowMode::Soft), WriteRequirement::No));
     assert_eq!(soft.own.as_deref(), Some(&base), "the scene's own image should continue");
     let effects = ui.press_character('V');
-    assert_eq!(find_render_request(&effects).expect("a request").write, WriteMode::No);
+    assert_eq!(find_render_request(&effects).expect("a request").write, WriteRequirement::No);
     let effects = ui.press_character('0');
     assert_eq!(find_render_request(&effects).map(|it| it.overrides.clone()), Some(base));
 }
@@ -378,7 +378,7 @@ fn pinhole_has_no_depth_of_field() {
 fn new_request_ends_a_pause() {
     let mut ui = TestUi::new();
     ui.press_character(' ');
-    let effects = ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!ui.state.work.paused);
     assert!(ui.screen_text().contains(messages::RESUMED), "{}", ui.screen_text());
@@ -490,9 +490,9 @@ fn saved_settings_are_the_base_for_toggles() {
     ui.press_character('s');
     ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let (generation, own) =
-        (ui.state.request.generation, AdjustableSettings { shadows: ShadowMode::Hard, ..scene_settings() });
+        (ui.state.request.generation, KeyboardSettings { shadows: ShadowMode::Hard, ..scene_settings() });
     let settings = Box::new(EffectiveSettings { shadows: ShadowMode::Hard, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
     let shadows: Vec<Option<ShadowMode>> = "sss"

@@ -1,13 +1,13 @@
 //! Tests that the image gets enough space and that nothing moves during a render.
 
 use super::{RED, cells_of};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
+use crate::pipeline::protocol::{self, Command, MaxPreviewSize, Stage, Status};
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
@@ -17,7 +17,7 @@ const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
 /// Returns the preview size for an image, limited to the requested size.
-fn fitted_preview_size(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
+fn fitted_preview_size(size: (u32, u32), most: MaxPreviewSize) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
@@ -111,7 +111,7 @@ fn layout_is_stable_during_a_render() {
                     vec![diagnostic(Severity::Warning, "unused")],
                     false,
                 )),
-                7 => ui.handle_event(Event::Changed(ContentChange { noticed: ui.now })),
+                7 => ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now })),
                 8 => {
                     ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
@@ -144,7 +144,7 @@ fn new_aspect_ratio_requests_another_preview() {
         own: scene_settings(),
     });
     assert!(
-        matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
+        matches!(wide[..], [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 80, .. })))]),
         "{wide:?}"
     );
 }
@@ -210,7 +210,7 @@ fn stage_times_are_compared_with_last_render() {
     };
     render(&mut ui, 1.42);
     assert!(!ui.screen_text().contains("1.42 s −") && !ui.screen_text().contains("1.42 s +"));
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     render(&mut ui, 1.12);
     assert!(ui.screen_text().contains("render   1.12 s −.3 s"), "{}", ui.screen_text());
     ui.press_character('r');
@@ -238,7 +238,7 @@ fn save_hint_is_shown_until_the_first_save() {
                 "{}",
                 ui.screen_text()
             );
-            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
             ui.worker_event(done_event(2, Vec::new(), false));
             assert!(
                 !ui.screen_words().contains(&messages::save_to_render_hint("cornell.toml", false)),

@@ -3,14 +3,14 @@
 use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, Command, ImagePosition, NormalizedRect, PickResult, PickedObject, SceneFileEdit,
-    WriteMode,
+    self, CameraSaveResult, Command, ImagePosition, NormalizedRect, PickedObject, PickedPixel,
+    SavedCameraEdit, WriteRequirement,
 };
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
@@ -56,7 +56,7 @@ fn thing() -> PickedObject {
 }
 
 fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
-    let picked = Box::new(PickResult { pixel: [1, 2], thing, color: Some([0.5; 3]) });
+    let picked = Box::new(PickedPixel { pixel: [1, 2], thing, color: Some([0.5; 3]) });
     ui.worker_event(protocol::Event::Picked { generation: 0, picked })
 }
 
@@ -135,7 +135,7 @@ fn click_after_f_sets_the_focus() {
     click(&mut ui, 12, 10);
     let effects = answer(&mut ui, Some(thing()));
     let focused = find_render_request(&effects).expect("a request");
-    assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteMode::No));
+    assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteRequirement::No));
     assert!(ui.screen_text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.screen_text());
     // Any other key cancels the pending click.
     ui.press_character('f');
@@ -172,7 +172,7 @@ fn saved_camera_becomes_the_scene_camera() {
     ui.press_character('c');
     let effects = kept(&mut ui, true, true);
     let own = find_render_request(&effects).expect("a request");
-    assert_eq!((own.overrides.camera.has_changes(), own.write), (false, WriteMode::Try));
+    assert_eq!((own.overrides.camera.has_changes(), own.write), (false, WriteRequirement::Try));
     let text = ui.screen_text();
     assert!(
         text.contains(&messages::camera_saved("scenes/cornell.toml"))
@@ -180,13 +180,13 @@ fn saved_camera_becomes_the_scene_camera() {
         "{text}"
     );
     // The watcher also reports this save.
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(
         ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
         ui.screen_text()
     );
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(
         !ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
@@ -200,9 +200,9 @@ fn saved_camera_becomes_the_scene_camera() {
     let text = ui.screen_text();
     assert!(text.contains("error: outdated") && text.contains("reset camera"), "{text}");
     // The watcher reports this save slightly later.
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(!ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
 }
 
@@ -211,7 +211,8 @@ fn undo_can_be_repeated_until_nothing_is_left() {
     let mut ui = ui();
     assert!(ui.press_character('u').is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_UNDO), "{}", ui.screen_text());
-    let edit = |after: &str| SceneFileEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
+    let edit =
+        |after: &str| SavedCameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
     for after in ["one", "two"] {
         let kept = CameraSaveResult {
             path: "a.toml".into(),
@@ -424,7 +425,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
 #[test]
 fn header_marks_an_older_render() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     let first = |ui: &mut TestUi| ui.screen_text().lines().next().map(str::to_owned).unwrap_or_default();
@@ -458,7 +459,7 @@ fn saved_camera_can_be_compared_with_the_old_one() {
     ui.finish_render(BLUE);
     ui.press_character('c');
     kept(&mut ui, true, true);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     assert!(super::cells_of(&mut ui, RED) > 0, "expected the previous camera: {}", ui.screen_text());
@@ -478,7 +479,7 @@ fn escape_cancels_gestures_and_closes_history() {
     ui.state.selection.facts = Some(vec!["sphere".to_owned()]);
     escape(&mut ui);
     assert_eq!(ui.state.selection.facts, None);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     assert!(ui.state.picture.history.is_viewing_older());
@@ -528,7 +529,7 @@ fn focusing_requires_an_aperture() {
 #[test]
 fn exposure_changes_add_no_history_entry() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     for color in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
         ui.press_character(']');
@@ -550,7 +551,7 @@ fn older_render_is_shown_with_its_changes() {
     use crate::pipeline::protocol;
     let mut ui = TestUi::from_state(state(120, 40));
     for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {
-        ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+        ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Text { generation, text: text.into() });
         ui.finish_render(color);

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::color::ColorDepth;
 use crate::event::PreviewSendReport;
 use crate::event::{Event, KeyPress};
@@ -293,7 +293,7 @@ fn only_renders_with_changes_are_counted() {
     ui.finish_render(RED);
     assert!(ui.screen_text().contains("· render 1"), "{}", ui.screen_text());
     ui.press_character('0');
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.screen_text().contains("unchanged · render 1"), "{}", ui.screen_text());
     ui.press_character('r');
@@ -307,7 +307,7 @@ fn deleted_file_is_reported_as_missing() {
     ui.finish_render(RED);
     let absent =
         *crate::scene::read_current_text("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(vec![absent]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
@@ -322,7 +322,7 @@ fn broken_file_keeps_the_image() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let before = cells_of(&mut ui, RED);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
@@ -340,7 +340,7 @@ fn broken_file_keeps_the_image() {
     let after = cells_of(&mut ui, RED);
     assert!(after >= before / 2, "{after} of {before} cells");
 
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     assert!(ui.screen_text().contains("heigth"), "the pane should stay open until the file is read");
     ui.finish_render(BLUE);
     assert!(!ui.screen_text().contains("heigth"));
@@ -527,7 +527,7 @@ fn files_of_other_images_are_not_listed() {
         ui.finish_render(super::RED);
         assert!(text_below_header(&mut ui).contains("→ a.png"), "{}", ui.screen_text());
         // The next image could not be written, so the file still contains the previous one.
-        ui.handle_event(Event::Changed(crate::ContentChange { noticed: ui.now }));
+        ui.handle_event(Event::Changed(crate::ContentChangeTime { noticed: ui.now }));
         ui.worker_event(protocol::Event::Started { generation: 2 });
         ui.worker_event(failed(2, "a.png: denied"));
         ui.worker_event(done_event(2, Vec::new(), false));
@@ -601,7 +601,7 @@ fn preview_cost_is_shown_if_it_fits() {
     ui.state.display.frame =
         Some(PreviewSendReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
     assert!(
-        ui.screen_text().contains(&messages::preview_transfer_cost(31, Some(150))),
+        ui.screen_text().contains(&messages::preview_bytes_and_round_trip(31, Some(150))),
         "{}",
         ui.screen_text()
     );

@@ -3,13 +3,13 @@
 use ratatui::layout::Rect;
 
 use super::{BLUE, RED, cells_of};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
+use crate::pipeline::protocol::{self, NoisePrediction, RenderProgress};
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalReply;
@@ -40,7 +40,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
     });
     for step in 0..=40 {
         let seconds = 10_f64.powf(f64::from(step) / 20.0);
-        let noise = Some(NoiseProgress { now: 0.1 / seconds.sqrt(), seconds, next: None });
+        let noise = Some(NoisePrediction { now: 0.1 / seconds.sqrt(), seconds, next: None });
         let progress = RenderProgress { elapsed_seconds: seconds, noise, ..render_progress(0.5, None) };
         ui.worker_event(protocol::Event::Progress { generation, progress });
     }
@@ -79,7 +79,8 @@ fn finished_render_has_a_noise_curve() {
     rendered(&mut ui, 0.01);
     let text = panel(&mut ui);
     assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
-    let words = format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target("1 %"));
+    let words =
+        format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target_line_label("1 %"));
     assert!(text.contains(&words), "{text}");
     // The target line is a row of identical dots from the axis to the edge.
     let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
@@ -292,10 +293,10 @@ fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::from_state(state(120, 40));
     rendered(&mut ui, 0.01);
     // Make and fix a typo, which leaves the image unchanged.
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.fail_render(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.handle_event(Event::Settled);
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), true);
@@ -333,7 +334,7 @@ fn history_heading_is_not_shown_without_entries() {
         ui.state.request.effective = Some(EffectiveSettings { width, height, ..effective_settings() });
         ui.handle_event(Event::Resize(window(200, 60)));
         for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
-            ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(protocol::Event::Started { generation });
             ui.worker_event(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
@@ -390,7 +391,7 @@ fn side_panel_fits_every_window_size() {
             (1_u8..).zip(edits).map(|(index, what)| (what, [40 * (index % 5), 10 * index, 7])).collect();
         ui.finish_render(RED);
         edited(&mut ui, &all);
-        ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+        ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
         rendered(&mut ui, 0.01);
         for columns in [100, 119, 120, 140, 200] {
             for rows in [1, 5, 12, 24, 40, 60, 90] {

@@ -8,7 +8,7 @@ use crate::event::{Event, KeyPress};
 use crate::exit_summary;
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CheckpointUpdate, PickResult, Stage, Status};
+use crate::pipeline::protocol::{self, CheckpointUpdate, PickedPixel, Stage, Status};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
@@ -23,7 +23,7 @@ fn click_result_is_shown_with_warnings_open() {
     ui.finish_render(RED);
     ui.worker_event(done_event(1, vec![diagnostic(Severity::Warning, "a warning")], false));
     ui.press_character('e');
-    let picked = PickResult { pixel: [3, 4], thing: None, color: None };
+    let picked = PickedPixel { pixel: [3, 4], thing: None, color: None };
     ui.worker_event(protocol::Event::Picked { generation: 1, picked: Box::new(picked) });
     assert!(ui.screen_text().contains("pixel 3, 4"), "{}", ui.screen_text());
 }
@@ -36,7 +36,7 @@ fn reset_lists_all_changes_once() {
     ui.press_character(']');
     ui.finish_render(BLUE);
     ui.press_key(KeyPress::special(KeyCode::Esc));
-    assert_eq!(ui.state.request.describe_key_changes(), ["focus", "exposure (+0.25)"]);
+    assert_eq!(ui.state.request.describe_keyboard_changes(), ["focus", "exposure (+0.25)"]);
     assert!(last_line(&mut ui).contains("reset focus, "), "{}", ui.screen_text());
     ui.press_character('l');
     ui.finish_render(RED);

@@ -1,7 +1,7 @@
 //! Tests for images written with `w`: text on the screen and in the exit summary.
 
 use super::{BLUE, RED};
-use crate::ContentChange;
+use crate::ContentChangeTime;
 use crate::event::{Effect, Event, KeyPress};
 use crate::exit_summary::summary_text;
 use crate::fixtures::*;
@@ -132,7 +132,7 @@ fn written_image_is_outdated_only_after_a_save() {
     finish_unwritten(&mut ui, BLUE);
     assert_shows(&mut ui, &messages::image_written_with_changes("cornell.png", "shadows hard"));
     assert!(!ui.screen_words().contains("older than your last"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChange { noticed: ui.now }));
+    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     own_image(&mut ui, SavedSceneImageState::NotBegun);
     finish_unwritten(&mut ui, RED);
     assert_shows(&mut ui, &messages::scene_image_outdated("cornell.png"));

@@ -3,13 +3,13 @@
 
 use std::path::PathBuf;
 
-use super::notices::{prompt, show_key_change, show_notice, show_notice_only};
+use super::notices::{show_key_change, show_message_until_key, show_notice, show_notice_without_effects};
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
-use crate::pipeline::settings::CameraChange;
+use crate::pipeline::settings::CameraOverrides;
 use crate::scene::description::Pose;
 use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -42,21 +42,24 @@ pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
 /// Moves the camera closer by a number of steps.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
-        return report_unknown_camera(state);
+        return show_no_scene_notice(state);
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
-        return show_notice_only(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
+        return show_notice_without_effects(
+            state,
+            if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST },
+        );
     }
     move_camera(state, |_| pose)
 }
 
 /// Widens the field of view by a number of steps.
 pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
+    let Some(view) = state.request.viewpoint() else { return show_no_scene_notice(state) };
     let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return show_notice_only(state, &messages::fov_limit(fov));
+        return show_notice_without_effects(state, &messages::fov_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
     render_camera_step(state)
@@ -64,32 +67,32 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
 
 /// Increases the exposure by a number of steps.
 pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
-    let Some(scene) = state.request.exposure else { return report_unknown_camera(state) };
+    let Some(scene) = state.request.exposure else { return show_no_scene_notice(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
-        return show_notice_only(state, &messages::exposure_limit(&format_stops(stops)));
+        return show_notice_without_effects(state, &messages::exposure_limit(&format_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
-    let effects = render_or_delay_step(state);
+    let effects = render_step_or_await_preview(state);
     show_notice(state, messages::exposure_changed(&format_stops(stops)));
     effects
 }
 
 fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
+    let Some(view) = state.request.viewpoint() else { return show_no_scene_notice(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
     render_camera_step(state)
 }
 
-fn report_unknown_camera(state: &mut State) -> Vec<Effect> {
-    show_notice_only(state, messages::NO_SCENE)
+fn show_no_scene_notice(state: &mut State) -> Vec<Effect> {
+    show_notice_without_effects(state, messages::NO_SCENE)
 }
 
 pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
-    drop_redundant_camera_changes(state);
-    let effects = render_or_delay_step(state);
+    drop_noop_camera_changes(state);
+    let effects = render_step_or_await_preview(state);
     show_key_change(
         state,
         if state.request.toggles.camera.has_changes() {
@@ -102,32 +105,32 @@ pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
 }
 
 /// Drops camera changes that are equal to the scene's own values.
-fn drop_redundant_camera_changes(state: &mut State) {
+fn drop_noop_camera_changes(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
     camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
-    let pose = CameraChange { focus: None, ..*camera };
+    let pose = CameraOverrides { focus: None, ..*camera };
     camera.focus = camera.focus.filter(|focus| *focus != own.with_change(&pose).focus);
 }
 
 /// Asks the worker to write the current camera into the scene file.
 pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
-        return report_unknown_camera(state);
+        return show_no_scene_notice(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
     if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
-        return show_notice_only(state, messages::NOTHING_TO_KEEP);
+        return show_notice_without_effects(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.describe_camera_conflicts();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !has_mesh_extension(&state.request.scene) {
         // The message below lists the saved values, so they cause no further conflict.
-        state.request.rebase_moves_on_scene();
+        state.request.reset_move_origin_to_scene_camera();
         let saved = saved.join(", ");
-        return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
+        return show_message_until_key(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
     }
     state.saving.is_camera_of_newest = state.picture.history.is_viewing_older();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
@@ -144,7 +147,7 @@ pub(super) fn handle_saved_camera(
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= has_mesh_extension(&state.request.scene);
-            return prompt(state, &format!("error: {}", escape_invisible_chars(&why)));
+            return show_message_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     if of_model {
@@ -164,7 +167,7 @@ pub(super) fn handle_saved_camera(
         state.picture.history.record_saved_camera(since);
     }
     if is_own && state.request.toggles.camera.has_changes() {
-        state.request.toggles.camera = CameraChange::default();
+        state.request.toggles.camera = CameraOverrides::default();
         effects = request_render(state, false);
     }
     state.saving.camera_kept = is_new.then_some(state.now);
@@ -176,8 +179,10 @@ pub(super) fn handle_saved_camera(
 pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
-        None if state.saving.camera_of_model.is_some() => show_notice_only(state, messages::NEW_SCENE_STAYS),
-        None => show_notice_only(state, messages::NOTHING_TO_UNDO),
+        None if state.saving.camera_of_model.is_some() => {
+            show_notice_without_effects(state, messages::NEW_SCENE_STAYS)
+        }
+        None => show_notice_without_effects(state, messages::NOTHING_TO_UNDO),
     }
 }
 
@@ -187,7 +192,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return prompt(state, &format!("error: {}", escape_invisible_chars(&why)));
+            return show_message_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     state.saving.camera_edits.pop();
@@ -200,16 +205,16 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
 }
 
 /// Renders the newest step immediately if the previous one has a preview. Otherwise the step waits.
-fn render_or_delay_step(state: &mut State) -> Vec<Effect> {
+fn render_step_or_await_preview(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.awaits_camera_step_preview() {
         state.request.camera_step.is_waiting = true;
         return Vec::new();
     }
-    render_step(state)
+    request_camera_step_render(state)
 }
 
-fn render_step(state: &mut State) -> Vec<Effect> {
+fn request_camera_step_render(state: &mut State) -> Vec<Effect> {
     let effects = request_render(state, false);
     state.request.camera_step.generation = Some(state.request.generation);
     effects
@@ -217,13 +222,13 @@ fn render_step(state: &mut State) -> Vec<Effect> {
 
 /// Renders the waiting step, if any, even if the previous one has no preview.
 pub(super) fn render_waiting_step_now(state: &mut State) -> Vec<Effect> {
-    if state.request.camera_step.is_waiting { render_step(state) } else { Vec::new() }
+    if state.request.camera_step.is_waiting { request_camera_step_render(state) } else { Vec::new() }
 }
 
 /// Renders the waiting step if the previous one has a preview.
 pub(super) fn try_render_waiting_step(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_camera_step_preview() {
-        render_or_delay_step(state)
+        render_step_or_await_preview(state)
     } else {
         Vec::new()
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{show_notice, show_notice_only, show_until_key};
+use super::notices::{show_notice, show_notice_without_effects, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{RenderState, State};
@@ -12,7 +12,7 @@ pub(super) fn record_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
         let origin = state.request.image_provenance(!is_finished);
-        state.picture.history.record(shown, state.now, origin);
+        state.picture.history.record_shown_image(shown, state.now, origin);
     }
 }
 
@@ -34,15 +34,16 @@ pub(super) fn record_newest(state: &mut State) {
 /// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_newest_image(state) };
+    let Some(newest) = newest_image(state) else { return report_no_image(state) };
     if state.picture.history.returns_to_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step_back_by(steps, newest) {
         Some(shown) => show_older_render(state, shown),
-        None => {
-            show_notice_only(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER })
-        }
+        None => show_notice_without_effects(
+            state,
+            if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER },
+        ),
     }
 }
 
@@ -65,7 +66,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
     record_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_newest_image(state) };
+    let Some(newest) = newest_image(state) else { return report_no_image(state) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_older_render(state, shown);
@@ -74,7 +75,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => show_notice_only(state, messages::NO_EARLIER_RENDER),
+        None => show_notice_without_effects(state, messages::NO_EARLIER_RENDER),
     }
 }
 
@@ -88,9 +89,9 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 }
 
 /// Explains why the history, which consists of previews, has no image.
-fn report_no_newest_image(state: &mut State) -> Vec<Effect> {
+fn report_no_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
-    show_notice_only(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
+    show_notice_without_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
 fn newest_image(state: &State) -> Option<crate::history::ShownImage> {

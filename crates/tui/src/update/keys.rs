@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::{show_notice, show_notice_only};
+use super::notices::{show_notice, show_notice_without_effects};
 use super::request::{request_render, request_resized_preview};
 use super::views::select_view_and_open_list;
 use super::{camera, edit_position, history, overlay, pointer, region};
@@ -17,7 +17,7 @@ use crate::pipeline::settings::ViewMode;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, IntegratorProperties, ShadowMode};
 use crate::scene::has_mesh_extension;
-use crate::state::{KeyOverrides, Pane, State};
+use crate::state::{KeyOverrides, PaneState, State};
 
 pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
     if let Some(effects) = overlay::handle_key(state, key) {
@@ -26,7 +26,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action_for(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
-        return if is_digit { show_notice_only(state, messages::VIEWS_FIRST) } else { Vec::new() };
+        return if is_digit { show_notice_without_effects(state, messages::VIEWS_FIRST) } else { Vec::new() };
     };
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
@@ -40,7 +40,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
     match action {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
-        Action::TogglePhotons => toggle_photons(state),
+        Action::TogglePhotons => toggle_photon_mapping(state),
         Action::CycleIntegrator => cycle_integrator(state),
         Action::NextView => step_view(state, 1),
         Action::PreviousView => step_view(state, ViewMode::ALL.len() - 1),
@@ -61,12 +61,12 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::UndoCamera => camera::undo_saved_camera(state),
         Action::Inspect => pointer::inspect(state),
         Action::Copy => pointer::copy_values(state),
-        Action::Focus => pointer::pick_focus(state),
+        Action::Focus => pointer::start_or_confirm_focus_pick(state),
         Action::ActualPixels => toggle_actual_pixels(state),
-        Action::RenderRegionFirst => region::handle_region_key(state),
+        Action::RenderRegionFirst => region::handle_region_select_key(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if has_mesh_extension(&state.request.scene) => {
-            show_notice_only(state, messages::NO_EDITOR_FOR_MODELS)
+            show_notice_without_effects(state, messages::NO_EDITOR_FOR_MODELS)
         }
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
         Action::CompareLastEdit => history::toggle_render_before_edit(state),
@@ -75,7 +75,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ResetSettings => reset_to_scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ToggleHelp => change_and_mark_dirty(state, |state| {
-            state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
+            state.overlays.help = PaneState { open: !state.overlays.help.open, ..PaneState::default() }
         }),
         Action::ShowImageOnly => toggle_image_only(state),
         Action::Redraw => vec![Effect::Redraw],
@@ -92,7 +92,7 @@ fn change_and_mark_dirty(state: &mut State, how: impl FnOnce(&mut State)) -> Vec
 }
 
 /// Whether a setting differs from `base`, its value before any key changed it.
-fn differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
+fn setting_differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
     base.is_none_or(|base| *next != base)
 }
 
@@ -100,12 +100,12 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     let (all, own) = (Integrator::ALL, state.request.integrator());
     let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
     state.request.toggles.integrator =
-        next.copied().filter(|next| differs_from_base(next, state.request.base_integrator()));
+        next.copied().filter(|next| setting_differs_from_base(next, state.request.base_integrator()));
     request_render(state, false)
 }
 
 /// Returns the name of an integrator that supports a setting, or `None` if the current integrator does.
-fn find_integrator_if_unsupported(
+fn suggest_supporting_integrator(
     state: &State,
     supports: impl Fn(IntegratorProperties) -> bool,
 ) -> Option<&'static str> {
@@ -116,19 +116,19 @@ fn find_integrator_if_unsupported(
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = find_integrator_if_unsupported(state, |method| method.honors_shadows) {
-        return show_notice_only(
+    if let Some(other) = suggest_supporting_integrator(state, |method| method.honors_shadows) {
+        return show_notice_without_effects(
             state,
             &messages::hard_shadows_unsupported(state.request.integrator().name(), other),
         );
     }
-    let next = match state.request.shadows() {
+    let next = match state.request.shadow_mode() {
         ShadowMode::Soft => ShadowMode::Hard,
         ShadowMode::Hard => ShadowMode::Off,
         ShadowMode::Off => ShadowMode::Soft,
     };
     state.request.toggles.shadows =
-        Some(next).filter(|next| differs_from_base(next, state.request.base_shadows()));
+        Some(next).filter(|next| setting_differs_from_base(next, state.request.base_shadows()));
     request_render(state, false)
 }
 
@@ -136,25 +136,25 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.combined_overrides().dof == Some(false);
     match &state.request.effective {
-        None => return show_notice_only(state, messages::NO_SCENE),
+        None => return show_notice_without_effects(state, messages::NO_SCENE),
         Some(effective) if !effective.dof && !switched_off => {
-            return show_notice_only(state, messages::PINHOLE);
+            return show_notice_without_effects(state, messages::PINHOLE);
         }
         Some(_) => {}
     }
     // By default, depth of field is on and depends only on the lens.
     let base = state.request.command_line.dof.or(Some(true));
-    state.request.toggles.dof = Some(switched_off).filter(|next| differs_from_base(next, base));
+    state.request.toggles.dof = Some(switched_off).filter(|next| setting_differs_from_base(next, base));
     request_render(state, false)
 }
 
-fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = find_integrator_if_unsupported(state, |method| method.gathers) {
-        return show_notice_only(state, &messages::photons_unsupported(other));
+fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
+    if let Some(other) = suggest_supporting_integrator(state, |method| method.gathers) {
+        return show_notice_without_effects(state, &messages::photons_unsupported(other));
     }
-    let next = !state.request.photons();
+    let next = !state.request.are_photons_enabled();
     state.request.toggles.photons =
-        Some(next).filter(|next| differs_from_base(next, state.request.base_photons()));
+        Some(next).filter(|next| setting_differs_from_base(next, state.request.base_photons_enabled()));
     request_render(state, false)
 }
 
@@ -165,7 +165,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn toggle_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewKind::None => return show_notice_only(state, messages::NO_PREVIEW),
+        PreviewKind::None => return show_notice_without_effects(state, messages::NO_PREVIEW),
         PreviewKind::HalfBlock
         | PreviewKind::Quadrant
         | PreviewKind::Sextant
@@ -181,7 +181,7 @@ fn toggle_image_only(state: &mut State) -> Vec<Effect> {
 /// Toggles between actual pixels around the crosshair and the whole image.
 fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
-        return show_notice_only(state, messages::NO_PREVIEW);
+        return show_notice_without_effects(state, messages::NO_PREVIEW);
     }
     history::return_to_newest(state, "");
     state.picture.close_up =
@@ -196,7 +196,7 @@ fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.work.is_request_running() && !state.work.paused {
-        return show_notice_only(state, messages::NOT_RENDERING);
+        return show_notice_without_effects(state, messages::NOT_RENDERING);
     }
     state.set_clock_paused(!state.work.paused);
     state.dirty = true;
@@ -214,7 +214,7 @@ fn write_image_now(state: &mut State) -> Vec<Effect> {
 
 fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == KeyOverrides::default() {
-        return show_notice_only(state, messages::NOTHING_TO_RESET);
+        return show_notice_without_effects(state, messages::NOTHING_TO_RESET);
     }
     state.request.toggles = KeyOverrides::default();
     let effects = request_render(state, false);
@@ -225,7 +225,7 @@ fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.warnings_and_write_failure().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_request_running();
-        return show_notice_only(
+        return show_notice_without_effects(
             state,
             if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING },
         );

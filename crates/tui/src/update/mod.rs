@@ -19,10 +19,10 @@ pub(super) use self::notices::show_notice;
 use self::notices::show_until_key;
 use self::request::{request_render, request_resized_preview};
 use super::ExitStatus;
-use super::event::{Effect, Event, EventSource, Signal, WindowSize};
+use super::event::{Effect, Event, RequiredEventSource, Signal, WindowSize};
 use super::history::ShownImage;
 use super::messages;
-use super::options::ContentChange;
+use super::options::ContentChangeTime;
 use super::preview_kind::PreviewKind;
 use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
@@ -69,7 +69,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Picture { generation, picture, range, section, lacks_photons, source } => {
             show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
-        Event::Changed(ContentChange { noticed }) => {
+        Event::Changed(ContentChangeTime { noticed }) => {
             // Keep the message if glimt made the change by writing the camera, or refused to write the camera
             // because of it.
             const OWN: Duration = Duration::from_secs(1);
@@ -124,7 +124,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
 
 fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
-        && has_matching_pixel_count(&shown.picture)
+        && has_consistent_pixel_count(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.update_newest_while_viewing_older(&shown) {
@@ -160,7 +160,7 @@ fn keep_nearly_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> Sho
     shown
 }
 
-fn has_matching_pixel_count(picture: &Srgb8Image) -> bool {
+fn has_consistent_pixel_count(picture: &Srgb8Image) -> bool {
     picture.width > 0
         && picture.height > 0
         && u64::try_from(picture.pixels.len())
@@ -179,7 +179,7 @@ fn handle_resize(state: &mut State, window: WindowSize) -> Vec<Effect> {
     state.display.window = window;
     state.dirty = true;
     state.request.resize_due =
-        (Layout::preview_size(state) != state.request.preview_size).then(|| state.now + RESIZE_QUIET);
+        (Layout::max_preview_size(state) != state.request.preview_size).then(|| state.now + RESIZE_QUIET);
     Vec::new()
 }
 
@@ -193,7 +193,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
     state.dirty |= state.overlays.message.take_if(is_over).is_some();
     if state.display.pixels_until.is_some_and(|until| now >= until) {
-        replies::report_missing_pixels(state);
+        replies::report_unsupported_graphics(state);
     }
     if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
@@ -215,14 +215,14 @@ fn signal_effect(signal: Signal) -> Effect {
     }
 }
 
-fn handle_lost_source(state: &mut State, source: EventSource) -> Vec<Effect> {
+fn handle_lost_source(state: &mut State, source: RequiredEventSource) -> Vec<Effect> {
     match source {
-        EventSource::Worker => vec![Effect::GiveUp],
-        EventSource::Watcher => {
+        RequiredEventSource::Worker => vec![Effect::GiveUp],
+        RequiredEventSource::Watcher => {
             worker::show_delayed_errors(state);
             show_until_key(state, messages::NOT_WATCHING);
             Vec::new()
         }
-        EventSource::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
+        RequiredEventSource::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
     }
 }

@@ -82,8 +82,8 @@ fn close_or_cancel_topmost(state: &mut State) -> bool {
 /// to scroll, in which case the key keeps its usual function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
-        () if state.overlays.help.open => (true, help::scroll_extent(state)),
-        () if state.overlays.diagnostics.open => (false, diagnostics::scroll_extent(state)),
+        () if state.overlays.help.open => (true, help::state_page_and_max_scroll(state)),
+        () if state.overlays.diagnostics.open => (false, diagnostics::state_page_and_max_scroll(state)),
         () => return false,
     };
     let pane = if is_help { &mut state.overlays.help } else { &mut state.overlays.diagnostics };

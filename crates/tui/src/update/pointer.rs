@@ -1,13 +1,13 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{prompt, show_key_change, show_notice, show_notice_only};
+use super::notices::{show_key_change, show_message_until_key, show_notice, show_notice_without_effects};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
-use crate::math::decimal::{coordinate_step_at_distance, round_to_step};
+use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::messages;
-use crate::pipeline::protocol::{Command, PickResult, PickedObject};
+use crate::pipeline::protocol::{Command, PickedObject, PickedPixel};
 use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
@@ -39,7 +39,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
             region::end_drag(state, spot)
         }
         MouseEventKind::Release => match state.selection.press.take() {
-            Some(press) if !press.has_moved => handle_click(state, mouse),
+            Some(press) if !press.has_moved => pick_object_at_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
         MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_over_help_or_diagnostics(state, mouse) => {
@@ -81,9 +81,9 @@ fn drag_to_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     camera::orbit_by(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
 }
 
-fn handle_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
+fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_only(state, messages::OLDER_RENDER);
+        return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
@@ -101,17 +101,17 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 }
 
 /// Waits for a click that sets the focus. If already waiting, sets the focus at the crosshair.
-pub(super) fn pick_focus(state: &mut State) -> Vec<Effect> {
+pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_only(state, messages::OLDER_RENDER);
+        return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return show_notice_only(state, messages::PINHOLE);
+        return show_notice_without_effects(state, messages::PINHOLE);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return prompt(state, messages::CLICK_TO_FOCUS);
+        return show_message_until_key(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
     send_pick_query(state, PickPurpose::Focus)
@@ -119,10 +119,10 @@ pub(super) fn pick_focus(state: &mut State) -> Vec<Effect> {
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_only(state, messages::OLDER_RENDER);
+        return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
-        return show_notice_only(state, messages::NO_SCENE);
+        return show_notice_without_effects(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -137,7 +137,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the reply to a pick query.
-pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect> {
+pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
     // An older render was opened after the click.
     if state.picture.history.is_viewing_older() {
         return Vec::new();
@@ -154,19 +154,19 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickResult) -> Vec<Effect>
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => show_notice_only(state, messages::NOTHING_TO_FOCUS),
+        (PickPurpose::Focus, None) => show_notice_without_effects(state, messages::NOTHING_TO_FOCUS),
         (PickPurpose::Focus, Some(thing)) => focus_at_depth(state, thing.depth),
     }
 }
 
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = round_to_step(depth, coordinate_step_at_distance(depth));
+    let distance = round_to_step(depth, decimal_step_at_distance(depth));
     if !(distance > 0.0) {
-        return show_notice_only(state, messages::NOTHING_TO_FOCUS);
+        return show_notice_without_effects(state, messages::NOTHING_TO_FOCUS);
     }
     // The scene may have been edited after the click.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return show_notice_only(state, messages::PINHOLE);
+        return show_notice_without_effects(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::render_camera_step(state);
@@ -177,7 +177,7 @@ fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
 }
 
 /// Formats the inspected values and the pixel position on one line.
-fn format_picked_values(PickResult { thing, pixel: [x, y], .. }: &PickResult, facts: &[String]) -> String {
+fn format_picked_values(PickedPixel { thing, pixel: [x, y], .. }: &PickedPixel, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
@@ -185,21 +185,21 @@ fn format_picked_values(PickResult { thing, pixel: [x, y], .. }: &PickResult, fa
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_only(state, messages::OLDER_RENDER);
+        return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
-        return show_notice_only(state, messages::NOTHING_TO_COPY);
+        return show_notice_without_effects(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
         // The message contains the text so that the user can select it.
-        return show_notice_only(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
+        return show_notice_without_effects(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]
 }
 
 /// Formats the inspected values: shape and name, line, material, distance, position, radiance and normal.
-fn inspected_values(PickResult { thing, color, pixel: [x, y] }: &PickResult) -> Vec<String> {
+fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
@@ -213,7 +213,7 @@ fn inspected_values(PickResult { thing, color, pixel: [x, y] }: &PickResult) -> 
     facts.extend((!has_mesh_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
-        format!("distance {}", format_number(*distance)),
+        format!("distance {}", format_significant_digits(*distance)),
         format!("position {}", format_vector(*position)),
     ]);
     facts.extend(light);
@@ -222,11 +222,11 @@ fn inspected_values(PickResult { thing, color, pixel: [x, y] }: &PickResult) -> 
 }
 
 fn format_vector(all: [f64; 3]) -> String {
-    format!("({})", all.map(format_number).join(", "))
+    format!("({})", all.map(format_significant_digits).join(", "))
 }
 
 /// Formats a number with three significant digits, or more if it has more digits before the decimal point.
-fn format_number(number: f64) -> String {
+fn format_significant_digits(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     round_to_step(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
 }
@@ -249,7 +249,7 @@ mod tests {
             distance: 3.8167,
             depth: 3.5,
         };
-        let picked = PickResult { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
+        let picked = PickedPixel { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
             inspected_values(&picked),
             [
@@ -264,10 +264,10 @@ mod tests {
         );
         let of_model =
             picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
-        let of_model = inspected_values(&PickResult { thing: of_model, ..picked });
+        let of_model = inspected_values(&PickedPixel { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(
-            inspected_values(&PickResult { thing: None, color: None, ..picked }),
+            inspected_values(&PickedPixel { thing: None, color: None, ..picked }),
             ["nothing at pixel 3, 4"]
         );
     }

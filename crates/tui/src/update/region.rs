@@ -1,6 +1,6 @@
 //! The image region to render first.
 
-use super::notices::{prompt, show_notice};
+use super::notices::{show_message_until_key, show_notice};
 use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
@@ -12,18 +12,18 @@ const SIDE: f64 = 1.0 / 3.0;
 
 /// Handles the key that selects a region. The first press waits for a drag, the second selects the region
 /// around the crosshair, and the third clears the region.
-pub(super) fn handle_region_key(state: &mut State) -> Vec<Effect> {
+pub(super) fn handle_region_select_key(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
-        let effects = restart_render(state);
+        let effects = reorder_running_render(state);
         show_notice(state, messages::REGION_CLEARED);
         return effects;
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return prompt(state, messages::DRAG_REGION);
+        return show_message_until_key(state, messages::DRAG_REGION);
     }
-    render_section(state, section_around_point(state.selection.crosshair))
+    render_section_first(state, section_around_point(state.selection.crosshair))
 }
 
 /// Stops waiting for a drag and cancels any drag in progress.
@@ -42,8 +42,8 @@ pub(super) fn update_dragged_region(state: &mut State, from: ImagePosition, to: 
 /// Ends the drag and uses the selected region, or a region around the position if there was no drag.
 pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
-        (Some(marked), _) => render_section(state, marked),
-        (None, Some(spot)) => render_section(state, section_around_point(spot)),
+        (Some(marked), _) => render_section_first(state, marked),
+        (None, Some(spot)) => render_section_first(state, section_around_point(spot)),
         (None, None) => Vec::new(),
     }
 }
@@ -53,17 +53,17 @@ fn section_around_point(spot: ImagePosition) -> NormalizedRect {
     NormalizedRect { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
 }
 
-fn render_section(state: &mut State, section: NormalizedRect) -> Vec<Effect> {
+fn render_section_first(state: &mut State, section: NormalizedRect) -> Vec<Effect> {
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
     let words = if state.work.is_request_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
-    let effects = restart_render(state);
+    let effects = reorder_running_render(state);
     show_notice(state, words);
     effects
 }
 
 /// Restarts a running render to change its rendering order. Samples are kept.
-fn restart_render(state: &mut State) -> Vec<Effect> {
+fn reorder_running_render(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.work.is_request_running() && !state.work.paused {
         request_render(state, false)

@@ -5,7 +5,7 @@ use super::request::request_resized_preview;
 use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
 use crate::graphics::ImageProtocol;
-use crate::pixel_request::ImageProtocolRequest;
+use crate::pixel_request::UnconfirmedImageProtocol;
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 use crate::terminal_replies::BlockGlyphs;
@@ -51,7 +51,7 @@ enum PixelSupport {
     Lacks,
 }
 
-fn pixel_support(request: ImageProtocolRequest, answer: TerminalReply) -> PixelSupport {
+fn requested_protocol_support(request: UnconfirmedImageProtocol, answer: TerminalReply) -> PixelSupport {
     match answer {
         TerminalReply::Images(protocol) if protocol == request.protocol => PixelSupport::Has,
         TerminalReply::Name(terminal)
@@ -59,7 +59,7 @@ fn pixel_support(request: ImageProtocolRequest, answer: TerminalReply) -> PixelS
         {
             PixelSupport::Has
         }
-        TerminalReply::Attributes if request.is_decided_by_attributes() => PixelSupport::Lacks,
+        TerminalReply::Attributes if request.is_attributes_reply_last() => PixelSupport::Lacks,
         TerminalReply::Images(_)
         | TerminalReply::Name(_)
         | TerminalReply::Attributes
@@ -76,10 +76,10 @@ fn pixel_support(request: ImageProtocolRequest, answer: TerminalReply) -> PixelS
 /// Switches to pixels if a reply confirms that the terminal supports them.
 fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
-    match pixel_support(request, answer) {
+    match requested_protocol_support(request, answer) {
         PixelSupport::Nothing => Vec::new(),
         PixelSupport::Lacks => {
-            report_missing_pixels(state);
+            report_unsupported_graphics(state);
             Vec::new()
         }
         PixelSupport::Has => {
@@ -94,7 +94,7 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
 
 /// Reports once that the terminal does not support pixels. If support is confirmed later, pixels are still
 /// used.
-pub(super) fn report_missing_pixels(state: &mut State) {
+pub(super) fn report_unsupported_graphics(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
         show_until_key(state, request.unsupported_message());
@@ -146,13 +146,13 @@ mod tests {
     use crate::pipeline::protocol::Command;
     use crate::pixel_request::MultiplexerPassthrough;
     use crate::terminal_replies::TerminalQueries;
-    use crate::terminals::{Capabilities, TerminalBrand};
+    use crate::terminals::{DesktopCapabilities, TerminalBrand};
     use crate::update::request_first_render;
 
     /// A UI whose user has requested kitty images.
     fn ui_requesting_pixels(route: MultiplexerPassthrough) -> TestUi {
         let mut state = state(80, 24);
-        let request = ImageProtocolRequest { protocol: ImageProtocol::Kitty, route, is_known: false };
+        let request = UnconfirmedImageProtocol { protocol: ImageProtocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
         state.display.pixels_until = Some(request.reply_deadline(state.now));
         TestUi::from_state(state)
@@ -175,7 +175,7 @@ mod tests {
         let mut ui = ui_requesting_pixels(MultiplexerPassthrough::Direct);
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.screen_text().contains("kitty images"), "{}", ui.screen_text());
-        let refusal = ui.state.display.pixels.map(ImageProtocolRequest::unsupported_message);
+        let refusal = ui.state.display.pixels.map(UnconfirmedImageProtocol::unsupported_message);
         assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         ui.press_character('s');
@@ -209,7 +209,7 @@ mod tests {
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] });
         assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");
-        assert_eq!(state.display.capabilities, Capabilities::default());
+        assert_eq!(state.display.capabilities, DesktopCapabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = handle_reply(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };

@@ -2,7 +2,7 @@
 
 use super::history;
 use crate::event::Effect;
-use crate::pipeline::protocol::{Command, Request, WriteMode};
+use crate::pipeline::protocol::{Command, Request, WriteRequirement};
 use crate::state::{CameraStepStatus, KeyOverrides, RenderState, State, WorkerActivity};
 use crate::view::layout::Layout;
 
@@ -29,7 +29,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.moved_since =
         is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
     state.request.record_original_camera();
-    state.request.preview_size = Layout::preview_size(state);
+    state.request.preview_size = Layout::max_preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStepStatus::default();
     // Clear these for now. If this request renders a saved change, they are set again later.
@@ -42,7 +42,11 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.request.scene.clone(),
         overrides: state.request.combined_overrides(),
         preview: state.request.preview_size,
-        write: if state.request.has_no_key_overrides() { WriteMode::Try } else { WriteMode::No },
+        write: if state.request.has_no_keyboard_overrides() {
+            WriteRequirement::Try
+        } else {
+            WriteRequirement::No
+        },
         own: state.request.overrides_for_scene_image(),
         saves: state.saving.edits,
         force,
@@ -62,7 +66,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
 /// If the preview size has changed, requests a preview of the same image at the new size, without restarting
 /// the render.
 pub(super) fn request_resized_preview(state: &mut State) -> Vec<Effect> {
-    let size = Layout::preview_size(state);
+    let size = Layout::max_preview_size(state);
     if size == state.request.preview_size || size.is_none() {
         return Vec::new();
     }

@@ -62,10 +62,10 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
 /// Selects a view and opens the list.
 pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Vec<Effect> {
     state.open_view_list();
-    state.request.toggles.view = (view != state.request.base_view()).then_some(view);
+    state.request.toggles.view = (view != state.request.base_view_mode()).then_some(view);
     let effects = request_render(state, false);
     if state.request.toggles.view.is_some() {
-        let is_empty = view == ViewMode::Photons && !state.request.photons();
+        let is_empty = view == ViewMode::Photons && !state.request.are_photons_enabled();
         let words = if is_empty {
             messages::VIEW_WITHOUT_PHOTONS.to_owned()
         } else {

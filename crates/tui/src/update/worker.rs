@@ -20,7 +20,7 @@ use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{
-    AssetProgressBar, BlockingErrors, Pane, RenderState, SceneImageProgress, State, WorkerActivity,
+    AssetProgressBar, BlockingErrors, PaneState, RenderState, SceneImageProgress, State, WorkerActivity,
     WrittenFile,
 };
 use crate::window_title;
@@ -56,7 +56,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
     let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
     state.dirty |= !shows_nothing;
     match event {
-        Event::Started { .. } => handle_started(state),
+        Event::Started { .. } => reset_work_for_new_request(state),
         Event::Stage { stage, .. } => record_stage(state, stage),
         Event::Asset { progress, .. } => update_asset_bar(state, progress),
         Event::Settings { settings, camera, exposure, own, .. } => {
@@ -80,7 +80,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             }
             state.work.progress = Some(progress);
             let is_rendering = SavedSceneImageState::Begun { is_rendering: true };
-            if state.request.has_no_key_overrides() {
+            if state.request.has_no_keyboard_overrides() {
                 state.saving.own.state = is_rendering;
             }
             if state.saving.own.state == is_rendering {
@@ -151,12 +151,12 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::Done { report, warnings, unchanged, .. } => {
             let time = state.work.total_rendering_time(state.now);
             handle_done(state, report, warnings, unchanged);
-            return notify_render_ended(state, time);
+            return notify_long_render_ended(state, time);
         }
         Event::Failed { failure, .. } => {
             let time = state.work.total_rendering_time(state.now);
             handle_failure(state, failure);
-            return notify_render_ended(state, time);
+            return notify_long_render_ended(state, time);
         }
         Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
         Event::Cancelled { .. } => {
@@ -170,7 +170,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
 
 /// Notifies the user that a long render has ended. Requires that the window is not focused and that the
 /// terminal supports notifications.
-fn notify_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
+fn notify_long_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, WorkerActivity::Done | WorkerActivity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
@@ -210,7 +210,7 @@ fn event_generation(event: &Event) -> u64 {
     }
 }
 
-fn handle_started(state: &mut State) {
+fn reset_work_for_new_request(state: &mut State) {
     for (before, stage) in state.work.last_seconds.iter_mut().zip(&state.work.stages) {
         let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
         *before = done.map(|stage| stage.seconds).or(*before);
@@ -222,7 +222,7 @@ fn handle_started(state: &mut State) {
     state.work.report = None;
     state.saving.unwritten = None;
     // A written image stays up to date until the render of another image begins.
-    if state.request.has_no_key_overrides() && state.saving.own.state != SavedSceneImageState::Written {
+    if state.request.has_no_keyboard_overrides() && state.saving.own.state != SavedSceneImageState::Written {
         state.saving.own =
             SceneImageProgress { state: SavedSceneImageState::Begun { is_rendering: true }, fraction: 0.0 };
     }
@@ -287,7 +287,7 @@ fn record_written_file(
     unfinished: Option<SampleCounts>,
 ) {
     let shows = (!is_own).then_some(state.saving.write_shows);
-    let view = shows.and_then(|shows| shows.view).unwrap_or(state.request.base_view());
+    let view = shows.and_then(|shows| shows.view).unwrap_or(state.request.base_view_mode());
     let made = match (unfinished, &state.work.report) {
         (Some(samples), _) => exit_summary::describe_unfinished_image(samples, view),
         (None, Some(report)) => exit_summary::describe_image(report, view),
@@ -310,13 +310,13 @@ fn record_written_file(
         is_stale,
         lost,
     });
-    if generation >= state.saving.saved_at && is_scene_image_complete(state, generation) {
+    if generation >= state.saving.saved_at && is_scene_image_written(state, generation) {
         state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
 }
 
 /// Whether all output files contain the scene's own finished image from this request.
-fn is_scene_image_complete(state: &State, generation: u64) -> bool {
+fn is_scene_image_written(state: &State, generation: u64) -> bool {
     let is_complete = |written: &WrittenFile| {
         written.generation == generation && written.shows.is_none() && !written.is_unfinished
     };
@@ -328,7 +328,7 @@ fn is_scene_image_complete(state: &State, generation: u64) -> bool {
 
 /// Adds a description to the files that contain a finished request's image.
 fn set_written_file_descriptions(state: &mut State, generation: u64, report: &Report) {
-    let base = state.request.base_view();
+    let base = state.request.base_view_mode();
     let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {
         let view = written.shows.and_then(|shows| shows.view).unwrap_or(base);
@@ -360,7 +360,7 @@ fn report_output_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     let generation = state.request.generation;
     state.saving.write_failed = Some(WriteFailure { why, generation, is_refused: true });
     if !conflicts.iter().all(|conflict| state.overlays.warnings.contains(conflict)) {
-        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
+        state.overlays.diagnostics = PaneState { open: true, scroll: 0 };
     }
     state.overlays.warnings.retain(|one| one.severity == Severity::Warning);
     state.overlays.warnings.splice(0..0, conflicts);
@@ -369,7 +369,7 @@ fn report_output_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
 /// Clears the errors once the file is valid again.
 fn clear_problems(state: &mut State) {
     if state.overlays.problems.take().is_some() {
-        state.overlays.diagnostics = Pane::default();
+        state.overlays.diagnostics = PaneState::default();
     }
 }
 
@@ -386,7 +386,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
-    if state.request.has_no_key_overrides() && is_on_disk && state.saving.unwritten.is_none() {
+    if state.request.has_no_keyboard_overrides() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
         state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
@@ -396,7 +396,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
     history::record_image(state);
-    count_render(state, unchanged);
+    count_finished_render(state, unchanged);
     if unchanged {
         state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
     }
@@ -417,7 +417,7 @@ fn add_earlier_seconds(report: &mut Report) {
 }
 
 /// Counts a finished render, unless it did not change the newest image.
-fn count_render(state: &mut State, unchanged: bool) {
+fn count_finished_render(state: &mut State, unchanged: bool) {
     let is_counted = std::mem::replace(&mut state.work.is_counted, true);
     let is_new = !unchanged && !is_counted || state.work.renders == 0;
     let is_shown = state.picture.history.is_newest_from_request(state.request.generation);
@@ -444,7 +444,7 @@ fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
         }
-        Status::Reused => state.work.restore_noise_curve(&origin),
+        Status::Reused => state.work.restore_noise_curve_for_image(&origin),
         Status::Running | Status::Skipped => {}
     }
     state.work.last_curve = state.work.curve.clone();
@@ -470,7 +470,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     state.saving.change = None;
     match failure {
         // The last valid scene is being rendered.
-        Failure::Scene(_) => state.picture.history.record_invalid_scene(),
+        Failure::Scene(_) => state.picture.history.discard_invalid_edits(),
         Failure::Work(_) => state.work.rendering = RenderState::Stopped,
     }
     match failure {
@@ -492,7 +492,7 @@ fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneOutcome) {
         LastValidSceneOutcome::Finished { unchanged } => {
             state.work.rendering = RenderState::Finished;
             history::record_image(state);
-            count_render(state, unchanged);
+            count_finished_render(state, unchanged);
         }
         LastValidSceneOutcome::Stopped => state.work.rendering = RenderState::Stopped,
     }
@@ -503,7 +503,7 @@ fn show_errors(state: &mut State, problems: BlockingErrors) {
     state.work.activity = WorkerActivity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
         state.overlays.problems = Some(problems);
-        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
+        state.overlays.diagnostics = PaneState { open: true, scroll: 0 };
     }
     state.dirty = true;
 }

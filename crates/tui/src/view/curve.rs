@@ -26,7 +26,9 @@ const MIN_RATIO: f64 = 1.5;
 /// little space.
 pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
-    let (Some(rows), Some(points)) = (chart_rows(state, area), curve_points(state)) else { return 0 };
+    let (Some(rows), Some(points)) = (chart_height(state, area), curve_points_if_enough(state)) else {
+        return 0;
+    };
     let depth = state.display.depth;
     put_text(buffer, nth_row(area, 0), &[(messages::NOISE_OVER_TIME, TextRole::Strong)], depth);
     let caption = caption(state, points, area.width);
@@ -39,14 +41,14 @@ pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -
 }
 
 /// Number of rows that the chart and its caption use. `None` if they do not fit.
-pub(super) fn chart_rows(state: &State, area: Rect) -> Option<u16> {
-    let words = 1 + caption(state, curve_points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
+pub(super) fn chart_height(state: &State, area: Rect) -> Option<u16> {
+    let words = 1 + caption(state, curve_points_if_enough(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
     (chart >= MIN_ROWS && area.width >= 20).then_some(words + chart)
 }
 
 /// The current image's points, if there are enough for a curve.
-fn curve_points(state: &State) -> Option<&[(f64, f64)]> {
+fn curve_points_if_enough(state: &State) -> Option<&[(f64, f64)]> {
     let points = state.work.curve.points();
     let [(first, _), .., (last, _)] = points else { return None };
     (points.len() >= MIN_POINTS && *last >= first * MIN_RATIO).then_some(points)
@@ -70,7 +72,7 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let line = match requested_noise(state) {
         Some(target) => {
             let share = whole(format_two_digit_percent(f64::from((target * 1e6).round() as f32) / 1e6));
-            format!("; {}", messages::noise_target(&share))
+            format!("; {}", messages::noise_target_line_label(&share))
         }
         None => String::new(),
     };

@@ -8,9 +8,9 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::stages::StyledLine;
-use super::text::{TextRole, format_count, nth_row, put_text, put_text_right, wrap_text};
+use super::text::{TextRole, format_count_with_noun, nth_row, put_text, put_text_right, wrap_text};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::{self, SpanRole};
+use crate::scene::report::{self, ReportTextRole};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
@@ -72,12 +72,12 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
         let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
         room.width -= put_text_right(buffer, area, &lines, tone, state.display.depth);
     }
-    let room = super::text::right_part(room, 1);
+    let room = super::text::remaining_row_area(room, 1);
     put_text(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
 /// Returns the number of lines per page and the maximum scroll position.
-pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
+pub(crate) fn state_page_and_max_scroll(state: &State) -> (usize, usize) {
     let area = Layout::for_state(state).pane;
     let text = pane_lines(state, area);
     page_and_max_scroll(&text, area)
@@ -126,23 +126,26 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
     let mut lines: Vec<StyledLine> =
-        faults.iter().take(MAX).flat_map(|fault| format_repeated_diagnostic(fault, width)).collect();
+        faults.iter().take(MAX).flat_map(|fault| format_diagnostic_with_positions(fault, width)).collect();
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
-        lines.push(vec![(format!("… {} not shown", format_count(more, "more diagnostic")), TextRole::Plain)]);
+        lines.push(vec![(
+            format!("… {} not shown", format_count_with_noun(more, "more diagnostic")),
+            TextRole::Plain,
+        )]);
     }
     lines
 }
 
 /// Formats the first position in full and the others only as line and column. An empty line follows.
-fn format_repeated_diagnostic(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
+fn format_diagnostic_with_positions(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
-        SpanRole::Text => TextRole::Plain,
-        SpanRole::Error => TextRole::Error,
-        SpanRole::Warning => TextRole::Warning,
-        SpanRole::Frame => TextRole::Faint,
-        SpanRole::Message => TextRole::Strong,
+        ReportTextRole::Text => TextRole::Plain,
+        ReportTextRole::Error => TextRole::Error,
+        ReportTextRole::Warning => TextRole::Warning,
+        ReportTextRole::Frame => TextRole::Faint,
+        ReportTextRole::Message => TextRole::Strong,
     };
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
@@ -157,7 +160,7 @@ fn format_repeated_diagnostic(fault: &[&Diagnostic], width: usize) -> Vec<Styled
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        let number = format_count(places.len(), "place");
+        let number = format_count_with_noun(places.len(), "place");
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
         lines.extend(wrap_text_in_role(&text, width, TextRole::Plain));
     }

@@ -7,10 +7,10 @@ use ratatui::layout::Rect;
 
 use super::layout::{BLOCK, Layout};
 use super::message;
-use super::stages::running_stage;
+use super::stages::running_stage_name;
 use super::text::{
-    TextRole, floor_percent, format_count, format_running_time, format_seconds, format_three_digit_number,
-    put_text, put_text_right, right_part, text_columns,
+    TextRole, floor_percent, format_count_with_noun, format_running_time, format_seconds,
+    format_three_digit_number, put_text, put_text_right, remaining_row_area, text_columns,
 };
 use crate::action::Action;
 use crate::choice::Choice;
@@ -32,17 +32,17 @@ const MIN_NAME: u16 = 6;
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
     let used = draw_activity_block(state, area, buffer);
-    let mut room = right_part(area, used + 1);
+    let mut room = remaining_row_area(area, used + 1);
     // If there is no other line, a message takes the whole header.
     if layout.keys.is_empty() && message::replaces_header_or_key_line(state, layout) {
         return;
     }
     if state.picture.is_alone {
-        let back = keymap::binding_for(Action::ShowImageOnly)
+        let back = keymap::binding_for_action(Action::ShowImageOnly)
             .map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_text_right(buffer, room, &back, TextRole::Faint, state.display.depth);
     }
-    let figures = progress_or_result(state);
+    let figures = progress_or_result_variants(state);
     // Choose a variant that leaves some space for the name, if possible.
     let fitting = [MIN_NAME + 1, 0]
         .into_iter()
@@ -62,7 +62,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 
 /// Draws the state block. Returns the number of columns used.
 fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
-    let (sign, word, tone) = activity_indicator(state);
+    let (sign, word, tone) = state_symbol_word_and_role(state);
     let mut text = format!(" {sign} {word} ");
     if area.width >= WIDE {
         text = format!("{text:<BLOCK$}");
@@ -77,7 +77,7 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 }
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
-pub(super) fn activity_indicator(state: &State) -> (&'static str, &'static str, TextRole) {
+pub(super) fn state_symbol_word_and_role(state: &State) -> (&'static str, &'static str, TextRole) {
     if state.picture.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
@@ -130,7 +130,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 /// The view and its range of values. Empty for the beauty view.
 fn view_label(state: &State) -> String {
     let open = state.picture.history.viewed_provenance();
-    let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
+    let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
         return String::new();
@@ -160,7 +160,7 @@ fn actual_pixels_label(state: &State) -> String {
 }
 
 /// Progress or result in several variants, from longest to shortest.
-fn progress_or_result(state: &State) -> Vec<String> {
+fn progress_or_result_variants(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
         let is_unfinished =
             state.picture.history.viewed_provenance().is_some_and(|origin| origin.is_unfinished);
@@ -199,7 +199,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
             vec![format!("{done}{}", format_eta(state, progress)), done]
         }
         (WorkerActivity::Running { .. }, _, None) => {
-            running_stage(state).map(|name| format!("{name}…")).into_iter().collect()
+            running_stage_name(state).map(|name| format!("{name}…")).into_iter().collect()
         }
         (WorkerActivity::Done, _, _) if state.work.unchanged => {
             vec![
@@ -246,9 +246,10 @@ fn format_eta(state: &State, progress: &RenderProgress) -> String {
 pub(super) fn format_problem_count(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
-    let errors = format_count(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
+    let errors =
+        format_count_with_noun(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
     match count(Severity::Warning) {
         0 => errors,
-        warnings => format!("{errors}, {}", format_count(warnings, "warning")),
+        warnings => format!("{errors}, {}", format_count_with_noun(warnings, "warning")),
     }
 }

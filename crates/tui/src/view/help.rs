@@ -25,7 +25,7 @@ const NOTES: &[(&str, &str)] = &[
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = help_area(state);
     let inner = inside_border(area);
-    let (page, last) = scroll_extent(state);
+    let (page, last) = state_page_and_max_scroll(state);
     let first = state.overlays.help.scroll.min(last);
     let lines = help_lines(inner.width);
     let mut title = " keys ".to_owned();
@@ -51,7 +51,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         put_text(buffer, place, &[(label, TextRole::Strong)], state.display.depth);
         put_text(
             buffer,
-            super::text::right_part(line, labels + BESIDE),
+            super::text::remaining_row_area(line, labels + BESIDE),
             &[(help, TextRole::Plain)],
             state.display.depth,
         );
@@ -64,7 +64,7 @@ const BESIDE: u16 = 3;
 /// Width of the label column if the help is `width` columns wide.
 fn label_width(width: u16) -> u16 {
     const MIN: u16 = 9;
-    widest_entry(|(label, _)| label).min(MIN.max(width / 3))
+    max_entry_width(|(label, _)| label).min(MIN.max(width / 3))
 }
 
 /// The help entries, wrapped into lines.
@@ -81,7 +81,7 @@ fn help_lines(width: u16) -> Vec<(String, String)> {
 }
 
 /// Returns the number of lines per page and the maximum scroll position.
-pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
+pub(crate) fn state_page_and_max_scroll(state: &State) -> (usize, usize) {
     let inner = inside_border(help_area(state));
     let page = usize::from(inner.height).max(1);
     (page, help_lines(inner.width).len().saturating_sub(page))
@@ -93,7 +93,7 @@ fn all_help_entries() -> impl Iterator<Item = (&'static str, &'static str)> {
     keys.chain(overlay).chain(NOTES.iter().copied())
 }
 
-fn widest_entry(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
+fn max_entry_width(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
     all_help_entries().map(|entry| text_columns(part(entry))).max().unwrap_or(0)
 }
 
@@ -101,7 +101,7 @@ fn help_area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
     // Leave the key line visible, because it shows how to scroll and close the help.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
-    let width = widest_entry(|(label, _)| label) + widest_entry(|(_, help)| help) + BESIDE + 3;
+    let width = max_entry_width(|(label, _)| label) + max_entry_width(|(_, help)| help) + BESIDE + 3;
     let wide = centered_area(above, width, above.height);
     let height =
         u16::try_from(help_lines(inside_border(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);

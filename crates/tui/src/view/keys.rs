@@ -3,10 +3,10 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::header::activity_indicator;
+use super::header::state_symbol_word_and_role;
 use super::layout::Layout;
 use super::message;
-use super::text::{TextRole, put_text, right_part, text_columns};
+use super::text::{TextRole, put_text, remaining_row_area, text_columns};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
@@ -30,7 +30,7 @@ impl KeyHint {
     }
 
     fn for_action(action: Action) -> Option<Self> {
-        keymap::binding_for(action).map(|it| Self::new(it.label, it.hint))
+        keymap::binding_for_action(action).map(|it| Self::new(it.label, it.hint))
     }
 
     fn width(&self, is_long: bool) -> u16 {
@@ -58,16 +58,16 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     // The help key is always shown, even if `q` does not fit.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
-    let toggles = if state.overlays.help.open { Vec::new() } else { toggle_hints(state) };
+    let toggles = if state.overlays.help.open { Vec::new() } else { hints_for_toggles(state) };
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
     for hint in fit_hints(current_hints(state), toggles, room, is_long) {
-        left = right_part(left, draw_hint(&hint, left, is_long, state, buffer));
+        left = remaining_row_area(left, draw_hint(&hint, left, is_long, state, buffer));
     }
-    let mut right = right_part(area, room);
+    let mut right = remaining_row_area(area, room);
     for hint in ways {
-        right = right_part(right, draw_hint(hint, right, true, state, buffer));
+        right = remaining_row_area(right, draw_hint(hint, right, true, state, buffer));
     }
 }
 
@@ -100,13 +100,13 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
 }
 
 /// Hints for the toggles and their values. Toggles that were changed with keys are bold.
-fn toggle_hints(state: &State) -> Vec<KeyHint> {
+fn hints_for_toggles(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
     let honors_shadows = state.request.integrator().properties().honors_shadows;
-    let shadows = if honors_shadows { state.request.shadows().name() } else { "–" };
+    let shadows = if honors_shadows { state.request.shadow_mode().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
     let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
     let keys = &state.request.toggles;
@@ -123,7 +123,7 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
         ),
     ];
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
-        let key = keymap::binding_for(action)?.label.split(' ').next()?;
+        let key = keymap::binding_for_action(action)?.label.split(' ').next()?;
         let words = format!("{name} {value}").trim_start().to_owned();
         Some(KeyHint {
             key,
@@ -145,7 +145,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     // Show scroll keys if some lines are not visible.
     let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
-        let (_, last) = super::help::scroll_extent(state);
+        let (_, last) = super::help::state_page_and_max_scroll(state);
         let lines = scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing());
         return (lines.chain(scrolling(last, &[OverlayAction::PageDown])).collect(), Vec::new());
     }
@@ -153,11 +153,11 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if let Some(views) = &state.overlays.views {
         urgent.extend(view_list_hints(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
-        let (_, last) = super::diagnostics::scroll_extent(state);
+        let (_, last) = super::diagnostics::state_page_and_max_scroll(state);
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(hidden_diagnostics_hint(state));
-    let named = |action, words| keymap::binding_for(action).map(|it| KeyHint::new(it.label, words));
+    let named = |action, words| keymap::binding_for_action(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
     if has_place && !has_mesh_extension(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
@@ -183,9 +183,9 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         let first = named(Action::RenderRegionFirst, "region first");
         urgent.extend(first.map(|hint| KeyHint { tone: TextRole::Strong, ..hint }));
     }
-    let reset = keymap::binding_for(Action::ResetSettings).map_or("", |it| it.label);
+    let reset = keymap::binding_for_action(Action::ResetSettings).map_or("", |it| it.label);
     let changed = |words| KeyHint { tone: TextRole::Strong, ..KeyHint::new(reset, words) };
-    let changes = state.request.describe_key_changes().join(", ");
+    let changes = state.request.describe_keyboard_changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
@@ -208,8 +208,8 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
-    let is_of_use =
-        state.request.toggles != KeyOverrides::default() && state.request.describe_key_changes().is_empty();
+    let is_of_use = state.request.toggles != KeyOverrides::default()
+        && state.request.describe_keyboard_changes().is_empty();
     let is_back = |it: &&KeyBinding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
         .iter()
@@ -244,16 +244,16 @@ const ELSEWHERE: [Action; 8] = [
 ];
 
 fn relabel_pause_hint(hint: KeyHint, state: &State) -> KeyHint {
-    let is_pause = keymap::binding_for(Action::TogglePause).is_some_and(|it| it.label == hint.key);
+    let is_pause = keymap::binding_for_action(Action::TogglePause).is_some_and(|it| it.label == hint.key);
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
 /// Hint with the number of errors and warnings. `None` if the pane is open.
 fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
-    let key = keymap::binding_for(Action::ToggleDiagnostics)?.label;
+    let key = keymap::binding_for_action(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
-        Some(_) => (super::header::format_problem_count(state), activity_indicator(state).2),
+        Some(_) => (super::header::format_problem_count(state), state_symbol_word_and_role(state).2),
         None => match state.warnings_and_write_failure() {
             none if none.is_empty() => return None,
             reported => (summarize_counts(&reported), TextRole::Warning),

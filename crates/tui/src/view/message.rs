@@ -8,7 +8,7 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::status_line;
-use super::text::{TextRole, nth_row, put_text, right_part, text_columns, wrap_text};
+use super::text::{TextRole, nth_row, put_text, remaining_row_area, text_columns, wrap_text};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
@@ -53,14 +53,14 @@ pub(super) fn replaces_header_or_key_line(state: &State, layout: &Layout) -> boo
 }
 
 /// Returns the part of the status line that no message uses.
-pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
+pub(super) fn free_status_line_area(state: &State, layout: &Layout) -> Rect {
     let spot = message_text(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
         Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,
         Some(MessagePosition::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
         Some(MessagePosition::Line(_) | MessagePosition::Over(_)) | None => 0,
     };
-    right_part(layout.under, used)
+    remaining_row_area(layout.under, used)
 }
 
 /// Whether the message covers the image.
@@ -99,7 +99,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     let under = layout.under;
     if under.is_empty() {
         // Do not cover the state block.
-        let beside = right_part(layout.header, super::layout::BLOCK as u16 + 1);
+        let beside = remaining_row_area(layout.header, super::layout::BLOCK as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
         return if fits {

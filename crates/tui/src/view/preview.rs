@@ -11,7 +11,7 @@ use super::ramp::AsciiRamp;
 use super::text::{TextRole, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Srgb8Image;
-use crate::graphics::TerminalImage;
+use crate::graphics::PlacedImage;
 use crate::history::ShownImage;
 use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
@@ -69,7 +69,7 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
     let spot = || {
         let spot =
             ImagePosition { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
-        shown.section.map_or(spot, |section| section.to_image_position(spot))
+        shown.section.map_or(spot, |section| section.section_to_image(spot))
     };
     cells.contains((column, row).into()).then(spot)
 }
@@ -92,11 +92,11 @@ fn is_drawn_as_pixels(state: &State) -> bool {
 }
 
 /// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
-pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<TerminalImage> {
+pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<PlacedImage> {
     let shown = state.picture.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
     let placed = PreviewPlacement::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
-    (!cells.is_empty()).then_some(TerminalImage { picture, cells, cell: state.display.window.cell_pixels })
+    (!cells.is_empty()).then_some(PlacedImage { picture, cells, cell: state.display.window.cell_pixels })
 }
 
 /// Color settings for a preview.
@@ -170,7 +170,7 @@ struct PreviewPlacement {
 impl PreviewPlacement {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
     fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
-        let across = kind.grid().map_or(1, CellGrid::columns);
+        let across = kind.grid().map_or(1, CellGrid::columns_per_cell);
         let one_to_one = across as f32 / state.display.horizontal_pixels_per_cell() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
         Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
@@ -179,7 +179,8 @@ impl PreviewPlacement {
     /// Computes the largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's
     /// height divided by its width. An image pixel covers at most `most` cell parts horizontally.
     fn fit(picture: &Srgb8Image, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
-        let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
+        let (across, down) =
+            kind.grid().map_or((1, 1), |grid| (grid.columns_per_cell() as u16, grid.rows_per_cell() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
         let room = (f32::from(area.width * across), f32::from(area.height * down));
         let size = (picture.width.max(1) as f32, picture.height.max(1) as f32 / pixel_aspect);
@@ -243,9 +244,9 @@ fn draw_two_color_cell(
     (x, y): (usize, usize),
     cell: &mut Cell,
 ) {
-    let (left, top) = (x as u32 * grid.columns(), y as u32 * grid.rows());
-    let part = |i: u32| scaled.pixel(left + i % grid.columns(), top + i / grid.columns());
-    let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
+    let (left, top) = (x as u32 * grid.columns_per_cell(), y as u32 * grid.rows_per_cell());
+    let part = |i: u32| scaled.pixel(left + i % grid.columns_per_cell(), top + i / grid.columns_per_cell());
+    let parts: Vec<Option<[u8; 3]>> = (0..grid.columns_per_cell() * grid.rows_per_cell()).map(part).collect();
     let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
     if colors.len() < parts.len() {
         // The last row of cells may lack pixels in its lower half.

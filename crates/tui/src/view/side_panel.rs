@@ -26,13 +26,13 @@ fn is_window_wide(state: &State) -> bool {
 }
 
 /// Returns the area left for the curve and the history, next to or below the lines.
-fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
+fn curve_and_history_area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_window_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
     let used = available_line_width(state, panel);
     let area = if used < panel.width {
-        super::text::right_part(panel, used + 2)
+        super::text::remaining_row_area(panel, used + 2)
     } else {
         // Leave one empty row above.
         let used = (lines + u16::from(lines > 0)).min(panel.height);
@@ -64,21 +64,21 @@ pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not
 /// move when the results change.
 fn divide_curve_and_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
-    let area = free_area(state, panel, lines);
+    let area = curve_and_history_area(state, panel, lines);
     let is_over = state.work.activity == WorkerActivity::Done && !state.picture.history.is_viewing_older();
-    let wants_curve = |area| is_over && curve::chart_rows(state, area).is_some();
+    let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();
     if area.width >= DIVIDED {
         // Place them side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
         let gap = if half > 0 { 2 } else { 0 };
-        return (Rect { width: half, ..area }, super::text::right_part(area, half + gap));
+        return (Rect { width: half, ..area }, super::text::remaining_row_area(area, half + gap));
     }
     if !wants_curve(area) {
         return (Rect::ZERO, area);
     }
     // The curve is at the top and the strip gets the remaining space. If the strip would not fit, the curve
     // is omitted.
-    let rows = curve::chart_rows(state, area).unwrap_or(0);
+    let rows = curve::chart_height(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };
     if strip::rows_used_by_strip(state, below) > 0 || strip::rows_used_by_strip(state, area) == 0 {

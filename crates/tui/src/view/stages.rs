@@ -1,7 +1,8 @@
 //! The stages. Each stage has its own line during a render, and all share a single line afterwards.
 
 use super::text::{
-    TextRole, format_count, format_seconds, format_time_difference, text_columns, truncated_text, wrap_text,
+    TextRole, format_count_with_noun, format_seconds, format_time_difference, text_columns, truncated_text,
+    wrap_text,
 };
 use crate::messages;
 use crate::pipeline::protocol::{Stage, StageReport, Status};
@@ -142,14 +143,14 @@ fn format_stage_summary(state: &State, is_long: bool, counts: impl Fn(&StageRepo
     }
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
-        let stages = if is_long { format_count(reused, "stage") } else { reused.to_string() };
+        let stages = if is_long { format_count_with_noun(reused, "stage") } else { reused.to_string() };
         line.push((comma.to_owned() + &messages::cached_stage_count(&stages), TextRole::Faint));
     }
     line
 }
 
 /// Name of the running stage.
-pub(super) fn running_stage(state: &State) -> Option<&'static str> {
+pub(super) fn running_stage_name(state: &State) -> Option<&'static str> {
     let mut stages = state.work.stages.iter().flatten();
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }

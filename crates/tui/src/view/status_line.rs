@@ -6,14 +6,14 @@ use ratatui::layout::Rect;
 
 use super::extras::FileLinksAndDelayedText;
 use super::layout::Layout;
-use super::stages::{self, running_stage};
+use super::stages::{self, running_stage_name};
 use super::text::{
     TextRole, floor_percent, format_approximate_time, format_bytes, format_duration, format_running_time,
-    format_two_digit_percent, progress_bar_parts, put_text, put_text_right, right_part, text_columns,
+    format_two_digit_percent, progress_bar_parts, put_text, put_text_right, remaining_row_area, text_columns,
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::protocol::{NoiseProgress, RenderProgress, SavedSceneImageState};
+use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneImageState};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
 use crate::scene::has_mesh_extension;
@@ -61,9 +61,13 @@ fn status_content(state: &State) -> StatusContent {
         WorkerActivity::Running { .. } => StatusContent::ProgressBar,
         WorkerActivity::Done => StatusContent::Summary,
         WorkerActivity::Waiting | WorkerActivity::Cancelled => StatusContent::Nothing,
-        WorkerActivity::Broken if let Some(progress) = last_good_progress(state) => StatusContent::Words(
-            format!("{}: {} %", messages::LAST_GOOD_SCENE, floor_percent(progress.fraction)),
-        ),
+        WorkerActivity::Broken if let Some(progress) = last_valid_scene_progress(state) => {
+            StatusContent::Words(format!(
+                "{}: {} %",
+                messages::LAST_GOOD_SCENE,
+                floor_percent(progress.fraction)
+            ))
+        }
         WorkerActivity::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
@@ -84,7 +88,7 @@ pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
 }
 
 /// Progress of the last valid scene's render, which continues while the file is broken.
-pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
+pub(crate) fn last_valid_scene_progress(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, WorkerActivity::Broken | WorkerActivity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
@@ -111,12 +115,13 @@ fn progress_fraction_and_text(state: &State, layout: &Layout) -> (f64, String) {
 
 /// Draws the progress bar for the asset being loaded or the render.
 fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
-    let name = running_stage(state).unwrap_or_default();
+    let name = running_stage_name(state).unwrap_or_default();
     let (fraction, words) = progress_fraction_and_text(state, layout);
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // While paused, the remaining time is unknown.
-    let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
+    let noise =
+        noise.map(|noise| NoisePrediction { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= text_columns(noise) + 3 + MIN_BAR;
     let noise = noise.and_then(|noise| noise_texts(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
@@ -142,7 +147,7 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
 
 /// Formats the noise as `noise 2.1 % → 1 % in about 14 s` and in a shorter variant. It is called noise rather
 /// than error because a noise-free image may still be biased.
-fn noise_texts(noise: &NoiseProgress) -> [String; 2] {
+fn noise_texts(noise: &NoisePrediction) -> [String; 2] {
     let now = format!("noise {}", format_two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {
         format!("{now} → {} in {}", format_two_digit_percent(level), format_approximate_time(seconds))
@@ -185,7 +190,7 @@ fn draw_summary(
         is_room(file);
     }
     let used = drawn.put_line_with_links(state, area, &pieces, buffer);
-    let free = right_part(area, used + 2);
+    let free = remaining_row_area(area, used + 2);
     let short = if has_mesh_extension(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
     let words = [save_scene_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
@@ -204,7 +209,7 @@ fn draw_summary(
 /// Name and size of each written file. Empty if the panel lists the files.
 fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextRole)>> {
     let pieces = |written: &WrittenFile| {
-        let name = written.display_path();
+        let name = written.escaped_path();
         let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), TextRole::Faint), (name, TextRole::File), (size, TextRole::Faint)]
     };
@@ -214,7 +219,7 @@ fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextR
 /// The files that contain the current image.
 pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &WrittenFile> {
     // If the scene's own image has not changed, it may have been written by an earlier request.
-    let is_own = state.request.has_no_key_overrides();
+    let is_own = state.request.has_no_keyboard_overrides();
     let of_any_request = is_own && state.saving.unwritten.is_none();
     state
         .saving
@@ -232,15 +237,18 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
         return Vec::new();
     }
     let by_hand = saving.manually_written_image();
-    if state.request.has_no_key_overrides() {
+    if state.request.has_no_keyboard_overrides() {
         let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
         let words = |file: &WrittenFile| {
-            messages::written_image_differs(&file.display_path(), &file.describe_key_changes().join(", "))
+            messages::written_image_differs(
+                &file.escaped_path(),
+                &file.describe_keyboard_changes().join(", "),
+            )
         };
         return by_hand.map(words).into_iter().collect();
     }
     if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
-        return vec![messages::written_image_unfinished(&file.display_path())];
+        return vec![messages::written_image_unfinished(&file.escaped_path())];
     }
     if !state.can_overwrite_outputs() {
         return vec![messages::NOT_SAVED_WITH_CONFLICT.to_owned()];
@@ -248,15 +256,15 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     let image_name = exit_summary::output_file_names(state);
     let other = match (saving.own, by_hand, image_name) {
         (_, Some(file), _) => Some(messages::image_written_with_changes(
-            &file.display_path(),
-            &file.describe_key_changes().join(", "),
+            &file.escaped_path(),
+            &file.describe_keyboard_changes().join(", "),
         )),
         (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
         (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {
             Some(messages::scene_image_unfinished(&name, floor_percent(fraction)))
         }
         (SceneImageProgress { state: SavedSceneImageState::NotBegun, .. }, None, Some(name)) => {
-            let is_older = !saving.written.is_empty() && saving.is_older_than_edit();
+            let is_older = !saving.written.is_empty() && saving.are_images_outdated();
             is_older.then(|| messages::scene_image_outdated(&name))
         }
     };
@@ -299,7 +307,7 @@ fn is_scene_unreadable(state: &State) -> bool {
 /// Describes the cost of the last preview in two variants: bytes sent with and without the round-trip time.
 fn preview_cost_variants(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
-    let cost = |time| messages::preview_transfer_cost(frame.bytes.div_ceil(1000), time);
+    let cost = |time| messages::preview_bytes_and_round_trip(frame.bytes.div_ceil(1000), time);
     let time = frame.round_trip.map(|time| time.as_millis().max(1));
     time.map(|time| cost(Some(time))).into_iter().chain([cost(None)]).collect()
 }

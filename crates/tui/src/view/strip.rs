@@ -2,8 +2,8 @@
 //! one.
 
 use super::preview;
-use super::strip_words::{EntryText, fit_text};
-use super::text::{TextRole, nth_row, put_text, right_part};
+use super::strip_words::{EntryNumberAndChanges, wrap_entry_text};
+use super::text::{TextRole, nth_row, put_text, remaining_row_area};
 use crate::action::Action;
 use crate::film::Srgb8Image;
 use crate::keymap;
@@ -32,7 +32,7 @@ const MIN_WORDS: u16 = 10;
 const COLUMN: u16 = 44;
 
 /// A history entry and its position in the strip.
-struct StripEntry {
+struct StripEntryLayout {
     /// Index into the history.
     index: usize,
     cells: Rect,
@@ -44,8 +44,9 @@ pub(super) fn draw_history_strip(state: &State, area: Rect, buffer: &mut Buffer)
     let items = visible_entries(state, area);
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
-    let keys =
-        keymap::binding_for(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
+    let keys = keymap::binding_for_action(Action::OlderRender)
+        .map_or("", |binding| binding.label)
+        .replace(' ', " / ");
     let title = Rect { y: top - 1, height: 1, ..area };
     put_text(
         buffer,
@@ -63,7 +64,11 @@ pub(super) fn draw_history_strip(state: &State, area: Rect, buffer: &mut Buffer)
     }
 }
 
-fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buffer: &mut Buffer) {
+fn draw_entry(
+    state: &State,
+    StripEntryLayout { index, cells, rows }: &StripEntryLayout,
+    buffer: &mut Buffer,
+) {
     let history = &state.picture.history;
     let Some(picture) = history.thumbnail(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
@@ -72,21 +77,27 @@ fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buf
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", TextRole::Strong) } else { (" ", TextRole::Plain) };
     // The text next to the thumbnail starts at the same column with or without a mark.
-    let words = EntryText {
-        head: format!("{mark}{} ", render_label(state, *index)),
+    let words = EntryNumberAndChanges {
+        head: format!("{mark}{} ", render_number_label(state, *index)),
         changes: history.describe_changes(*index, is_entry_rendering(state, *index)),
     };
-    let beside = right_part(*cells, place.width + 1);
-    let lines = fit_text(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
+    let beside = remaining_row_area(*cells, place.width + 1);
+    let lines =
+        wrap_entry_text(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
     for (y, line) in (0..rows.entry).zip(&lines) {
         put_text(buffer, nth_row(beside, y), &[(line, tone)], state.display.depth);
     }
 }
 
 /// Number of the render that produced an entry, or a dash if the render was stopped.
-fn render_label(state: &State, index: usize) -> String {
+fn render_number_label(state: &State, index: usize) -> String {
     let under_way = is_entry_rendering(state, index).then_some(state.work.renders + 1);
-    state.picture.history.render_number(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
+    state
+        .picture
+        .history
+        .render_number_at(index)
+        .or(under_way)
+        .map_or("–".to_owned(), |run| run.to_string())
 }
 
 /// Whether an entry's render is still running.
@@ -110,7 +121,7 @@ pub(super) fn rows_used_by_strip(state: &State, area: Rect) -> u16 {
 }
 
 /// The entries that fit at the bottom of an area, newest first. The entry being viewed is always included.
-fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
+fn visible_entries(state: &State, area: Rect) -> Vec<StripEntryLayout> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
@@ -133,13 +144,16 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
         let y = area.bottom() + gap - (high - line) * rows.pitch;
         Rect { x: area.x + column * width, y, width: width - beside, height: rows.entry }
     };
-    let item =
-        |number: usize| StripEntry { index: first + shown - 1 - number, cells: place(number as u16), rows };
+    let item = |number: usize| StripEntryLayout {
+        index: first + shown - 1 - number,
+        cells: place(number as u16),
+        rows,
+    };
     (0..shown).map(item).collect()
 }
 
 /// Returns the index of the history entry shown at a cell in the strip.
 pub(super) fn entry_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
-    let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
+    let is_there = |item: &StripEntryLayout| item.cells.contains((column, row).into());
     visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)
 }

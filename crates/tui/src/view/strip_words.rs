@@ -6,7 +6,7 @@ use crate::messages;
 use crate::scene::{key_parts, shortened_key, split_at_unquoted_space};
 
 /// Text of a history entry.
-pub(super) struct EntryText {
+pub(super) struct EntryNumberAndChanges {
     /// The entry's mark and number, followed by a space.
     pub(super) head: String,
     /// Changes since the previous entry.
@@ -30,14 +30,14 @@ enum ChangeDetail {
 
 /// Formats the text as lines of `width` columns. Tries to fit it into `rows[0]` rows, then into `rows[1]`. If
 /// it fits neither, the excess is appended to the last line.
-pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
+pub(super) fn wrap_entry_text(words: &EntryNumberAndChanges, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeDetail::Full, ChangeDetail::New, ChangeDetail::Short];
     let count = words.changes.len();
     let fewer = (1..count).rev().map(ChangeDetail::First).chain([ChangeDetail::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| fill_lines(&words.head, &shown_change_pieces(words, form, width), width);
+    let lines = |form| fill_lines(&words.head, &split_shown_changes(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
     let fits = |(form, rows): (ChangeDetail, usize)| {
@@ -55,7 +55,11 @@ pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec
 }
 
 /// Splits all displayed changes into pieces.
-fn shown_change_pieces(words: &EntryText, form: ChangeDetail, width: usize) -> Vec<ChangePiece> {
+fn split_shown_changes(
+    words: &EntryNumberAndChanges,
+    form: ChangeDetail,
+    width: usize,
+) -> Vec<UnbreakablePiece> {
     let changes = &words.changes;
     let told = match form {
         ChangeDetail::Full | ChangeDetail::New | ChangeDetail::Short => changes.len(),
@@ -70,23 +74,23 @@ fn shown_change_pieces(words: &EntryText, form: ChangeDetail, width: usize) -> V
             () if change == messages::STOPPED => ":",
             () => ";",
         };
-        if let Some(ChangePiece { text, .. }) = pieces.last_mut() {
+        if let Some(UnbreakablePiece { text, .. }) = pieces.last_mut() {
             *text += end;
         }
     }
     if told < changes.len() {
-        pieces.push(ChangePiece::from_text("…"));
+        pieces.push(UnbreakablePiece::from_text("…"));
     }
     pieces
 }
 
 /// Text that is kept on one line if possible.
-struct ChangePiece {
+struct UnbreakablePiece {
     text: String,
     is_key: bool,
 }
 
-impl ChangePiece {
+impl UnbreakablePiece {
     fn from_text(text: impl Into<String>) -> Self {
         Self { text: text.into(), is_key: false }
     }
@@ -105,13 +109,13 @@ impl ChangePiece {
 }
 
 /// Splits a change into pieces: the key and its values, or single words.
-fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<ChangePiece> {
-    let words = |text: &str| text.split(' ').map(ChangePiece::from_text).collect::<Vec<_>>();
-    let key = |key: &str| ChangePiece { text: format_key(key, form, beside_head), is_key: true };
+fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<UnbreakablePiece> {
+    let words = |text: &str| text.split(' ').map(UnbreakablePiece::from_text).collect::<Vec<_>>();
+    let key = |key: &str| UnbreakablePiece { text: format_key(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
         let (name, value) = split_at_unquoted_space(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
-        return [ChangePiece::from_text(sign), key(name)].into_iter().chain(value).collect();
+        return [UnbreakablePiece::from_text(sign), key(name)].into_iter().chain(value).collect();
     }
     let of_key = split_at_unquoted_space(change).filter(|_| !change.starts_with("line "));
     let Some((name, old, new)) = of_key.and_then(|(name, values)| {
@@ -120,9 +124,9 @@ fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<Ch
     }) else {
         return words(change);
     };
-    let new = ChangePiece::from_text(format!("→ {new}"));
+    let new = UnbreakablePiece::from_text(format!("→ {new}"));
     match form {
-        ChangeDetail::Full => vec![key(name), ChangePiece::from_text(old), new],
+        ChangeDetail::Full => vec![key(name), UnbreakablePiece::from_text(old), new],
         ChangeDetail::New | ChangeDetail::Short | ChangeDetail::First(_) | ChangeDetail::Cut => {
             vec![key(name), new]
         }
@@ -148,7 +152,7 @@ fn last_key_parts(key: &str) -> String {
 
 /// Fills lines with pieces. The first line starts with `head`. Pieces that are too long are broken. Keys are
 /// broken after a dot, and other pieces between words.
-fn fill_lines(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
+fn fill_lines(head: &str, pieces: &[UnbreakablePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
     for piece in pieces {
@@ -176,7 +180,7 @@ mod tests {
 
     fn lines(number: &str, changes: &[&str], width: usize) -> Vec<String> {
         let changes = changes.iter().map(|change| (*change).to_owned()).collect();
-        fit_text(&EntryText { head: format!("{number} "), changes }, width, [3, 4])
+        wrap_entry_text(&EntryNumberAndChanges { head: format!("{number} "), changes }, width, [3, 4])
     }
 
     #[test]

@@ -120,7 +120,7 @@ pub(super) fn nth_row(area: Rect, index: u16) -> Rect {
 }
 
 /// The part of a row to the right of the used columns.
-pub(super) fn right_part(area: Rect, used: u16) -> Rect {
+pub(super) fn remaining_row_area(area: Rect, used: u16) -> Rect {
     let used = used.min(area.width);
     Rect { x: area.x + used, width: area.width - used, ..area }
 }
@@ -259,7 +259,7 @@ pub(super) fn format_three_digit_number(x: f32) -> String {
 }
 
 /// Formats a count with its noun, such as `1 error` or `2 errors`.
-pub(crate) fn format_count(count: usize, what: &str) -> String {
+pub(crate) fn format_count_with_noun(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 

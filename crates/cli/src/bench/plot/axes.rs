@@ -53,12 +53,12 @@ impl Ranged for LogAxis {
 }
 
 /// Formats a mark as `10⁻³`, `2·10⁻³` or `5`.
-pub(super) fn format_power_of_ten(mark: f64) -> String {
+pub(super) fn format_log_axis_mark(mark: f64) -> String {
     let (factor, whole) = digit_and_exponent(mark);
     if whole == 0 {
         return factor.to_string();
     }
-    let digits = format!("{whole}").chars().map(to_superscript).collect::<String>();
+    let digits = format!("{whole}").chars().map(superscript_char).collect::<String>();
     if factor == 1 { format!("10{digits}") } else { format!("{factor}·10{digits}") }
 }
 
@@ -69,7 +69,7 @@ pub(super) fn format_decimal(mark: f64) -> String {
         let decimals = (-whole).max(0) as usize;
         format!("{:.decimals$}", f64::from(factor) * libm::pow(10.0, f64::from(whole)))
     } else {
-        format_power_of_ten(mark)
+        format_log_axis_mark(mark)
     }
 }
 
@@ -79,7 +79,7 @@ fn digit_and_exponent(mark: f64) -> (i32, i32) {
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
 }
 
-fn to_superscript(digit: char) -> char {
+fn superscript_char(digit: char) -> char {
     match digit {
         '-' => '⁻',
         '1' => '¹',
@@ -106,12 +106,12 @@ mod tests {
         let near = LogAxis::spanning([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
         let names: Vec<String> = near.marks.iter().map(|mark| format_decimal(*mark)).collect();
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
-        let names: Vec<String> = near.marks.iter().map(|mark| format_power_of_ten(*mark)).collect();
+        let names: Vec<String> = near.marks.iter().map(|mark| format_log_axis_mark(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
         assert_eq!(LogAxis::spanning([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
         let half = LogAxis::spanning([1e-2, 1.0].into_iter(), 0.5).range;
         assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
-        assert_eq!(format_power_of_ten(libm::log10(5.0)), "5");
+        assert_eq!(format_log_axis_mark(libm::log10(5.0)), "5");
         assert_eq!((format_decimal(2.0).as_str(), format_decimal(-12.0).as_str()), ("100", "10⁻¹²"));
     }
 }

@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::AXES;
-use super::axes::{LogAxis, format_decimal, format_power_of_ten};
+use super::axes::{LogAxis, format_decimal, format_log_axis_mark};
 use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -53,7 +53,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
         .x_desc(AXES[0])
         .y_desc(AXES[1])
         .x_label_formatter(&|mark| format_decimal(*mark))
-        .y_label_formatter(&|mark| format_power_of_ten(*mark))
+        .y_label_formatter(&|mark| format_log_axis_mark(*mark))
         .draw()?;
     if noise > 0.0 {
         draw_reference_noise(&mut chart, libm::log10(noise), &across)?;

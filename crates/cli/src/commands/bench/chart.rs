@@ -12,7 +12,7 @@ use crate::bench::{Results, SceneResult};
 use crate::console::Console;
 use crate::progress::format_seconds;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::tui::paint::as_text_lines;
+use crate::tui::paint::buffer_to_text_lines;
 
 /// Method colors, from the terminal's palette.
 const COLORS: [Color; 6] =
@@ -70,7 +70,7 @@ impl ConvergenceChart {
         if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
             return String::new();
         }
-        as_text_lines(&self.draw(size), is_colored)
+        buffer_to_text_lines(&self.draw(size), is_colored)
     }
 
     fn draw(&self, (columns, rows): (u16, u16)) -> Buffer {
@@ -122,7 +122,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
         crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
-        console.print_trusted_text(&as_text_lines(
+        console.print_trusted_text(&buffer_to_text_lines(
             &ConvergenceChart::from_scene(scene).draw((columns, ROWS)),
             console.is_colored(),
         ));
@@ -175,12 +175,12 @@ mod tests {
     #[test]
     fn charts_have_lines_names_and_labels() {
         let buffer = ConvergenceChart::from_scene(&scene()).draw((60, ROWS));
-        let plain = as_text_lines(&buffer, false);
+        let plain = buffer_to_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
         assert!(plain.lines().all(|line| line.chars().count() <= 60) && !plain.contains('\u{1b}'), "{plain}");
         assert_eq!(plain.matches('o').count(), 2 + 1, "expected two points and the legend: {plain}");
-        let colored = as_text_lines(&buffer, true);
+        let colored = buffer_to_text_lines(&buffer, true);
         let ends = |line: &str| line.rfind('\u{1b}') == line.rfind("\u{1b}[0m");
         assert!(colored.contains("\u{1b}[34m") && colored.lines().all(ends), "{colored}");
     }
@@ -189,7 +189,9 @@ mod tests {
     fn empty_charts_are_drawn() {
         let mut empty = scene();
         empty.methods.clear();
-        assert!(!as_text_lines(&ConvergenceChart::from_scene(&empty).draw((30, ROWS)), true).is_empty());
+        assert!(
+            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw((30, ROWS)), true).is_empty()
+        );
     }
 
     #[test]

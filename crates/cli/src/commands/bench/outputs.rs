@@ -38,7 +38,7 @@ enum OutputKind {
 
 impl BenchOutputs {
     /// Checks the outputs before measuring and reports errors.
-    pub(super) fn from_checked_args(
+    pub(super) fn try_from_args(
         args: &BenchArgs,
         scenes: &[PathBuf],
         console: &Console,

@@ -71,7 +71,7 @@ impl BenchProgress {
             BenchEvent::Done(line) => {
                 self.last = Instant::now();
                 match &self.format {
-                    ProgressFormat::Plain => self.console.print_message(&line),
+                    ProgressFormat::Plain => self.console.print_line_to_stderr(&line),
                     ProgressFormat::Json => json_line(&json!({ "event": "step", "what": line })),
                     ProgressFormat::Bar(..) | ProgressFormat::Silent => {}
                 }
@@ -117,7 +117,7 @@ impl BenchProgress {
             }
             ProgressFormat::Plain if is_due => {
                 let percent = self.fraction * 100.0;
-                self.console.print_message(&format!("{percent:3.0}% {} {to_go}", self.what));
+                self.console.print_line_to_stderr(&format!("{percent:3.0}% {} {to_go}", self.what));
             }
             ProgressFormat::Json if is_due => json_line(&json!({
                 "event": "progress", "stage": "bench", "what": self.what, "fraction": self.fraction,
@@ -144,7 +144,7 @@ impl BenchProgress {
 
     pub(super) fn report_failure(&self, kind: &str, message: &str) {
         if self.is_text() {
-            self.console.print_message(message);
+            self.console.print_line_to_stderr(message);
         } else {
             json_line(&json!({ "event": "failed", "kind": kind, "message": message }));
         }
@@ -152,7 +152,7 @@ impl BenchProgress {
 
     pub(super) fn report_cancelled(&self, message: &str) {
         if self.is_text() {
-            self.console.print_message(message);
+            self.console.print_line_to_stderr(message);
         } else {
             json_line(&json!({ "event": "cancelled" }));
         }
@@ -161,7 +161,7 @@ impl BenchProgress {
     /// Reports a warning about a written file.
     pub(super) fn report_written_file_warning(&self, message: &str) {
         if self.is_text() {
-            self.console.print_message(&format!("warning: {message}"));
+            self.console.print_line_to_stderr(&format!("warning: {message}"));
         } else {
             json_line(&json!({ "event": "warnings", "messages": [message] }));
         }
@@ -170,7 +170,7 @@ impl BenchProgress {
     pub(super) fn report_written(&self, path: &Path, bytes: usize) {
         match self.format {
             ProgressFormat::Bar(..) | ProgressFormat::Plain => {
-                self.console.print_message(&format!("wrote {}", path.display()));
+                self.console.print_line_to_stderr(&format!("wrote {}", path.display()));
             }
             ProgressFormat::Json => {
                 json_line(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 use super::format_six_significant_digits;
-use crate::args::{CompareArgs, ImageVisibility};
+use crate::args::{CompareArgs, CompareImageVisibility};
 use crate::compare::{self, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::film::RadianceImage;
@@ -19,17 +19,17 @@ const MIN_VISIBLE_FLIP: f32 = 0.1;
 pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
-        ImageVisibility::Auto => is_terminal,
-        ImageVisibility::On => true,
-        ImageVisibility::Off => false,
+        CompareImageVisibility::Auto => is_terminal,
+        CompareImageVisibility::On => true,
+        CompareImageVisibility::Off => false,
     };
     if !is_wanted {
         return String::new();
     }
     let (difference, description) = flip_or_difference_with_label(pair, measured);
     let pictures = [
-        tone_mapped(&file_name(&args.a), pair.a()),
-        tone_mapped(&format!("{}, the reference", file_name(&args.b)), pair.b()),
+        tone_mapped(&file_name_or_path(&args.a), pair.a()),
+        tone_mapped(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
         tone_mapped(&description, &difference),
     ];
     images_as_text(&pictures, args.color, is_terminal)
@@ -41,7 +41,7 @@ pub(super) fn print_images(lines: &str, console: &Console) {
     }
 }
 
-fn file_name(path: &Path) -> String {
+fn file_name_or_path(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 

@@ -144,7 +144,7 @@ fn quote_text_for_bash(text: &str, quote: Quote, keeps_home: bool) -> Option<Str
     if text.chars().any(char::is_control) {
         // Control characters cannot be written inside quotes.
         return (quote == Quote::None)
-            .then(|| format!("$'{}'", text.chars().map(escape_for_dollar_quotes).collect::<String>()));
+            .then(|| format!("$'{}'", text.chars().map(escape_char_for_dollar_quotes).collect::<String>()));
     }
     let mut out = String::new();
     for (at, character) in text.chars().enumerate() {
@@ -170,7 +170,7 @@ fn quote_text_for_bash(text: &str, quote: Quote, keeps_home: bool) -> Option<Str
 }
 
 /// Escapes a character for `$'…'`.
-fn escape_for_dollar_quotes(character: char) -> String {
+fn escape_char_for_dollar_quotes(character: char) -> String {
     match character {
         '\'' | '\\' => format!("\\{character}"),
         // Write all three octal digits, because the next character may be a digit.

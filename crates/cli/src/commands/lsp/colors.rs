@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::document::OpenDocument;
 use crate::math::color::{linear_to_srgb, srgb8_to_linear};
 use crate::scene::keys::key::ValueKind;
-use crate::scene::keys::parse_color_bytes;
+use crate::scene::keys::parse_hex_or_named_srgb8;
 use crate::scene::outline::OutlineKey;
 
 /// Returns all colors in a document.
@@ -21,7 +21,7 @@ pub(super) fn document_colors(document: &OpenDocument) -> Value {
                 Some(ValueKind::Color(_) | ValueKind::ColorOrTexture(_) | ValueKind::Emission(_))
             );
             if let Some(color) = parse_color(&document.text, key).filter(|_| is_color) {
-                found.push(ColorInformation { range: document.span(&key.value), color });
+                found.push(ColorInformation { range: document.to_lsp_range(&key.value), color });
             }
         }
     }
@@ -31,7 +31,7 @@ pub(super) fn document_colors(document: &OpenDocument) -> Value {
 /// Parses a value as a color. Numbers are clamped to 1.
 fn parse_color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
-        Some(text) => parse_color_bytes(text)?,
+        Some(text) => parse_hex_or_named_srgb8(text)?,
         None => {
             let list = text.get(key.value.clone())?.strip_prefix('[')?.strip_suffix(']')?;
             let numbers: Vec<f32> =

@@ -7,7 +7,7 @@ use lsp_types::{
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use super::look::{describe_key, texture_keys};
+use super::look::{describe_key, texture_reference_keys};
 use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names};
@@ -22,14 +22,15 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
             of.key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
         CursorContext::InnerKey { given } => {
-            let keys = texture_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
+            let keys =
+                texture_reference_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
             keys.map(|(name, doc)| {
                 completion_item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = "))
             })
             .collect()
         }
         CursorContext::InnerValue { key, is_quoted } => match key.as_str() {
-            "texture" => table_name_items(document, "textures", is_quoted),
+            "texture" => defined_name_items(document, "textures", is_quoted),
             "channel" => choice_items(
                 &crate::scene::keys::key::choice_values::<crate::scene::description::Channel>(),
                 is_quoted,
@@ -99,7 +100,7 @@ fn missing_key_items(of: CursorTable, given: &[String], is_assigned: bool) -> Ve
         item.detail = Some(key.kind_text().replace('`', ""));
         item
     };
-    items.extend(of.keys().iter().filter(|key| !is_given(key.name)).map(key));
+    items.extend(of.allowed_keys().iter().filter(|key| !is_given(key.name)).map(key));
     items
 }
 
@@ -129,9 +130,9 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         ValueKind::Flag => ["true", "false"]
             .map(|flag| completion_item(flag, CompletionItemKind::VALUE, "", flag.to_owned()))
             .to_vec(),
-        ValueKind::Material | ValueKind::Texture | ValueKind::Heights => {
-            kind.defining_table().map_or_else(Vec::new, |table| table_name_items(document, table, is_quoted))
-        }
+        ValueKind::Material | ValueKind::Texture | ValueKind::Heights => kind
+            .defining_table()
+            .map_or_else(Vec::new, |table| defined_name_items(document, table, is_quoted)),
         ValueKind::Color(_) => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) if is_quoted => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) => {
@@ -161,7 +162,7 @@ fn choice_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
 
 /// Returns candidates for the names of the tables in `table`. For example, `[materials.wall]` defines the
 /// name `wall`.
-fn table_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
+fn defined_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());
     named

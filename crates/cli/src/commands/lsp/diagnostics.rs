@@ -38,7 +38,8 @@ pub(super) fn file_diagnostics(
 fn to_lsp_diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnostic {
     let is_here = one.path == document.path;
     let place = one.place.as_ref();
-    let range = place.filter(|_| is_here).map_or(Range::default(), |place| document.span(&place.span));
+    let range =
+        place.filter(|_| is_here).map_or(Range::default(), |place| document.to_lsp_range(&place.span));
     let label = place.map(|place| place.label.as_str()).filter(|label| !label.is_empty());
     let mut message =
         if is_here { one.message.clone() } else { format!("{}: {}", file_name(&one.path), one.message) };

@@ -50,7 +50,7 @@ impl OpenDocument {
         Position::new(line as u32, units as u32)
     }
 
-    pub(super) fn span(&self, range: &Range<usize>) -> Span {
+    pub(super) fn to_lsp_range(&self, range: &Range<usize>) -> Span {
         Span::new(self.position(range.start), self.position(range.end))
     }
 }

@@ -57,8 +57,8 @@ impl FileCheckThread {
     }
 
     /// Queues a check of a document's files.
-    pub(super) fn check(&self, uri: Uri, document: OpenDocument) {
-        self.shared.lock().enqueue(uri, document);
+    pub(super) fn queue_check(&self, uri: Uri, document: OpenDocument) {
+        self.shared.lock().enqueue_latest(uri, document);
         self.shared.changed.notify_one();
     }
 }
@@ -90,7 +90,7 @@ impl CheckQueue {
 }
 
 impl CheckRequests {
-    fn enqueue(&mut self, uri: Uri, document: OpenDocument) {
+    fn enqueue_latest(&mut self, uri: Uri, document: OpenDocument) {
         if let Some((_, token)) = self.running.as_ref().filter(|(running, _)| *running == uri) {
             token.cancel();
         }
@@ -122,19 +122,19 @@ mod tests {
         let uri = |name: &str| name.parse::<Uri>().expect("an address");
         let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
         let mut requests = CheckRequests::default();
-        requests.enqueue(uri("file:///a"), document(1));
+        requests.enqueue_latest(uri("file:///a"), document(1));
         let (_, _, first) = requests.start_next().expect("a request");
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {
-            requests.enqueue(uri(name), document(version));
+            requests.enqueue_latest(uri(name), document(version));
         }
         assert!(first.is_cancelled(), "a newer request replaces it");
         let mut next = || requests.start_next().map(|(uri, document, _)| (uri.to_string(), document.version));
         assert_eq!(next(), Some(("file:///b".to_owned(), 1)));
         assert_eq!(next(), Some(("file:///a".to_owned(), 3)));
         assert_eq!(next(), None);
-        requests.enqueue(uri("file:///b"), document(2));
+        requests.enqueue_latest(uri("file:///b"), document(2));
         let (_, _, last) = requests.start_next().expect("a request");
-        requests.enqueue(uri("file:///c"), document(1));
+        requests.enqueue_latest(uri("file:///c"), document(1));
         assert!(!last.is_cancelled());
         requests.shut_down();
         assert!(last.is_cancelled() && requests.start_next().is_none());

@@ -45,10 +45,10 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
             None => return None,
         }
     } else {
-        texture_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
+        texture_reference_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
     };
     let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
-    Some(json!(Hover { contents, range: Some(document.span(&key.name.span)) }))
+    Some(json!(Hover { contents, range: Some(document.to_lsp_range(&key.name.span)) }))
 }
 
 /// Describes a key in Markdown: description, unit, range and default.
@@ -65,7 +65,7 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
         "default",
         match key.default {
             DefaultValue::Absent => String::new(),
-            DefaultValue::Required(_) | DefaultValue::Is(_) | DefaultValue::By(_) => key.default_text(),
+            DefaultValue::Required(_) | DefaultValue::Is(_) | DefaultValue::By(_) => key.default_markdown(),
         },
     );
     if let ValueKind::Words(list) = key.kind {
@@ -75,7 +75,7 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
 }
 
 /// Returns the keys allowed in a texture's inline table.
-pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
+pub(super) fn texture_reference_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
         ("channel", "The channel to read: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
@@ -97,5 +97,5 @@ pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value
     let named =
         document.tables.iter().filter(|one| one.info.name == group).filter_map(|one| one.name.as_ref());
     let definition = named.into_iter().find(|one| one.text == name)?;
-    Some(json!(document.span(&definition.span)))
+    Some(json!(document.to_lsp_range(&definition.span)))
 }

@@ -193,7 +193,7 @@ impl Server<'_> {
             DidOpenTextDocument::METHOD => {
                 if let Some(DidOpenTextDocumentParams { text_document: one }) = parse_params(params) {
                     self.store_and_diagnose_document(&one.uri, one.version, one.text);
-                    self.queue_file_check(&one.uri);
+                    self.queue_referenced_files_check(&one.uri);
                 }
             }
             DidChangeTextDocument::METHOD => {
@@ -215,7 +215,7 @@ impl Server<'_> {
             }
             DidSaveTextDocument::METHOD => {
                 if let Some(DidSaveTextDocumentParams { text_document, .. }) = parse_params(params) {
-                    self.queue_file_check(&text_document.uri);
+                    self.queue_referenced_files_check(&text_document.uri);
                 }
             }
             DidCloseTextDocument::METHOD => {
@@ -243,10 +243,10 @@ impl Server<'_> {
     }
 
     /// Queues a check of the files referenced by a document.
-    fn queue_file_check(&self, uri: &Uri) {
+    fn queue_referenced_files_check(&self, uri: &Uri) {
         let document = self.documents().get(uri.as_str()).cloned();
         if let (Some(files), Some(document)) = (&self.files, document) {
-            files.check(uri.clone(), document);
+            files.queue_check(uri.clone(), document);
         }
     }
 }

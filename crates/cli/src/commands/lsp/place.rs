@@ -28,7 +28,7 @@ pub(super) struct CursorTable {
 
 impl CursorTable {
     /// The keys allowed in the table.
-    pub(super) fn keys(&self) -> Vec<&'static KeyInfo> {
+    pub(super) fn allowed_keys(&self) -> Vec<&'static KeyInfo> {
         self.info.keys_for_type(self.kind).collect()
     }
 
@@ -78,11 +78,11 @@ fn context_in_table(
     if opened > closed {
         return Some(context_in_inline_table(typed.rsplit('{').next().unwrap_or_default()));
     }
-    let current = if is_inline { last_item(typed) } else { typed };
+    let current = if is_inline { last_list_item(typed) } else { typed };
     let Some((key, value)) = current.split_once('=') else {
         let is_assigned =
             after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').trim_start().starts_with('=');
-        return Some(CursorContext::Key { of, given: keys_present(body, current.trim()), is_assigned });
+        return Some(CursorContext::Key { of, given: other_keys_present(body, current.trim()), is_assigned });
     };
     let is_whole = !is_in_quotes(value) && value.contains(['"', '\'']);
     let is_open = !(is_whole || value.contains('['));
@@ -90,17 +90,19 @@ fn context_in_table(
 }
 
 fn context_in_inline_table(typed: &str) -> CursorContext {
-    let current = last_item(typed);
+    let current = last_list_item(typed);
     match current.split_once('=') {
         Some((key, value)) => {
             CursorContext::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
         }
-        None => CursorContext::InnerKey { given: keys_present(&typed.replace(',', "\n"), current.trim()) },
+        None => {
+            CursorContext::InnerKey { given: other_keys_present(&typed.replace(',', "\n"), current.trim()) }
+        }
     }
 }
 
 /// Returns the last item in a comma-separated list. Ignores commas within brackets.
-fn last_item(typed: &str) -> &str {
+fn last_list_item(typed: &str) -> &str {
     let mut depth = 0_i32;
     let mut start = 0;
     for (at, character) in typed.char_indices() {
@@ -212,7 +214,7 @@ fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TableType
         let (key, value) = item.split_once('=')?;
         (key.trim() == "type").then(|| first_string(value)).flatten()
     });
-    info.find_type(named).or_else(|| info.find_type(None))
+    info.find_type_or_default(named).or_else(|| info.find_type_or_default(None))
 }
 
 /// Contents of the first string in a value.
@@ -222,7 +224,7 @@ fn first_string(value: &str) -> Option<&str> {
 }
 
 /// Returns the keys in `body`, except the key being typed.
-fn keys_present(body: &str, typed: &str) -> Vec<String> {
+fn other_keys_present(body: &str, typed: &str) -> Vec<String> {
     let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
     keys.filter(|key| key != typed).collect()
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::control::{CancelToken, Cancelled};
 use crate::output::part::{self, PartFile};
 use crate::output::{is_same_file, scene_path};
-use crate::pipeline::companion_files;
+use crate::pipeline::files_referenced_by_assets;
 use crate::scene::referenced_files;
 use crate::scene::sanitize::escape_invisible_chars;
 
@@ -46,7 +46,7 @@ impl<'a> RenderInputFiles<'a> {
             Some(format!("the parts' scene references it ({name})"))
         };
         let by_name = || {
-            let name = part::input_name_by_path(self.parts, path)?;
+            let name = part::find_input_by_path_suffix(self.parts, path)?;
             Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {
@@ -63,7 +63,7 @@ impl<'a> RenderInputFiles<'a> {
         match self.companions.get() {
             Some(companions) => Ok(companions),
             None => {
-                let companions = companion_files(self.named.iter(), self.token)?;
+                let companions = files_referenced_by_assets(self.named.iter(), self.token)?;
                 Ok(self.companions.get_or_init(|| companions))
             }
         }

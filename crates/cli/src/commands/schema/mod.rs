@@ -66,7 +66,7 @@ fn table_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
         (true, _) => {
             object_schema(&info.keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
         }
-        (false, SchemaDraft::Four) => all_types_schema(info),
+        (false, SchemaDraft::Four) => all_types_table_schema(info),
         (false, SchemaDraft::Latest) => schema_by_type(info),
     };
     for (name, condition) in table_key_conditions(info.name, draft) {
@@ -116,7 +116,7 @@ fn description(key: &KeyInfo) -> String {
         |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
     let default = match key.default {
         DefaultValue::Required(_) => "\n\nRequired.".to_owned(),
-        DefaultValue::Is(_) | DefaultValue::By(_) => named("Default", key.default_text()),
+        DefaultValue::Is(_) | DefaultValue::By(_) => named("Default", key.default_markdown()),
         DefaultValue::Absent => String::new(),
     };
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range_text()))
@@ -158,7 +158,7 @@ fn type_key_schema(info: &TableInfo) -> Value {
 
 /// Returns the schema for a table that accepts the keys of all types. Dependencies restrict each key to its
 /// types.
-fn all_types_schema(info: &'static TableInfo) -> Value {
+fn all_types_table_schema(info: &'static TableInfo) -> Value {
     let draft = SchemaDraft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
     properties.insert("type".to_owned(), type_key_schema(info));

@@ -38,7 +38,7 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
             any_of(color_schemas(limits, draft), texture_reference_schema(json!({ "scale": scale })))
         }
         ValueKind::NumberOrTexture(limits) => {
-            any_of(vec![number_schema(limits, draft)], texture_channel_schema())
+            any_of(vec![number_schema(limits, draft)], texture_with_channel_schema())
         }
         ValueKind::Numbers(count, _, limits) => number_array_schema(count, limits, draft),
         ValueKind::Scale(limits) => {
@@ -46,7 +46,7 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         }
         ValueKind::Texture | ValueKind::Material => json!({ "type": "string", "minLength": 1 }),
         ValueKind::Heights => {
-            any_of(vec![json!({ "type": "string", "minLength": 1 })], texture_channel_schema())
+            any_of(vec![json!({ "type": "string", "minLength": 1 })], texture_with_channel_schema())
         }
     }
 }
@@ -141,7 +141,7 @@ fn texture_reference_schema(more: Value) -> Value {
 }
 
 /// Returns the schema for `{ texture = "name", channel = "r" }`.
-fn texture_channel_schema() -> Value {
+fn texture_with_channel_schema() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
     let doc = "The channel to read. The default is luminance, or alpha for opacity.";
     texture_reference_schema(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))

@@ -129,7 +129,7 @@ pub enum Alpha {
 
 /// Solid glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Glass {
+pub struct TintedGlass {
     /// Transmittance per unit distance.
     pub tint: DVec3,
 }
@@ -168,7 +168,7 @@ pub struct ModelMaterial {
     /// Whether both sides are visible and emit light.
     pub is_two_sided: bool,
     /// Solid glass. If set, all other parameters except the roughness are ignored.
-    pub glass: Option<Glass>,
+    pub glass: Option<TintedGlass>,
 }
 
 impl ModelMaterial {

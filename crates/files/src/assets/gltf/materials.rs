@@ -1,7 +1,9 @@
 //! Converts glTF materials to `principled` and `glass` parameters (glTF 2.0, 3.9, and the extensions
 //! `KHR_materials_*`).
 
-use super::description::{Alpha, Glass, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
+use super::description::{
+    Alpha, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue, TintedGlass,
+};
 use super::json::{
     CLAMP, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureInfoExtensions, TextureTransform,
 };
@@ -173,7 +175,7 @@ impl MaterialReader<'_> {
         material: &ModelMaterial,
         color: [f64; 3],
         distance: Option<f64>,
-    ) -> Option<Glass> {
+    ) -> Option<TintedGlass> {
         if material.transmission.texture.is_some() || material.transmission.factor.x < 0.5 {
             self.note("the volume is ignored because the surface is not transmissive everywhere");
             return None;
@@ -184,7 +186,7 @@ impl MaterialReader<'_> {
         let distance = distance.filter(|distance| *distance > 0.0 && distance.is_finite());
         let transmittance =
             |part: f64| distance.map_or(1.0, |distance| libm::pow(clamp_to_unit(part), 1.0 / distance));
-        Some(Glass { tint: DVec3::from(color.map(transmittance)) })
+        Some(TintedGlass { tint: DVec3::from(color.map(transmittance)) })
     }
 
     fn convert_alpha_mode(

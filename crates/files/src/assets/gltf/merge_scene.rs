@@ -9,7 +9,7 @@ use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
 use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
-use crate::math::origin::origin_near;
+use crate::math::origin::local_coordinate_origin;
 
 /// Maximum number of triangles in a merged scene, counting every instance.
 const MAX_TRIANGLES: usize = 1 << 25;
@@ -25,11 +25,11 @@ impl GltfFile {
         let Some([min, max]) = scene.bounds else {
             return Err(self.malformed_error(GltfError::new("its scene has no visible faces")));
         };
-        let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
+        let origin = local_coordinate_origin((min + max) * 0.5, (max - min).max_element() * 0.5);
         let (companions, pictures) = (self.companions.clone(), self.image_file_paths());
         let mut merged = LoadedMesh { hash: self.hash, companions, pictures, ..LoadedMesh::default() };
         merged.mesh.origin = origin;
-        merged.material_warnings = self.material_warnings(&scene);
+        merged.material_warnings = self.dropped_texture_warnings(&scene);
         merged.warnings = scene.notes;
         merged.materials = scene.materials.iter().map(to_file_material).collect();
         // Add all instances. In the merged mesh, either all vertices have an attribute or none do.
@@ -51,12 +51,12 @@ impl GltfFile {
                 ))));
             }
             append_part(&mut merged.mesh, part, &instance.placed, instance.material as u32);
-            token.check()?;
+            token.check_pause_and_cancel()?;
         }
         Ok(merged)
     }
 
-    fn material_warnings(&self, scene: &ModelScene) -> Vec<String> {
+    fn dropped_texture_warnings(&self, scene: &ModelScene) -> Vec<String> {
         let has_texture =
             |material: &ModelMaterial| material.color.texture.is_some() || material.normal.is_some();
         let textured = scene.materials.iter().filter(|material| has_texture(material)).count();

@@ -23,8 +23,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub use self::description::{
-    AffineMap, Alpha, Glass, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
-    ModelScene, TextureRef, TextureWrap, TexturedValue,
+    AffineMap, Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
+    TextureRef, TextureWrap, TexturedValue, TintedGlass,
 };
 use self::json::{JsonImage, Root, Uri};
 pub use self::references::referenced_files;
@@ -103,7 +103,7 @@ impl GltfFile {
     pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
         let monitor = Monitor { progress, token };
         let bytes = read::read_unless_zeros_at_start(path, FILE_LIMIT, monitor)?;
-        read::refuse_utf16(path, &bytes)?;
+        read::reject_utf16(path, &bytes)?;
         let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
         let (json, binary) =
@@ -180,7 +180,7 @@ impl GltfFile {
     /// Image files referenced by the glTF file, including unused ones.
     pub fn image_file_paths(&self) -> Vec<PathBuf> {
         let file = |image: &JsonImage| match &image.uri {
-            Some(Uri::File(uri)) => resolve_uri(&self.path, uri).ok(),
+            Some(Uri::File(uri)) => resolve_relative_uri(&self.path, uri).ok(),
             Some(Uri::Data(_)) | None => None,
         };
         self.root.images.iter().filter_map(file).collect()
@@ -215,7 +215,7 @@ impl GltfFile {
             .ok_or_else(|| GltfError::index_out_of_range("images", number, images.len()))?;
         match (&image.uri, image.buffer_view) {
             (Some(Uri::Data(bytes)), _) => Ok(ImageLocation::Inside(bytes)),
-            (Some(Uri::File(uri)), _) => Ok(ImageLocation::File(resolve_uri(&self.path, uri)?)),
+            (Some(Uri::File(uri)), _) => Ok(ImageLocation::File(resolve_relative_uri(&self.path, uri)?)),
             (None, Some(view)) => {
                 let views = &self.root.buffer_views;
                 let json = views
@@ -247,7 +247,7 @@ impl GltfFile {
         for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
             let part = first_part_with_same_mesh.len();
             let is_compressed = primitive.extensions.contains_key(DRACO);
-            let sets = self.coordinate_sets(primitive);
+            let sets = self.select_two_uv_sets(primitive);
             let mesh = (primitive.indices, primitive.mode, is_compressed, sets, &primitive.attributes);
             let first = *first.entry(mesh).or_insert(part);
             first_part_with_same_mesh.push(first);
@@ -288,7 +288,9 @@ impl GltfFile {
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {
-            ImageLocation::File(file) => image::read_dimensions(&file, encoding, limits, token),
+            ImageLocation::File(file) => {
+                image::read_dimensions_and_decoded_bytes(&file, encoding, limits, token)
+            }
             ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
                 image::read_embedded_dimensions(image, encoding, limits, token)
@@ -529,7 +531,7 @@ fn read_buffers(
         let bytes = match buffer.uri.take() {
             Some(Uri::Data(bytes)) => bytes,
             Some(Uri::File(uri)) => {
-                let file = resolve_uri(path, &uri).map_err(wrong)?;
+                let file = resolve_relative_uri(path, &uri).map_err(wrong)?;
                 let silent = Monitor { progress: &ignore_progress, token: monitor.token };
                 let stamp = FileStamp::from_path(&file);
                 let bytes =
@@ -562,7 +564,7 @@ fn read_buffers(
 }
 
 /// Resolves a relative URI (RFC 3986) against the path of the glTF file.
-fn resolve_uri(path: &Path, uri: &str) -> Result<PathBuf, GltfError> {
+fn resolve_relative_uri(path: &Path, uri: &str) -> Result<PathBuf, GltfError> {
     let has_scheme = uri.split(['/', '?', '#']).next().is_some_and(|first| first.contains(':'));
     if has_scheme || uri.starts_with('/') || uri.is_empty() {
         return Err(GltfError::new(not_relative_uri_message(uri)));

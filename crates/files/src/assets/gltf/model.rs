@@ -89,7 +89,7 @@ impl GltfFile {
                 ));
                 return Err(self.malformed_error(wrong.add_location(format!("nodes[{}]", instance.node))));
             }
-            token.check()?;
+            token.check_pause_and_cancel()?;
         }
         match (scene.bounds, first_wrong) {
             (None, Some(wrong)) => Err(wrong),
@@ -178,7 +178,7 @@ impl SceneWalk<'_> {
         let place = format!("nodes[{number}]");
         let shows = node.mesh.is_some() || node.extensions.light.is_some();
         if node.camera.is_some() || (is_visible && shows) {
-            check_transform_limit(node, &placed)?;
+            check_transform_magnitude(node, &placed)?;
         }
         if let Some(camera) = node.camera {
             let json = root
@@ -210,7 +210,7 @@ impl SceneWalk<'_> {
             self.notes.add(&place, "morph targets are ignored; the base shape is shown");
         }
         let placed = match node.skin {
-            Some(skin) => self.bind_pose(skin, worlds, &place)?.unwrap_or(placed),
+            Some(skin) => self.bind_pose_transform(skin, worlds, &place)?.unwrap_or(placed),
             None => placed,
         };
         let is_usable = placed.translate.is_finite() && is_invertible(&placed.linear);
@@ -229,7 +229,8 @@ impl SceneWalk<'_> {
             if self.scene.instances.len() >= MAX_INSTANCES {
                 return Err(GltfError::new(format!("more than {MAX_INSTANCES} primitive instances")));
             }
-            let material = self.material_index(primitive.material, container.coordinate_sets(primitive))?;
+            let material =
+                self.material_index(primitive.material, container.select_two_uv_sets(primitive))?;
             let colors = container.attribute(primitive, "COLOR_0")?;
             self.note_ignored_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
@@ -292,7 +293,7 @@ impl SceneWalk<'_> {
 
     /// Transform of a skin in its bind pose (glTF 2.0, 3.7.3). In this pose, all joints yield the same
     /// transform, so only the first joint is evaluated.
-    fn bind_pose(
+    fn bind_pose_transform(
         &mut self,
         number: usize,
         worlds: &WorldTransforms,
@@ -408,7 +409,7 @@ pub(super) const UNKNOWN_CAMERA: &str = "the camera is skipped: it is neither pe
 
 /// Rejects transforms with entries above the limit. If one of the node's own properties exceeds the limit,
 /// the error names that property.
-fn check_transform_limit(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
+fn check_transform_magnitude(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |largest, number| largest.max(number.abs()));
     let all = |placed: &AffineMap| {
         largest(&placed.linear.to_cols_array()).max(largest(&placed.translate.to_array()))

@@ -5,7 +5,7 @@ use super::json::{Primitive, TRIANGLES};
 use super::{GltfError, GltfFile};
 use crate::assets::mesh::assemble::assemble;
 use crate::assets::mesh::parsed::{Faces, ParsedMesh};
-use crate::assets::mesh::{MeshSource, vertex_out_of_range_message};
+use crate::assets::mesh::{MeshFileBytes, vertex_out_of_range_message};
 use crate::assets::read::Monitor;
 use crate::assets::{AssetError, LoadedMesh};
 use crate::control::{CancelToken, Progress};
@@ -66,7 +66,7 @@ impl GltfFile {
         let parsed = self
             .parse_primitive(primitive)
             .map_err(|wrong| self.malformed_error(wrong.add_location(place.clone())))?;
-        let source = MeshSource { path: &self.path, bytes: &[], monitor: Monitor { progress, token } };
+        let source = MeshFileBytes { path: &self.path, bytes: &[], monitor: Monitor { progress, token } };
         let mut loaded = assemble(&source, parsed).map_err(|error| match error {
             AssetError::Malformed { path, line, reason } => {
                 AssetError::Malformed { path, line, reason: format!("{place}: {reason}") }
@@ -98,7 +98,7 @@ impl GltfFile {
         let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
         let normals = self.attribute(primitive, "NORMAL")?.filter(is_complete);
         let mut sets = Vec::with_capacity(2);
-        for set in self.coordinate_sets(primitive) {
+        for set in self.select_two_uv_sets(primitive) {
             sets.push(self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete));
         }
         let colors = self.attribute(primitive, "COLOR_0")?.filter(is_complete);
@@ -138,7 +138,7 @@ impl GltfFile {
 
     /// Selects the two texture coordinate sets for a primitive's mesh: the first two that its material's
     /// textures use, in ascending order. If the textures use only one set, that set is first.
-    pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
+    pub(super) fn select_two_uv_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
         let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
         let first = used.first().copied().unwrap_or_default();

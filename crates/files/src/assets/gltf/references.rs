@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Visitor};
 
-use super::{BOM, JSON_LIMIT, resolve_uri};
+use super::{BOM, JSON_LIMIT, resolve_relative_uri};
 use crate::assets::read;
 use crate::control::{CancelToken, Cancelled};
 
 /// The URIs in a glTF file. Everything else in the file is ignored, valid or not.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct References {
+struct UriReferences {
     buffers: Vec<Reference>,
     images: Vec<Reference>,
 }
@@ -55,7 +55,7 @@ struct CancellableReader<'a, R> {
 
 impl<R: Read> Read for CancellableReader<'_, R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.token.check().map_err(io::Error::other)?;
+        self.token.check_pause_and_cancel().map_err(io::Error::other)?;
         self.reader.read(bytes)
     }
 }
@@ -67,10 +67,10 @@ impl<R: Read> Read for CancellableReader<'_, R> {
 /// Returns [`Cancelled`] if the token is cancelled.
 pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
     let references = json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
-    token.check()?;
-    let References { buffers, images } = references.unwrap_or_default();
+    token.check_pause_and_cancel()?;
+    let UriReferences { buffers, images } = references.unwrap_or_default();
     let uris = buffers.into_iter().chain(images).filter_map(|reference| reference.uri?.0);
-    Ok(uris.filter_map(|uri| resolve_uri(path, &uri).ok()).collect())
+    Ok(uris.filter_map(|uri| resolve_relative_uri(path, &uri).ok()).collect())
 }
 
 /// Opens the JSON in a glTF file.
@@ -79,7 +79,7 @@ fn json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read 
     /// length and type.
     const BEFORE_JSON: u64 = 20;
     const BUFFER: usize = 1 << 16;
-    let (mut file, _) = read::open(path, u64::MAX).map_err(io::Error::other)?;
+    let (mut file, _) = read::open_regular_with_limit(path, u64::MAX).map_err(io::Error::other)?;
     let mut header = Vec::new();
     (&mut file).take(BEFORE_JSON).read_to_end(&mut header)?;
     let (before, length) = match header[..] {

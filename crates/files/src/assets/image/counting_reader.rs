@@ -8,7 +8,7 @@ use super::decode_thread::ProgressReporter;
 /// would not report progress.
 const CHUNK: usize = 1 << 16;
 
-pub(super) struct CountingReader<R> {
+pub(super) struct ProgressReader<R> {
     inner: R,
     at: u64,
     /// Farthest position read so far. Decoders may seek backward.
@@ -17,13 +17,13 @@ pub(super) struct CountingReader<R> {
     report: ProgressReporter,
 }
 
-impl<R> CountingReader<R> {
+impl<R> ProgressReader<R> {
     pub(super) fn new(inner: R, length: u64, report: ProgressReporter) -> Self {
         Self { inner, at: 0, reached: 0, length, report }
     }
 }
 
-impl<R: Read> Read for CountingReader<R> {
+impl<R: Read> Read for ProgressReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let most = buffer.len().min(CHUNK);
         let got = self.inner.read(&mut buffer[..most])?;
@@ -34,7 +34,7 @@ impl<R: Read> Read for CountingReader<R> {
     }
 }
 
-impl<R: Seek> Seek for CountingReader<R> {
+impl<R: Seek> Seek for ProgressReader<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.at = self.inner.seek(to)?;
         Ok(self.at)

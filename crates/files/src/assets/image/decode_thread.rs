@@ -76,7 +76,7 @@ fn wait_for_result<T>(
     loop {
         match reports.recv_timeout(POLL) {
             Ok(done) => monitor.report_progress(done as usize, total as usize)?,
-            Err(RecvTimeoutError::Timeout) => monitor.token.check()?,
+            Err(RecvTimeoutError::Timeout) => monitor.token.check_pause_and_cancel()?,
             // The decoder has dropped its reporter, so it has read everything.
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -84,7 +84,7 @@ fn wait_for_result<T>(
     loop {
         match result.recv_timeout(POLL) {
             Ok(value) => return Ok(Some(value)),
-            Err(RecvTimeoutError::Timeout) => monitor.token.check()?,
+            Err(RecvTimeoutError::Timeout) => monitor.token.check_pause_and_cancel()?,
             Err(RecvTimeoutError::Disconnected) => return Ok(None),
         }
     }
@@ -92,7 +92,7 @@ fn wait_for_result<T>(
 
 fn wait_for_abandoned_threads(token: &CancelToken) -> Result<(), Cancelled> {
     loop {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let mut threads = lock_abandoned_threads();
         threads.retain(|thread| !thread.is_finished());
         if threads.is_empty() {

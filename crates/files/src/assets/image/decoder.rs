@@ -35,7 +35,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     match reader.format() {
         Some(ImageFormat::Png) => {
             let decoder = PngDecoder::new(reader.into_inner(), memory_bytes)?;
-            let metadata = decoder.metadata();
+            let metadata = decoder.color_space_and_warnings();
             Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::OpenExr) => {
@@ -53,14 +53,14 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
         }
         Some(ImageFormat::Jpeg) => {
-            decoder_with_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
+            limit_memory_and_read_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
         }
         Some(ImageFormat::Pnm) => {
-            decoder_with_profile(PnmDecoder::new(reader.into_inner())?, encoding, memory_bytes)
+            limit_memory_and_read_profile(PnmDecoder::new(reader.into_inner())?, encoding, memory_bytes)
         }
         Some(ImageFormat::Bmp) => {
             let (decoder, mut metadata) =
-                decoder_with_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
+                limit_memory_and_read_profile(BmpDecoder::new(reader.into_inner())?, encoding, memory_bytes)?;
             metadata.alpha = AlphaInterpretation::UnusedIfZero;
             Ok((decoder, metadata))
         }
@@ -70,7 +70,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
             let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
             file.seek(SeekFrom::Start(0))?;
             let (decoder, mut metadata) =
-                decoder_with_profile(WebPDecoder::new(file)?, encoding, memory_bytes)?;
+                limit_memory_and_read_profile(WebPDecoder::new(file)?, encoding, memory_bytes)?;
             metadata.warn_about_extra_frames(frames);
             Ok((decoder, metadata))
         }
@@ -82,7 +82,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
 }
 
 /// Sets a decoder's memory limit, and reads the color profile if the encoding uses it.
-fn decoder_with_profile(
+fn limit_memory_and_read_profile(
     mut decoder: impl ImageDecoder + 'static,
     encoding: ImageEncoding,
     memory_bytes: u64,
@@ -95,7 +95,7 @@ fn decoder_with_profile(
     if encoding.uses_file_color_space()
         && let Some(profile) = decoder.icc_profile()?
     {
-        metadata.add_profile(Some(&profile), !decoder.color_type().has_color());
+        metadata.apply_icc_profile(Some(&profile), !decoder.color_type().has_color());
     }
     Ok((Box::new(decoder), metadata))
 }
@@ -141,7 +141,7 @@ pub(super) fn max_decompression_ratio(format: Option<ImageFormat>) -> u64 {
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
 /// size of the file data kept by the decoder. `in_memory` is the size of the in-memory copy of the file,
 /// which is freed before the texels are complete.
-pub(super) fn checked_texel_bytes(
+pub(super) fn check_limits_and_texel_bytes(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],

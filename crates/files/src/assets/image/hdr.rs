@@ -186,7 +186,7 @@ impl HeaderVariables {
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
-            space: matrix.map_or_else(ColorSpace::default, ColorSpace::with_matrix_to_rec_709),
+            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_matrix_to_rec_709),
             warnings: self.warnings,
         }
     }
@@ -305,16 +305,16 @@ fn read_scanline(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) 
 fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> ImageResult<()> {
     let mut done = 0;
     while done < pixels.len() {
-        let [code] = read_bytes(file)?;
+        let [code] = read_byte_array(file)?;
         let length = usize::from(if code > 128 { code - 128 } else { code });
         let run = pixels.get_mut(done..done + length).filter(|run| !run.is_empty());
         let Some(run) = run else { return Err(decoding_error(RUN_TOO_LONG.to_owned())) };
         if code > 128 {
-            let [value] = read_bytes(file)?;
+            let [value] = read_byte_array(file)?;
             run.iter_mut().for_each(|pixel| pixel[channel] = value);
         } else {
             for pixel in run {
-                [pixel[channel]] = read_bytes(file)?;
+                [pixel[channel]] = read_byte_array(file)?;
             }
         }
         done += length;
@@ -352,10 +352,10 @@ fn read_flat_scanline(
 }
 
 fn read_pixel(file: &mut impl Read) -> ImageResult<[u8; 4]> {
-    read_bytes(file)
+    read_byte_array(file)
 }
 
-fn read_bytes<const N: usize>(file: &mut impl Read) -> ImageResult<[u8; N]> {
+fn read_byte_array<const N: usize>(file: &mut impl Read) -> ImageResult<[u8; N]> {
     let mut bytes = [0; N];
     file.read_exact(&mut bytes).map_err(ImageError::IoError)?;
     Ok(bytes)

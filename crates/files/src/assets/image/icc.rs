@@ -10,7 +10,7 @@ const MAX_VALUES: usize = 1 << 16;
 
 /// Returns the color space from a profile for a gray or RGB image, or the reason for ignoring the profile.
 pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
-    let profile = IccProfile::parse(profile).ok_or(MALFORMED)?;
+    let profile = IccProfile::from_bytes(profile).ok_or(MALFORMED)?;
     match (profile.read_four_bytes(16), profile.read_four_bytes(20)) {
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb_color_space(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
@@ -42,7 +42,7 @@ pub(super) fn wrong_color_space_message(found: &str, is_gray: bool) -> String {
 struct IccProfile<'a>(&'a [u8]);
 
 impl<'a> IccProfile<'a> {
-    fn parse(bytes: &'a [u8]) -> Option<Self> {
+    fn from_bytes(bytes: &'a [u8]) -> Option<Self> {
         let profile = Self(bytes);
         (profile.read_four_bytes(36)? == b"acsp").then_some(profile)
     }

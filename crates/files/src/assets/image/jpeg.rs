@@ -86,13 +86,13 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
 pub(super) fn check_plausible_size(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {
-        return Err(too_many_pixels_message(width, height, file_bytes));
+        return Err(implausible_image_size_message(width, height, file_bytes));
     }
     Ok(())
 }
 
 /// Error message for an image with more pixels than its file can contain.
-pub(super) fn too_many_pixels_message(width: u32, height: u32, file_bytes: u64) -> String {
+pub(super) fn implausible_image_size_message(width: u32, height: u32, file_bytes: u64) -> String {
     format!("the header claims {width} × {height} pixels, too many for a file of {file_bytes} bytes")
 }
 

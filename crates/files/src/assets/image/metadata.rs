@@ -40,24 +40,24 @@ pub(super) struct ImageMetadata {
 
 impl ImageMetadata {
     /// Adds a warning.
-    pub(super) fn warn(&mut self, words: impl Into<String>) {
+    pub(super) fn add_warning(&mut self, words: impl Into<String>) {
         self.warnings.push(ImageWarning { line: None, words: words.into() });
     }
 
     /// Adds a warning that only the first frame of an animation is used.
     pub(super) fn warn_about_extra_frames(&mut self, frames: u32) {
         if frames > 1 {
-            self.warn(format!("it has {frames} frames; only the first is used"));
+            self.add_warning(format!("it has {frames} frames; only the first is used"));
         }
     }
 
     /// Applies an ICC profile. `None` means that the profile could not be decompressed.
-    pub(super) fn add_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
+    pub(super) fn apply_icc_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
         match profile
             .map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::profile_color_space(profile, is_gray))
         {
             Ok(space) => self.space = space,
-            Err(reason) => self.warn(profile_ignored_warning(&reason)),
+            Err(reason) => self.add_warning(profile_ignored_warning(&reason)),
         }
     }
 }

@@ -31,10 +31,11 @@ use crate::materials::mipmaps::ImageHalver;
 use crate::materials::texels::Texels;
 use crate::materials::{ChannelSelector, Mipmaps};
 use crate::system::describe_error;
-use counting_reader::CountingReader;
+use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    OpenedImage, bytes_per_texel, checked_texel_bytes, create_decoder, max_decompression_ratio, orientation,
+    OpenedImage, bytes_per_texel, check_limits_and_texel_bytes, create_decoder, max_decompression_ratio,
+    orientation,
 };
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
@@ -181,12 +182,12 @@ pub fn load_hashed(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<(LoadedImage, FileHash), AssetError> {
-    let (source, hash) = ImageSource::read_hashed(path, encoding, limits, token)?;
-    Ok((load_source(source, encoding, Monitor { progress, token })?, hash))
+    let (source, hash) = OpenImage::read_hashed(path, encoding, limits, token)?;
+    Ok((decode_source(source, encoding, Monitor { progress, token })?, hash))
 }
 
-fn load_source(
-    file: ImageSource,
+fn decode_source(
+    file: OpenImage,
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
 ) -> Result<LoadedImage, AssetError> {
@@ -195,7 +196,7 @@ fn load_source(
     let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
         if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
-            metadata.warn(words);
+            metadata.add_warning(words);
         }
         Ok((convert::texels(image, encoding, &metadata), metadata.warnings))
     })?;
@@ -211,21 +212,21 @@ fn load_source(
 ///
 /// # Errors
 /// Any error from [`load`] that can be detected at the start of the file.
-pub fn read_dimensions(
+pub fn read_dimensions_and_decoded_bytes(
     path: &Path,
     encoding: ImageEncoding,
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    source_size_and_texel_bytes(
-        ImageSource::open(path, limits, token)?,
+    source_size_and_decoded_bytes(
+        OpenImage::open(path, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
     )
 }
 
-fn source_size_and_texel_bytes(
-    file: ImageSource,
+fn source_size_and_decoded_bytes(
+    file: OpenImage,
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
@@ -256,7 +257,7 @@ pub fn load_embedded(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<LoadedImage, AssetError> {
-    load_source(ImageSource::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
+    decode_source(OpenImage::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
 /// Like [`read_dimensions`], but for an embedded image.
@@ -269,8 +270,8 @@ pub fn read_embedded_dimensions(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    source_size_and_texel_bytes(
-        ImageSource::from_embedded(image, limits, token)?,
+    source_size_and_decoded_bytes(
+        OpenImage::from_embedded(image, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
     )
@@ -285,7 +286,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
         let halving = ImageHalver::new(level);
         let mut rows = halving.empty_rows();
         for y in 0..halving.halved_height() {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             halving.append_row(y, &mut rows);
         }
         Ok(halving.assemble_image(rows))
@@ -332,7 +333,7 @@ impl Seek for ImageStream {
 }
 
 /// An open image and its load settings.
-struct ImageSource {
+struct OpenImage {
     path: PathBuf,
     file: ImageStream,
     length: u64,
@@ -340,9 +341,9 @@ struct ImageSource {
     token: CancelToken,
 }
 
-impl ImageSource {
+impl OpenImage {
     fn open(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<Self, AssetError> {
-        let (file, length) = read::open(path, FILE_LIMIT)?;
+        let (file, length) = read::open_regular_with_limit(path, FILE_LIMIT)?;
         if length == 0 {
             return Err(AssetError::malformed(path, None, EMPTY_FILE));
         }
@@ -363,17 +364,17 @@ impl ImageSource {
         limits: ImageLimits,
         token: &CancelToken,
     ) -> Result<(Self, FileHash), AssetError> {
-        let (file, length) = read::open(path, FILE_LIMIT)?;
+        let (file, length) = read::open_regular_with_limit(path, FILE_LIMIT)?;
         if length > CHECKED_FIRST {
             // Avoid reading a large file that will be rejected.
-            read_dimensions(path, encoding, limits, token)?;
+            read_dimensions_and_decoded_bytes(path, encoding, limits, token)?;
         }
         let unreadable = |error: io::Error| AssetError::from_io(path, &error);
         let without_text = match length > CHECKED_FIRST {
             true => png::read_without_text_chunks(&file, token),
             false => Ok(None),
         };
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let (bytes, hash) = match without_text.map_err(unreadable)? {
             Some(found) => found,
             None => {
@@ -413,7 +414,7 @@ impl ImageSource {
         let (path, length) = (self.path.clone(), self.length);
         let done =
             decode_thread::run_on_thread(monitor, length, move |report| catch_panic(|| work(self, report)))?;
-        monitor.token.check()?;
+        monitor.token.check_pause_and_cancel()?;
         let done = done.unwrap_or_else(|| Err("cannot start a decoder thread".to_owned()));
         done.unwrap_or_else(|panic| Err(format!("the decoder failed: {panic}")))
             .map_err(|reason| AssetError::malformed(&path, None, reason))
@@ -461,7 +462,7 @@ impl ImageSource {
             }
             ImageStream::Embedded(_) => {}
         }
-        let mut bytes = BufReader::new(CountingReader::new(self.file, self.length, report));
+        let mut bytes = BufReader::new(ProgressReader::new(self.file, self.length, report));
         let first = bytes.fill_buf().map_err(|error| describe_error(&error))?;
         let (is_hdr, is_pfm) = (first.starts_with(hdr::MAGIC), pfm::is_pfm(first));
         let mut reader =
@@ -491,7 +492,7 @@ impl ImageSource {
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
-        let texel_bytes = checked_texel_bytes(
+        let texel_bytes = check_limits_and_texel_bytes(
             &*decoder,
             texel,
             [self.length, held_bytes, in_memory],
@@ -552,7 +553,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it needs more memory than the limit for images".to_owned()
         }
-        _ => replace_png_chunk_types(&error.to_string()),
+        _ => simplify_png_message(&error.to_string()),
     };
     if words.chars().count() <= MAX_LENGTH {
         words
@@ -563,7 +564,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
 
 /// Replaces PNG chunk types in a decoder message with the chunk names. The decoder prints them in debug
 /// format.
-fn replace_png_chunk_types(words: &str) -> String {
+fn simplify_png_message(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };
     let Some((chunk, after)) = rest.split_once(" }") else { return words.to_owned() };

@@ -53,7 +53,7 @@ pub(super) fn read_without_text_chunks(
         kept.truncate(start);
         let (mut skipped, mut left) = (vec![0; SKIPPED_BYTES], length);
         while left > 0 {
-            token.check().map_err(|cancelled| io::Error::other(cancelled.to_string()))?;
+            token.check_pause_and_cancel().map_err(|cancelled| io::Error::other(cancelled.to_string()))?;
             let most = skipped.len().min(left as usize);
             let got = file.read(&mut skipped[..most])?;
             if got == 0 {
@@ -103,18 +103,18 @@ impl<R: BufRead + Seek> PngDecoder<R> {
 
     /// Color space and warnings. Color chunks take precedence in the order `cICP`, `sRGB`, `iCCP`, then
     /// `gAMA` with `cHRM`.
-    pub(super) fn metadata(&self) -> ImageMetadata {
+    pub(super) fn color_space_and_warnings(&self) -> ImageMetadata {
         let (info, mut metadata) = (self.reader.info(), ImageMetadata::default());
         metadata.warn_about_extra_frames(info.animation_control().map_or(0, |control| control.num_frames));
         let is_gray = !self.color_type.has_color();
         if let Some(points) = info.coding_independent_code_points {
             match color_space_from_cicp(points) {
                 Some(space) => metadata.space = space,
-                None => metadata.warn(unsupported_cicp_warning(points)),
+                None => metadata.add_warning(unsupported_cicp_warning(points)),
             }
         } else if info.srgb.is_some() {
         } else if let Some(profile) = &self.profile {
-            metadata.add_profile(profile.as_deref(), is_gray);
+            metadata.apply_icc_profile(profile.as_deref(), is_gray);
         } else {
             metadata.space = self.color_space_from_gama_and_chrm(&mut metadata, is_gray);
         }
@@ -132,7 +132,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
             Primaries { red, green, blue, white }.to_rec_709()
         });
         if matrix.is_none() {
-            metadata.warn("a degenerate cHRM chunk is ignored");
+            metadata.add_warning("a degenerate cHRM chunk is ignored");
         }
         ColorSpace::from_curves_and_matrix(
             Some([curve.clone(), curve.clone(), curve]),

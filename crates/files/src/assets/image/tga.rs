@@ -43,7 +43,7 @@ pub(super) fn open_with_alpha_usage<R: Read + Seek>(
     let has_alpha_bit = color_bits(&header) == Some(16) && alpha != AlphaInterpretation::Unused;
     let alpha = if has_alpha_bit { AlphaInterpretation::Dropped } else { alpha };
     header[DESCRIPTOR] =
-        header[DESCRIPTOR] & !ALPHA_BITS | possible_alpha_bits(&header).map_err(decoding_error)?;
+        header[DESCRIPTOR] & !ALPHA_BITS | max_alpha_bits(&header).map_err(decoding_error)?;
     file.seek(SeekFrom::Start(HEADER as u64))?;
     Ok((TgaDecoder::new(Cursor::new(header).chain(file))?, alpha))
 }
@@ -58,7 +58,7 @@ fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
 }
 
 /// Returns how many bits of each pixel may contain alpha.
-fn possible_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
+fn max_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
     let kind = header[2];
     let bits = match (kind, color_bits(header)) {
         (_, Some(bits)) => bits,

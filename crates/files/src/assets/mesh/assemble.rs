@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use super::normals::fill_missing_normals;
 use super::parsed::{Faces, ParsedMesh};
 use super::polygon::triangulate;
-use super::{MeshSource, corners};
+use super::{MeshFileBytes, corners};
 use crate::assets::{AssetError, DroppedFaces, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
-use crate::math::origin::origin_near;
+use crate::math::origin::local_coordinate_origin;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Number of faces between polls of the cancel token.
@@ -19,13 +19,13 @@ const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: triangulates polygons, drops unusable faces, removes unused vertices and completes the
 /// normals.
-pub(crate) fn assemble(source: &MeshSource<'_>, parsed: ParsedMesh) -> Result<LoadedMesh, AssetError> {
+pub(crate) fn assemble(source: &MeshFileBytes<'_>, parsed: ParsedMesh) -> Result<LoadedMesh, AssetError> {
     assemble_text_mesh(source, parsed, |_| None)
 }
 
 /// Like [`assemble`], but for text files. `start_of` maps a face index to the byte offset of the face.
 pub(super) fn assemble_text_mesh(
-    source: &MeshSource<'_>,
+    source: &MeshFileBytes<'_>,
     mut parsed: ParsedMesh,
     start_of: impl Fn(usize) -> Option<usize>,
 ) -> Result<LoadedMesh, AssetError> {
@@ -59,7 +59,7 @@ pub(super) fn assemble_text_mesh(
     let line_of = |face: usize| start_of(face).map(|start| source.line_number(start));
     warnings.extend(self_intersection_warning(crossing, line_of));
     if triangles.is_empty() {
-        return Err(source.malformed_error(no_usable_face_message(faces.len(), dropped)));
+        return Err(source.malformed_error_without_line(no_usable_face_message(faces.len(), dropped)));
     }
     let bad_uvs = [&uvs, &second_uvs].map(|uvs| find_non_finite_vertices(uvs, |uv| uv.is_finite()));
     let bad_normals = find_non_finite_vertices(&normals, |normal| normal.is_finite());
@@ -97,7 +97,7 @@ fn recenter_positions(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>
         |(min, max): (DVec3, DVec3), (least, greatest): (DVec3, DVec3)| (min.min(least), max.max(greatest));
     let places = faces.corners.par_iter().map(place).filter(held);
     let (min, max) = places.fold(none, |ends, place| both(ends, (place, place))).reduce(none, both);
-    let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
+    let origin = local_coordinate_origin((min + max) * 0.5, (max - min).max_element() * 0.5);
     (origin, positions.into_par_iter().map(|place| (place - origin).as_vec3()).collect())
 }
 
@@ -193,25 +193,27 @@ impl<'a> FaceTriangulator<'a> {
         }
     }
 
-    fn add_all_faces(&mut self, source: &MeshSource<'_>, faces: &Faces) -> Result<(), AssetError> {
-        if self.copy_valid_triangles(faces) {
+    fn add_all_faces(&mut self, source: &MeshFileBytes<'_>, faces: &Faces) -> Result<(), AssetError> {
+        if self.copy_triangles_if_all_valid(faces) {
             return Ok(());
         }
         self.triangles.reserve(faces.len());
         let mut from = 0;
         for face in 0..faces.len() {
             if face % BATCH == 0 {
-                source.monitor.token.check()?;
+                source.monitor.token.check_pause_and_cancel()?;
             }
             let arity = faces.arities.get(face).map_or(3, |arity| *arity as usize);
             let corners = &faces.corners[from..from + arity];
             from += arity;
             if corners.iter().any(|&corner| corner as usize >= self.positions.len()) {
-                return Err(source.malformed_error(index_out_of_range_message(face + 1)));
+                return Err(source.malformed_error_without_line(index_out_of_range_message(face + 1)));
             }
             self.add_face(corners, face);
             if self.triangles.len() > self.most_triangles {
-                return Err(source.malformed_error(too_many_triangles_message(self.most_triangles)));
+                return Err(
+                    source.malformed_error_without_line(too_many_triangles_message(self.most_triangles))
+                );
             }
             if let Some(&material) = self.materials.get(face) {
                 self.triangle_materials.resize(self.triangles.len(), material);
@@ -222,7 +224,7 @@ impl<'a> FaceTriangulator<'a> {
 
     /// Fast path for meshes with only valid triangles: copies all faces in parallel. Returns false for other
     /// meshes.
-    fn copy_valid_triangles(&mut self, faces: &Faces) -> bool {
+    fn copy_triangles_if_all_valid(&mut self, faces: &Faces) -> bool {
         let (triangles, _) = faces.corners.as_chunks();
         let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
         let good = |triangle: &[u32; 3]| {
@@ -343,7 +345,7 @@ mod tests {
     fn assembled(parsed: ParsedMesh) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
         let monitor = Monitor { progress: &ignore_progress, token: &token };
-        assemble(&MeshSource { path: Path::new("a.off"), bytes: &[], monitor }, parsed)
+        assemble(&MeshFileBytes { path: Path::new("a.off"), bytes: &[], monitor }, parsed)
     }
 
     fn faces(list: &[&[u32]]) -> Faces {
@@ -414,7 +416,7 @@ mod tests {
     fn too_many_triangles_are_rejected() {
         let token = CancelToken::new();
         let monitor = Monitor { progress: &ignore_progress, token: &token };
-        let source = MeshSource { path: Path::new("a.off"), bytes: &[], monitor };
+        let source = MeshFileBytes { path: Path::new("a.off"), bytes: &[], monitor };
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
             assert!(FaceTriangulator::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
             let result = FaceTriangulator::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));

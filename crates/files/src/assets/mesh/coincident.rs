@@ -24,14 +24,14 @@ pub(super) fn find_coincident_vertex_sets(
     let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
     let mut hashes = vec![0; positions.len()];
     for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         hashes.par_iter_mut().zip(positions).for_each(|(hash, position)| *hash = hash_of(*position));
     }
     let (entries, ends) = sort_into_buckets(&hashes, bits, token)?;
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let buckets: Vec<_> = starts.zip(&ends).map(|(start, end)| &entries[start..*end]).collect();
     let found: Result<Vec<_>, Cancelled> =
-        buckets.par_iter().map(|bucket| find_in_bucket(bucket, positions, token)).collect();
+        buckets.par_iter().map(|bucket| group_coincident_in_bucket(bucket, positions, token)).collect();
     Ok(found?.into_iter().flatten().collect())
 }
 
@@ -58,7 +58,7 @@ fn sort_into_buckets(
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
     for hashes in hashes.chunks(BATCH) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         hashes.iter().for_each(|&hash| ends[bucket(hash)] += 1);
     }
     let mut next = 0;
@@ -68,7 +68,7 @@ fn sort_into_buckets(
     let mut entries = vec![(0, 0); hashes.len()];
     for (vertex, &hash) in (0_u32..).zip(hashes) {
         if (vertex as usize).is_multiple_of(BATCH) {
-            token.check()?;
+            token.check_pause_and_cancel()?;
         }
         let end = &mut ends[bucket(hash)];
         entries[*end] = (hash, vertex);
@@ -78,12 +78,12 @@ fn sort_into_buckets(
 }
 
 /// Finds the coincident vertices in a bucket. Groups the vertices by hash, then by position.
-fn find_in_bucket(
+fn group_coincident_in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],
     token: &CancelToken,
 ) -> Result<Vec<Vec<u32>>, Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let mut entries = bucket.to_vec();
     entries.sort_unstable();
     let mut found = Vec::new();

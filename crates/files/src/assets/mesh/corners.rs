@@ -28,7 +28,7 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
     let mut known: HashMap<VertexUvColorKey, u32> = HashMap::new();
     for (place, corner) in parsed.faces.corners.iter_mut().enumerate() {
         if place % BATCH == 0 {
-            token.check()?;
+            token.check_pause_and_cancel()?;
         }
         let vertex = *corner as usize;
         let of_vertex = || parsed.uvs.get(vertex).copied().unwrap_or(Vec2::ZERO);

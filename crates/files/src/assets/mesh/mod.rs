@@ -47,16 +47,16 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (parse, read): (ParseFn, ReadFileFn) = match extension.as_str() {
         "obj" => (obj::parse, read::read_text),
-        "off" => (off::parse, read::read_text_or_binary),
-        "ply" => (ply::parse, read::read_text_or_binary),
+        "off" => (off::parse, read::read_with_text_magic),
+        "ply" => (ply::parse, read::read_with_text_magic),
         "stl" => (stl::parse, read::read_unless_zeros_at_start),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
     let monitor = Monitor { progress, token };
     let bytes = read(path, FILE_LIMIT, monitor)?;
-    let source = MeshSource { path, bytes: text::strip_byte_order_mark(&bytes), monitor };
+    let source = MeshFileBytes { path, bytes: text::strip_byte_order_mark(&bytes), monitor };
     if source.bytes.is_empty() {
-        return Err(source.malformed_error(EMPTY_FILE));
+        return Err(source.malformed_error_without_line(EMPTY_FILE));
     }
     let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
     monitor.report_progress(2 * bytes.len(), 2 * bytes.len())?;
@@ -84,25 +84,25 @@ pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
     format!("vertex {vertex} is out of range: there are {count}, numbered from 0")
 }
 
-type ParseFn = fn(&MeshSource<'_>) -> Result<LoadedMesh, AssetError>;
+type ParseFn = fn(&MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError>;
 type ReadFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]
-pub(crate) struct MeshSource<'a> {
+pub(crate) struct MeshFileBytes<'a> {
     pub(crate) path: &'a Path,
     pub(crate) bytes: &'a [u8],
     pub(crate) monitor: Monitor<'a>,
 }
 
-impl MeshSource<'_> {
+impl MeshFileBytes<'_> {
     /// Reports that the parser has reached byte `at`.
     fn report_progress(&self, at: usize) -> Result<(), AssetError> {
         Ok(self.monitor.report_progress(self.bytes.len() + at, 2 * self.bytes.len())?)
     }
 
     /// Creates an error without a line number.
-    fn malformed_error(&self, reason: impl Into<String>) -> AssetError {
+    fn malformed_error_without_line(&self, reason: impl Into<String>) -> AssetError {
         AssetError::malformed(self.path, None, reason)
     }
 

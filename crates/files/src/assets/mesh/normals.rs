@@ -33,7 +33,7 @@ const BATCH: usize = 1 << 16;
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
     let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
-    let firsts = first_vertex_with_same_normal(groups);
+    let firsts = map_to_first_with_same_normal(groups);
     for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
@@ -41,9 +41,9 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     let places = coincident::find_coincident_vertex_sets(&mesh.positions, token)?;
     let mut joined = sums.clone();
     for place in &places {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         if groups.is_empty() {
-            sum_coincident_normals(place, &sums, &mut joined);
+            merge_seam_normals(place, &sums, &mut joined);
         } else {
             let group = |vertex: &u32| groups[*vertex as usize].group;
             let is_joined = |vertex: &&u32| {
@@ -53,7 +53,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
             place.sort_by_key(group);
             place
                 .chunk_by(|a, b| group(a) == group(b))
-                .for_each(|place| sum_coincident_normals(place, &sums, &mut joined));
+                .for_each(|place| merge_seam_normals(place, &sums, &mut joined));
         }
     }
     for (vertex, first) in firsts.into_iter().enumerate() {
@@ -61,7 +61,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     }
     let mut normals = vec![Vec3::ZERO; sums.len()];
     for (normals, sums) in normals.chunks_mut(BATCH).zip(joined.chunks(BATCH)) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let unit = |sum: &DVec3| sum.try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3());
         normals.par_iter_mut().zip(sums).for_each(|(normal, sum)| *normal = unit(sum));
     }
@@ -72,7 +72,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
 }
 
 /// Maps each vertex to the first vertex with the same normal. Empty if there are no groups.
-fn first_vertex_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
+fn map_to_first_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
     let first_of = |(vertex, group): (usize, &VertexNormalGroup)| {
@@ -93,7 +93,7 @@ pub(crate) fn is_faceted_without_normals(mesh: &TriangleMesh) -> bool {
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
         return false;
     }
-    let firsts = first_vertex_with_same_normal(groups);
+    let firsts = map_to_first_with_same_normal(groups);
     let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
     for corners in &mesh.triangles {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
@@ -129,12 +129,12 @@ fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     let mut weighted = Vec::with_capacity(BATCH.min(mesh.triangles.len()));
     for triangles in mesh.triangles.chunks(BATCH) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         triangles
             .par_iter()
             .with_min_len(1 << 10)
-            .map(|triangle| corner_angles(corners(triangle)))
+            .map(|triangle| normal_and_corner_angles(corners(triangle)))
             .collect_into_vec(&mut weighted);
         sums.par_chunks_mut(share).enumerate().for_each(|(part, sums)| {
             let first = part * share;
@@ -152,7 +152,7 @@ fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result
 
 /// Returns a triangle's unit normal (0 if it has no area) and the angle at each corner. Unlike the arccosine,
 /// the arctangent is accurate for the tiny angles in slivers.
-fn corner_angles([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
+fn normal_and_corner_angles([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let cross = ca.cross(ab);
@@ -180,7 +180,7 @@ fn fast_atan2(x: f64, y: f64) -> f64 {
     STARTS[octant] + SIGNS[octant] * t * (low + t8 * (high + t8 * 0.002_866_225_7))
 }
 
-fn sum_coincident_normals(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
+fn merge_seam_normals(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     let own = |vertex: u32| sums[vertex as usize];
     if group.len() > COMPARED {
         let sum: DVec3 = group.iter().map(|&vertex| own(vertex)).sum();
@@ -203,10 +203,11 @@ fn replace_canceled_normals(
     token: &CancelToken,
 ) -> Result<(), Cancelled> {
     for triangles in mesh.triangles.chunks(BATCH) {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         for triangle in triangles {
             if triangle.iter().any(|&vertex| normals[vertex as usize] == Vec3::ZERO) {
-                let (normal, _) = corner_angles(triangle.map(|vertex| mesh.positions[vertex as usize]));
+                let (normal, _) =
+                    normal_and_corner_angles(triangle.map(|vertex| mesh.positions[vertex as usize]));
                 for &vertex in triangle {
                     let own = &mut normals[vertex as usize];
                     *own = if *own == Vec3::ZERO { normal.as_vec3() } else { *own };

@@ -6,7 +6,7 @@
 use super::assemble::assemble_text_mesh;
 use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored_warning};
 use super::text::{Cursor, expected_message, quote_word, unexpected_line_end_message};
-use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range_message};
+use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// Number of vertices or faces between polls of the cancel token.
@@ -22,14 +22,14 @@ struct OffVertexColumns {
     homogeneous: bool,
 }
 
-pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
     let (excess, indices) = Default::default();
     OffReader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
 }
 
 #[derive(Clone, Copy)]
 struct OffReader<'a> {
-    source: MeshSource<'a>,
+    source: MeshFileBytes<'a>,
     cursor: Cursor<'a>,
     /// Lines with numbers that the header does not declare.
     excess: IgnoredLines,
@@ -47,7 +47,7 @@ impl IgnoredLines {
         self.0 += 1;
     }
 
-    fn warning(self, source: &MeshSource<'_>, ignored: &str) -> Option<String> {
+    fn warning(self, source: &MeshFileBytes<'_>, ignored: &str) -> Option<String> {
         let Self(count, first) = self;
         (count > 0).then(|| ignored_lines_warning(source.line_number(first), count, ignored))
     }
@@ -117,14 +117,14 @@ fn incomplete_face_message(corner: usize, arity: usize) -> String {
 
 /// Optional colors of vertices or corners.
 #[derive(Default)]
-struct OffColors {
+struct ParsedOffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
     /// Minimum alpha and a byte offset on its line.
     least_alpha: Option<(f64, usize)>,
 }
 
-impl OffColors {
+impl ParsedOffColors {
     /// Adds the same color for `times` vertices or corners.
     fn push_repeated(&mut self, color: &[f64], times: usize, at: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied();
@@ -139,7 +139,7 @@ impl OffColors {
     }
 
     /// Colors as bytes. Missing colors are white. Empty if there are no colors at all.
-    fn finish(self, source: &MeshSource<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    fn finish(self, source: &MeshFileBytes<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
@@ -180,7 +180,7 @@ impl OffReader<'_> {
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
         ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
-        ahead.cursor.skip_to_word();
+        ahead.cursor.skip_to_word_across_lines();
         Some(ahead.cursor.offset())
     }
 
@@ -195,7 +195,7 @@ impl OffReader<'_> {
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
     fn read_header_keyword(&mut self) -> Result<OffVertexColumns, AssetError> {
-        if !self.cursor.skip_to_word() {
+        if !self.cursor.skip_to_word_across_lines() {
             return self.fail(EMPTY_FILE);
         }
         let start = self.cursor;
@@ -214,12 +214,12 @@ impl OffReader<'_> {
             return self.fail(unsupported_variant_message(word));
         }
         self.cursor = Cursor::new(self.source.bytes, self.cursor.offset() - digits.len());
-        self.refuse_binary()?;
+        self.reject_binary()?;
         let has = |letter| flags.contains(&letter);
         Ok(OffVertexColumns { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
     }
 
-    fn refuse_binary(&mut self) -> Result<(), AssetError> {
+    fn reject_binary(&mut self) -> Result<(), AssetError> {
         let mut ahead = self.cursor;
         if ahead.skip_to_word_in_line() && ahead.word() == b"BINARY" {
             return self.fail(BINARY_OFF);
@@ -228,7 +228,7 @@ impl OffReader<'_> {
     }
 
     fn read_count(&mut self, of: &str) -> Result<u64, AssetError> {
-        if !self.cursor.skip_to_word() {
+        if !self.cursor.skip_to_word_across_lines() {
             let end = self.source.bytes.trim_ascii_end().len();
             return Err(self.source.malformed_error_with_line(end, missing_count_message(of)));
         }
@@ -279,12 +279,12 @@ impl OffReader<'_> {
         parsed: &mut ParsedMesh,
     ) -> Result<(), AssetError> {
         parsed.positions.reserve(count as usize);
-        let mut colors = OffColors::default();
+        let mut colors = ParsedOffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.report_progress(self.cursor.offset())?;
             }
-            if !self.cursor.skip_to_word() {
+            if !self.cursor.skip_to_word_across_lines() {
                 return self.fail(truncated_message(index, count, "vertices"));
             }
             let position = self.read_vec3("a coordinate")?;
@@ -315,7 +315,7 @@ impl OffReader<'_> {
     }
 
     /// Adds a color from the end of a line to `times` vertices or corners.
-    fn add_color_repeatedly(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
+    fn add_color_repeatedly(&mut self, color: &[f64], times: usize, colors: &mut ParsedOffColors) {
         colors.push_repeated(color, times, self.cursor.offset());
         match color {
             [_, _, _, alpha] => colors.track_lowest_alpha(*alpha, self.cursor.offset()),
@@ -359,14 +359,19 @@ impl OffReader<'_> {
         Ok(last.as_vec2())
     }
 
-    fn faces(&mut self, vertices: u64, count: u64, parsed: &mut ParsedMesh) -> Result<OffColors, AssetError> {
+    fn faces(
+        &mut self,
+        vertices: u64,
+        count: u64,
+        parsed: &mut ParsedMesh,
+    ) -> Result<ParsedOffColors, AssetError> {
         parsed.faces.reserve(count as usize);
-        let mut colors = OffColors::default();
+        let mut colors = ParsedOffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.report_progress(self.cursor.offset())?;
             }
-            if !self.cursor.skip_to_word() {
+            if !self.cursor.skip_to_word_across_lines() {
                 return self.fail(truncated_message(index, count, "faces"));
             }
             self.face(vertices, parsed, &mut colors)?;
@@ -378,14 +383,16 @@ impl OffReader<'_> {
         &mut self,
         vertices: u64,
         parsed: &mut ParsedMesh,
-        colors: &mut OffColors,
+        colors: &mut ParsedOffColors,
     ) -> Result<(), AssetError> {
         let arity = usize::try_from(self.read_nonnegative_integer("corners")?).unwrap_or(usize::MAX);
         if arity.saturating_mul(2) > self.cursor.remaining() {
             return self.fail(too_many_corners_message(arity));
         }
         for corner in 0..arity {
-            if !self.cursor.skip_to_word_in_line() && (corner == 0 || !self.cursor.skip_to_word()) {
+            if !self.cursor.skip_to_word_in_line()
+                && (corner == 0 || !self.cursor.skip_to_word_across_lines())
+            {
                 return self.fail(incomplete_face_message(corner, arity));
             }
             match self.cursor.integer() {
@@ -425,7 +432,7 @@ mod tests {
     fn read(text: &str) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
         let monitor = Monitor { progress: &ignore_progress, token: &token };
-        parse(&MeshSource { path: Path::new("a.off"), bytes: text.as_bytes(), monitor })
+        parse(&MeshFileBytes { path: Path::new("a.off"), bytes: text.as_bytes(), monitor })
     }
 
     fn error(text: &str) -> (Option<usize>, String) {

@@ -110,7 +110,7 @@ pub(crate) struct ParsedMesh {
 
 /// Extreme values of a color component, each with the byte offset of its color.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ComponentExtremes {
+pub(crate) struct ColorComponentExtremes {
     least: Option<(f64, usize)>,
     greatest: Option<(f64, usize)>,
     non_finite: Option<(f64, usize)>,
@@ -118,7 +118,7 @@ pub(crate) struct ComponentExtremes {
     fraction: Option<(f64, usize)>,
 }
 
-impl ComponentExtremes {
+impl ColorComponentExtremes {
     pub(super) fn add(&mut self, value: f64, at: usize) {
         if !value.is_finite() {
             self.non_finite.get_or_insert((value, at));
@@ -141,7 +141,7 @@ impl ComponentExtremes {
     }
 
     /// Returns the byte offset of a color with a value outside [0, `one`], and a warning.
-    pub(super) fn out_of_range_warning(&self, one: f64) -> Option<(usize, String)> {
+    pub(super) fn out_of_range_color_warning(&self, one: f64) -> Option<(usize, String)> {
         let least = self.least.filter(|(least, _)| *least < 0.0);
         let greatest = self.greatest.filter(|(greatest, _)| *greatest > one);
         let (value, at) = self.non_finite.or(greatest).or(least)?;
@@ -166,7 +166,7 @@ pub(super) fn dropped_fractions_warning(value: f64) -> String {
 
 /// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ColorRange(ComponentExtremes);
+pub(crate) struct ColorRange(ColorComponentExtremes);
 
 impl ColorRange {
     /// Adds a color and its byte offset.
@@ -184,7 +184,7 @@ impl ColorRange {
 
     /// Returns the byte offset of a color with an out-of-range value, and a warning.
     pub(super) fn out_of_range_warning(&self) -> Option<(usize, String)> {
-        self.0.out_of_range_warning(self.full_intensity())
+        self.0.out_of_range_color_warning(self.full_intensity())
     }
 
     /// Converts a color in this range to bytes.

@@ -8,7 +8,7 @@
 use super::assemble::{assemble, assemble_text_mesh};
 use super::parsed::{Faces, ParsedMesh};
 use super::text::{Cursor, convert_mac_line_ends, expected_message};
-use super::{AssetError, LoadedMesh, MeshSource};
+use super::{AssetError, LoadedMesh, MeshFileBytes};
 use crate::assets::read;
 use crate::math::DVec3;
 
@@ -21,14 +21,14 @@ const FACET: usize = 50;
 /// Number of facets (binary) or words (text) between polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
-pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
     if !has_binary_size(source.bytes) {
-        read::refuse_utf16(source.path, source.bytes)?;
+        read::reject_utf16(source.path, source.bytes)?;
     }
     match detect_encoding(source.bytes) {
         StlEncoding::Text => {
             let bytes = convert_mac_line_ends(source.bytes);
-            let source = MeshSource { bytes: &bytes, ..*source };
+            let source = MeshFileBytes { bytes: &bytes, ..*source };
             let mut reader =
                 TextReader { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
             let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
@@ -69,18 +69,18 @@ fn declared_facet_count(bytes: &[u8]) -> Option<u64> {
 }
 
 /// Reads a binary STL file.
-fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
+fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
     let Some(claimed) = declared_facet_count(source.bytes) else {
-        return Err(source.malformed_error(not_stl_message(source.bytes.trim_ascii_start())));
+        return Err(source.malformed_error_without_line(not_stl_message(source.bytes.trim_ascii_start())));
     };
     let facets = source.bytes[START..].chunks_exact(FACET);
     let excess = facets.remainder().len();
     let found = facets.len() as u64;
     if found < claimed {
-        return Err(source.malformed_error(missing_facets_message(claimed, found)));
+        return Err(source.malformed_error_without_line(missing_facets_message(claimed, found)));
     }
     if found == 0 {
-        return Err(source.malformed_error(format!(
+        return Err(source.malformed_error_without_line(format!(
             "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET} bytes)"
         )));
     }
@@ -141,7 +141,7 @@ fn add_corner(parsed: &mut ParsedMesh, position: DVec3) {
 
 /// Parser for text STL files.
 struct TextReader<'a> {
-    source: MeshSource<'a>,
+    source: MeshFileBytes<'a>,
     cursor: Cursor<'a>,
     /// Indices of faces with more than 3 corners, each with the byte offset of its loop.
     polygons: Vec<(usize, usize)>,
@@ -158,7 +158,7 @@ impl TextReader<'_> {
         let mut corners: Option<usize> = None;
         let (mut loop_start, mut faces) = (0, 0);
         let mut words = 0;
-        while self.cursor.skip_to_word() {
+        while self.cursor.skip_to_word_across_lines() {
             if words % BATCH == 0 {
                 self.source.report_progress(self.cursor.offset())?;
             }
@@ -214,7 +214,7 @@ impl TextReader<'_> {
     }
 
     fn float(&mut self) -> Result<f64, AssetError> {
-        if !self.cursor.skip_to_word() {
+        if !self.cursor.skip_to_word_across_lines() {
             return self.fail_with_line(self.cursor, "the file ends inside a vertex");
         }
         let mut start = self.cursor;
@@ -234,7 +234,7 @@ impl TextReader<'_> {
             let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
             if word.eq_ignore_ascii_case(b"facet") {
                 let mut ahead = Cursor::new(bytes, at + word.len());
-                if ahead.skip_to_word() && ahead.word().eq_ignore_ascii_case(b"normal") {
+                if ahead.skip_to_word_across_lines() && ahead.word().eq_ignore_ascii_case(b"normal") {
                     break;
                 }
             }
@@ -247,7 +247,7 @@ impl TextReader<'_> {
     fn skip_normal(&mut self) {
         for _ in 0..3 {
             let mut ahead = self.cursor;
-            if ahead.skip_to_word() && !ahead.word().eq_ignore_ascii_case(b"outer") {
+            if ahead.skip_to_word_across_lines() && !ahead.word().eq_ignore_ascii_case(b"outer") {
                 self.cursor = ahead;
             }
         }
@@ -266,7 +266,7 @@ mod tests {
 
     fn read(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
-        parse(&MeshSource {
+        parse(&MeshFileBytes {
             path: Path::new("a.stl"),
             bytes,
             monitor: Monitor { progress: &ignore_progress, token: &token },

@@ -50,7 +50,7 @@ impl Lines {
 
     /// Opens a file with at most `limit` bytes, and skips the byte order mark.
     pub(super) fn open(path: &Path, limit: u64) -> Result<Self, AssetError> {
-        let (file, _) = read::open(path, limit)?;
+        let (file, _) = read::open_regular_with_limit(path, limit)?;
         let mut reader = BufReader::with_capacity(Self::BUFFER, file);
         let unreadable = |error| AssetError::from_io(path, &error);
         let start = reader.fill_buf().map_err(unreadable)?;
@@ -68,7 +68,7 @@ impl Lines {
 
     /// Skips buffered lines that do not contain `letter` in upper or lower case. This is much faster than
     /// reading them.
-    pub(super) fn skip_lines_without_letter(&mut self, letter: u8) {
+    pub(super) fn skip_to_line_containing(&mut self, letter: u8) {
         let Ok(buffer) = self.reader.fill_buf() else { return };
         let (lower, upper) = (letter.to_ascii_lowercase(), letter.to_ascii_uppercase());
         let found = memchr::memchr2(lower, upper, buffer).unwrap_or(buffer.len());
@@ -87,7 +87,7 @@ impl Lines {
     }
 
     fn append_next_line(&mut self, token: &CancelToken) -> Result<bool, Cancelled> {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let mut rest = (&mut self.reader).take(Self::MAX_LENGTH as u64);
         Ok(rest.read_until(self.end, &mut self.line).is_ok_and(|length| length > 0))
     }
@@ -115,7 +115,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Moves to the next word, skipping line ends and comments. Returns false at the end of the text.
-    pub(super) fn skip_to_word(&mut self) -> bool {
+    pub(super) fn skip_to_word_across_lines(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
                 None => return false,
@@ -206,12 +206,12 @@ mod tests {
     #[test]
     fn blanks_and_comments_separate_words() {
         let mut cursor = Cursor::new(b" ab#c d\n\r\n # e\nf", 0);
-        assert!(cursor.skip_to_word());
+        assert!(cursor.skip_to_word_across_lines());
         assert_eq!(cursor.word(), b"ab");
         assert!(!cursor.skip_to_word_in_line());
-        assert!(cursor.skip_to_word());
+        assert!(cursor.skip_to_word_across_lines());
         assert_eq!(cursor.word(), b"f");
-        assert!(!cursor.skip_to_word());
+        assert!(!cursor.skip_to_word_across_lines());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, gaussian_kernel, normalized, offsets};
+use super::super::plane::{Plane, gaussian_kernel, normalized_taps, offsets};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
@@ -27,7 +27,7 @@ const FEATURE_DEGREES: f64 = 0.082;
 const REACH: f64 = 3.0;
 
 /// A separable blur with a weight.
-struct WeightedBlur {
+struct WeightedGaussian {
     weight: f64,
     taps: Vec<f64>,
 }
@@ -35,7 +35,7 @@ struct WeightedBlur {
 /// All filters for a specific number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
-    blurs: [Vec<WeightedBlur>; 3],
+    blurs: [Vec<WeightedGaussian>; 3],
     smooth: Vec<f64>,
     edge: Vec<f64>,
     point: Vec<f64>,
@@ -63,7 +63,7 @@ impl Filters {
         Self {
             radius,
             blurs,
-            smooth: padded(&normalized(&bell), feature_radius),
+            smooth: padded(&normalized_taps(&bell), feature_radius),
             edge: padded(&normalize_signs_separately(&slope), feature_radius),
             point: padded(&normalize_signs_separately(&curvature), feature_radius),
         }
@@ -108,13 +108,13 @@ fn contrast_sensitivity_blurs(
     terms: &[SensitivityTerm],
     radius: usize,
     pixels_per_degree: f64,
-) -> Vec<WeightedBlur> {
+) -> Vec<WeightedGaussian> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
         let taps = gaussian_kernel(sigma, radius);
         let sum: f64 = taps.iter().sum();
-        WeightedBlur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized(&taps) }
+        WeightedGaussian { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized_taps(&taps) }
     });
     let mut blurs: Vec<_> = volumes.collect();
     let total: f64 = blurs.iter().map(|blur| blur.weight).sum();

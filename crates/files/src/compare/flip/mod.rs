@@ -44,7 +44,7 @@ pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
 
 fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
     let [a, b] = [0, 1].map(|which| perceived_colors_and_features(pair, which, tile, filters));
-    let colors = a.0.iter().zip(&b.0).map(|(a, b)| color_error(a.distance(b), max));
+    let colors = a.0.iter().zip(&b.0).map(|(a, b)| error_from_color_distance(a.distance(b), max));
     let features = a.1.differences(&b.1);
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
@@ -86,7 +86,7 @@ fn opponent_planes(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Pla
 }
 
 /// Maps a color distance to an error in [0, 1]. Most of the range is used for small distances.
-fn color_error(distance: f64, max: f64) -> f64 {
+fn error_from_color_distance(distance: f64, max: f64) -> f64 {
     let error = libm::pow(distance, QC);
     let knee = PC * max;
     if error < knee { error * PT / knee } else { PT + (error - knee) / (max - knee) * (1.0 - PT) }

@@ -30,7 +30,7 @@ pub(super) fn encode(
     }
     let mut writer = encoder.write_header()?;
     for frame in frames {
-        token.check().map_err(std::io::Error::other)?;
+        token.check_pause_and_cancel().map_err(std::io::Error::other)?;
         writer.write_image_data(frame.pixels.as_flattened())?;
     }
     writer.finish()?;

@@ -34,7 +34,7 @@ impl Dither {
         let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();
         let mut indices = Vec::with_capacity(picture.pixels.len());
         for (y, row) in picture.pixels.chunks(picture.width.max(1) as usize).enumerate() {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             for (x, color) in row.iter().enumerate() {
                 let mixed = known.entry(*color).or_insert_with(|| self.mixed_colors(*color));
                 indices.push(mixed[RANKS[y % SIDE * SIDE + x % SIDE]]);

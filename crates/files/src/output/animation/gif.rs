@@ -26,7 +26,7 @@ pub(super) fn encode(
     let (width, height) = frames.first().map_or((0, 0), |first| (first.width as u16, first.height as u16));
     // Choose the palette from pixels in all frames.
     let palette = palette(frames);
-    token.check().map_err(cancelled)?;
+    token.check_pause_and_cancel().map_err(cancelled)?;
     // Write the header: the palette, an infinite loop, and the metadata as comments.
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette)?;
     encoder.set_repeat(Repeat::Infinite)?;

@@ -39,7 +39,7 @@ pub fn encode(
         AnimationFormat::Apng => apng::encode(frames, metadata, token).map_err(|error| error.to_string()),
     };
     // A cancelled encoder reports its own error.
-    token.check()?;
+    token.check_pause_and_cancel()?;
     bytes.map_err(|why| failed(format!("could not be encoded: {why}")))
 }
 

@@ -5,19 +5,19 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::super::{BitDepth, DevelopSettings};
+use super::super::{BitDepth, FilmEncodingSettings};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::{ToneMapping, Tonemap, Transfer};
-use crate::film::{Convergence, Film, FilmError, Quantity, Rect, SumOrder};
+use crate::film::{ConvergenceModel, Film, FilmError, Quantity, Rect, SumOrder};
 
 /// Header of a part or checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartHeader {
     /// Type of the file.
-    pub kind: PartKind,
+    pub kind: PartOrCheckpoint,
     /// Everything the image depends on, with user-visible names.
-    pub identity: Vec<Dependency>,
+    pub identity: Vec<RenderInput>,
     /// Share of the image that the file contains.
     pub share: PartShare,
     /// Properties of the image.
@@ -35,14 +35,14 @@ pub struct PartHeader {
 /// Type of a part file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum PartKind {
+pub enum PartOrCheckpoint {
     /// A finished part of an image.
     Part,
     /// The saved state of a render that can be resumed.
     Checkpoint,
 }
 
-impl PartKind {
+impl PartOrCheckpoint {
     /// Returns the name of the type.
     pub fn name(self) -> &'static str {
         match self {
@@ -54,7 +54,7 @@ impl PartKind {
 
 /// An input that an image depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Dependency {
+pub struct RenderInput {
     /// A scene key or a file name.
     pub name: String,
     /// Value of the key, or hash of the file's content.
@@ -81,24 +81,24 @@ impl PartHeader {
 
     /// Returns the name of the input file with this hexadecimal hash. `None` if no input file has this hash.
     pub(super) fn input_name_by_hash(&self, hash: &str) -> Option<&str> {
-        let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
-        self.identity.iter().find(matches).map(|input| strip_file_prefix(&input.name))
+        let matches = |input: &&RenderInput| input.name.starts_with(FILE) && input.value == hash;
+        self.identity.iter().find(matches).map(|input| strip_file_dependency_prefix(&input.name))
     }
 
     /// Searches the input files, then the scene's other references, for a name that matches the end of
     /// `path`. The file need not exist. Returns the name, relative to the scene's folder.
-    pub(super) fn input_name_by_path(&self, path: &Path) -> Option<&str> {
+    pub(super) fn find_input_by_path_suffix(&self, path: &Path) -> Option<&str> {
         let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         let references = self.references.iter().map(String::as_str);
         inputs
-            .map(|input| strip_file_prefix(&input.name))
+            .map(|input| strip_file_dependency_prefix(&input.name))
             .chain(references)
-            .find(|name| is_end_of_path(name, path))
+            .find(|name| path_ends_with(name, path))
     }
 }
 
 /// Whether a path ends with a name. Ignores the name's components up to the last `..`.
-fn is_end_of_path(name: &str, path: &Path) -> bool {
+fn path_ends_with(name: &str, path: &Path) -> bool {
     let mut end = PathBuf::new();
     for component in Path::new(name).components() {
         match component {
@@ -168,7 +168,7 @@ const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (D
 
 impl ImageHeader {
     /// Describes the image that these settings produce from a film.
-    pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
+    pub fn new(film: &Film, finish: &FilmEncodingSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;
         let kind = match tone.range_map {
@@ -182,7 +182,7 @@ impl ImageHeader {
             width: film.width(),
             height: film.height(),
             crop: [x, y, width, height],
-            is_by_photons: film.convergence() == Convergence::Photons,
+            is_by_photons: film.convergence() == ConvergenceModel::Photons,
             quantity: quantity.map_or("radiance", |(_, word)| *word).to_owned(),
             tone: ToneHeader {
                 exposure: tone.exposure_stops,
@@ -200,12 +200,12 @@ impl ImageHeader {
     }
 
     /// Returns the settings for encoding the image file. `None` if a name is unknown.
-    pub fn develop_settings(&self) -> Option<DevelopSettings> {
+    pub fn develop_settings(&self) -> Option<FilmEncodingSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
             Some(word) => RangeMap::Unresolved(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
         };
-        Some(DevelopSettings {
+        Some(FilmEncodingSettings {
             quantity: QUANTITIES.iter().find(|(_, word)| *word == self.quantity)?.0,
             tone: ToneMapping {
                 exposure_stops: self.tone.exposure,
@@ -227,7 +227,9 @@ impl ImageHeader {
         let [x, y, width, height] = self.crop;
         let film = Film::new(self.width, self.height, Some(Rect { x, y, width, height }))?;
         Ok(match self.is_by_photons {
-            true => film.with_convergence(Convergence::Photons).with_sum_order(SumOrder::Blocked)?,
+            true => {
+                film.with_convergence_model(ConvergenceModel::Photons).with_sum_order(SumOrder::Blocked)?
+            }
             false => film,
         })
     }
@@ -235,11 +237,11 @@ impl ImageHeader {
 
 /// Describes the differences between two lists of inputs. `here` and `there` are the names of the lists.
 pub fn dependency_differences(
-    a: &[Dependency],
-    b: &[Dependency],
+    a: &[RenderInput],
+    b: &[RenderInput],
     (here, there): (&str, &str),
 ) -> Vec<String> {
-    let value_of = |all: &[Dependency], name: &str| {
+    let value_of = |all: &[RenderInput], name: &str| {
         all.iter().find(|input| input.name == name).map(|input| input.value.clone())
     };
     let shown = |value: Option<String>| value.unwrap_or_else(|| "missing".to_owned());
@@ -256,12 +258,12 @@ pub fn dependency_differences(
         .map(|name| match (value_of(a, name), value_of(b, name)) {
             _ if *name == EVERYTHING => "the scene's shapes, materials, lights or camera differ".to_owned(),
             (Some(_), Some(_)) if is_content_hash_name(name) => {
-                format!("{} has different content", strip_file_prefix(name))
+                format!("{} has different content", strip_file_dependency_prefix(name))
             }
             (a, b) if is_content_hash_name(name) => {
                 let place = if a.is_some() { here } else { there };
                 debug_assert!(a.is_some() != b.is_some());
-                format!("{} is only used {place}", strip_file_prefix(name))
+                format!("{} is only used {place}", strip_file_dependency_prefix(name))
             }
             (Some(a), Some(b)) if *name == PROGRAM => {
                 format!("it was rendered by glimt {a} {here} and glimt {b} {there}; use the same build")
@@ -281,16 +283,16 @@ fn is_content_hash_name(name: &str) -> bool {
     name.starts_with(FILE) || name == EVERYTHING
 }
 
-fn strip_file_prefix(name: &str) -> &str {
+fn strip_file_dependency_prefix(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
 /// Name prefix for file inputs.
 const FILE: &str = "file ";
 
-impl Dependency {
+impl RenderInput {
     /// Creates an input for a setting.
-    pub fn from_setting(name: &str, value: impl Into<String>) -> Self {
+    pub fn from_name_and_value(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }
     }
 

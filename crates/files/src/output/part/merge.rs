@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::head::{PartHeader, PartKind, dependency_differences};
+use super::head::{PartHeader, PartOrCheckpoint, dependency_differences};
 use super::{PartError, PartFile};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -23,11 +23,11 @@ pub struct MergedParts {
 /// # Errors
 /// A file is not a part, belongs to another image, or contains the same part as another file. The error names
 /// the first file with a problem.
-pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
+pub fn check_and_list_missing(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
     for part in parts {
-        part.check_kind(PartKind::Part)?;
+        part.check_kind(PartOrCheckpoint::Part)?;
         let name = first.path.display().to_string();
         let differences = head_differences(&part.head, &first.head);
         if !differences.is_empty() {
@@ -78,13 +78,13 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
 ///
 /// # Errors
 /// Same as [`check`]. Also fails if parts are missing, a part is inconsistent, or the work is cancelled.
-pub fn merge(
+pub fn merge_into_film(
     parts: &[PartFile],
     is_partial: bool,
     token: &CancelToken,
     mut tell: impl FnMut(usize, &Film),
 ) -> Result<MergedParts, PartError> {
-    let missing = check(parts)?;
+    let missing = check_and_list_missing(parts)?;
     let Some(first) = parts.first() else { return Err(PartError::Missing { missing, count: 0 }) };
     let count = first.head.share.count;
     if !missing.is_empty() && !is_partial {
@@ -92,7 +92,7 @@ pub fn merge(
     }
     let film = first.head.picture.create_film()?;
     for tile in 0..film.tile_count() {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
             0 => tile_in_single_part(parts, tile, area)?,

@@ -21,10 +21,10 @@ mod save;
 
 pub use error::{PartError, PartIndex, missing_parts_message};
 pub use head::{
-    Dependency, ImageHeader, PartHeader, PartKind, PartShare, ToneHeader, dependency_differences,
+    ImageHeader, PartHeader, PartOrCheckpoint, PartShare, RenderInput, ToneHeader, dependency_differences,
 };
-pub use merge::{MergedParts, check, merge};
-pub use read::{PartFile, input_name_by_content, input_name_by_path, is_part};
+pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
+pub use read::{PartFile, find_input_by_path_suffix, input_name_by_content, is_part};
 pub use save::save;
 
 /// Magic number. As in PNG, a program that converts the file as if it were text corrupts the number, so the

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 
-use super::head::{PartHeader, PartKind};
+use super::head::{PartHeader, PartOrCheckpoint};
 use super::{Digest, FOOTER, Footer, MARK, PartError, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -36,7 +36,7 @@ pub(super) const IMPOSSIBLE_HEADER: &str = "the header has invalid values";
 /// Whether a file has the magic number of parts and checkpoints.
 pub fn is_part(path: &Path) -> bool {
     let mut mark = [0; MARK.len()];
-    open(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
+    open_raising_file_limit(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
 }
 
 /// Finds an input file that has the same content as the file at `path`, and returns its name. Input files
@@ -44,19 +44,19 @@ pub fn is_part(path: &Path) -> bool {
 /// input or the file cannot be read.
 pub fn input_name_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(open(path).ok()?).ok()?;
+    hasher.update_reader(open_raising_file_limit(path).ok()?).ok()?;
     let hash = hasher.finalize().to_hex();
     parts.iter().find_map(|part| part.head.input_name_by_hash(&hash))
 }
 
 /// Finds an input file whose name matches the end of `path`, and returns the name. Unlike a comparison of
 /// contents, this also finds files that were missing or have changed since.
-pub fn input_name_by_path<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn find_input_by_path_suffix<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
-    parts
-        .iter()
-        .find_map(|part| [&absolute, &real].into_iter().find_map(|path| part.head.input_name_by_path(path)))
+    parts.iter().find_map(|part| {
+        [&absolute, &real].into_iter().find_map(|path| part.head.find_input_by_path_suffix(path))
+    })
 }
 
 impl PartFile {
@@ -67,7 +67,7 @@ impl PartFile {
     /// cancelled.
     pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
-        let file = open(path)?;
+        let file = open_raising_file_limit(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
         let mut reader = PartReader { path, file: BufReader::with_capacity(1 << 20, &file), at: 0, size };
         let (head, header_digest) = reader.read_header()?;
@@ -75,7 +75,7 @@ impl PartFile {
         let (mut tiles, mut records) = (Vec::<(u32, u64, u32)>::new(), blake3::Hasher::new());
         let mut bytes = Vec::new();
         let end = loop {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             let (number, offset, digest) = reader.read_record(&header_digest, &mut bytes)?;
             if number == FOOTER {
                 break serde_json::from_slice::<Footer>(&bytes);
@@ -105,7 +105,7 @@ impl PartFile {
     /// Same as [`Self::open`].
     pub fn read_header(path: &Path) -> Result<PartHeader, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
-        let file = open(path)?;
+        let file = open_raising_file_limit(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
         PartReader { path, file: BufReader::new(&file), at: 0, size }.read_header().map(|(head, _)| head)
     }
@@ -114,7 +114,7 @@ impl PartFile {
     ///
     /// # Errors
     /// [`PartError::Kind`].
-    pub fn check_kind(&self, wanted: PartKind) -> Result<(), PartError> {
+    pub fn check_kind(&self, wanted: PartOrCheckpoint) -> Result<(), PartError> {
         let found = self.head.kind;
         if found == wanted {
             return Ok(());
@@ -169,7 +169,7 @@ impl PartFile {
 
 /// Opens a regular file. If the process has reached its limit on open files, raises the limit and tries
 /// again.
-fn open(path: &Path) -> Result<File, PartError> {
+fn open_raising_file_limit(path: &Path) -> Result<File, PartError> {
     let opened = match file::open_regular_file(path) {
         Err(error) if error.raw_os_error() == Some(nix::errno::Errno::EMFILE as i32) => {
             raise_file_limit().and_then(|()| file::open_regular_file(path))

@@ -103,7 +103,7 @@ fn encode_part(
     // Write the tiles.
     let (mut tiles, mut records, mut bytes) = (0, blake3::Hasher::new(), Vec::new());
     for tile in 0..film.tile_count() {
-        token.check().map_err(io::Error::other)?;
+        token.check_pause_and_cancel().map_err(io::Error::other)?;
         bytes.clear();
         if film.serialize_tile(tile, &mut bytes) {
             records.update(&write_record(file, &header_digest, tile as u32, &bytes)?);

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use serde_json::json;
 
 use super::super::write::{Durability, WritePolicy};
-use super::super::{AttributeLossPolicy, BitDepth, DevelopSettings};
+use super::super::{AttributeLossPolicy, BitDepth, FilmEncodingSettings};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
@@ -32,8 +32,8 @@ fn film(index: u32, count: u32) -> Film {
     film
 }
 
-fn finish() -> DevelopSettings {
-    DevelopSettings {
+fn finish() -> FilmEncodingSettings {
+    FilmEncodingSettings {
         quantity: Quantity::Radiance,
         tone: ToneMapping { exposure_stops: 0.3, ..ToneMapping::default() },
         bit_depth: BitDepth::Sixteen,
@@ -44,11 +44,11 @@ fn finish() -> DevelopSettings {
 
 fn head(index: u32, count: u32, film: &Film) -> PartHeader {
     PartHeader {
-        kind: PartKind::Part,
+        kind: PartOrCheckpoint::Part,
         identity: vec![
-            Dependency::from_setting("seed", "7"),
-            Dependency::file("knot.obj", "12ab"),
-            Dependency::from_combined_hash("ff"),
+            RenderInput::from_name_and_value("seed", "7"),
+            RenderInput::file("knot.obj", "12ab"),
+            RenderInput::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
         picture: ImageHeader::new(film, &finish()),
@@ -86,7 +86,7 @@ fn parts(folder: &Path, count: u32) -> Vec<PathBuf> {
 
 fn merged(paths: &[PathBuf]) -> Result<MergedParts, PartError> {
     let parts = paths.iter().map(|path| opened(path)).collect::<Result<Vec<_>, _>>()?;
-    merge(&parts, false, &CancelToken::new(), |_, _| ())
+    merge_into_film(&parts, false, &CancelToken::new(), |_, _| ())
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn mismatched_parts_are_rejected() {
         assert!(path.ends_with("other.part") && differences.len() == 1, "{differences:?}");
         assert!(words.iter().all(|word| differences[0].contains(word)), "{differences:?}");
     }
-    let checkpoint = other(&|head: &mut PartHeader| head.kind = PartKind::Checkpoint);
+    let checkpoint = other(&|head: &mut PartHeader| head.kind = PartOrCheckpoint::Checkpoint);
     assert!(
         matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
         "{checkpoint}"
@@ -231,7 +231,8 @@ fn metadata_differences_are_listed() {
         opened(&put(folder.path(), scene, &head, &film)).expect("a part")
     };
     let parts = [part(1, "a.toml"), part(2, "b.toml")];
-    let PartError::Other { differences, .. } = merge::check(&parts).expect_err("two scenes") else {
+    let PartError::Other { differences, .. } = merge::check_and_list_missing(&parts).expect_err("two scenes")
+    else {
         panic!("the scenes differ")
     };
     assert!(differences[0].contains("b.toml") && differences[0].contains("a.toml"), "{differences:?}");
@@ -239,8 +240,9 @@ fn metadata_differences_are_listed() {
 
 #[test]
 fn parts_from_different_builds_do_not_match() {
-    let inputs =
-        |build: &str| vec![Dependency::from_setting("glimt", build), Dependency::from_setting("width", "4")];
+    let inputs = |build: &str| {
+        vec![RenderInput::from_name_and_value("glimt", build), RenderInput::from_name_and_value("width", "4")]
+    };
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
     assert_eq!(dependency_differences(&a, &a, ("here", "there")), [""; 0]);
     let found = dependency_differences(&a, &b, ("here", "there"));
@@ -294,6 +296,6 @@ fn inputs_match_the_end_of_a_path() {
         ("/d.png", None),
         ("/scenes", None),
     ] {
-        assert_eq!(head.input_name_by_path(Path::new(path)), expected, "{path}");
+        assert_eq!(head.find_input_by_path_suffix(Path::new(path)), expected, "{path}");
     }
 }

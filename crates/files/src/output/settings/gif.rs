@@ -15,7 +15,7 @@ const HAS_PALETTE: u8 = 0x80;
 
 /// Reads a GIF from the start. The frame count is missing if the file is truncated. Returns `None` if the
 /// file has no frames.
-pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
+pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = read_array(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));
     let mut info = ImageInfo { format: "GIF".to_owned(), size: Some(size), ..ImageInfo::default() };

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use ::exr::meta::MetaData;
 
-use super::part::{PartFile, PartKind};
+use super::part::{PartFile, PartOrCheckpoint};
 use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
 use crate::system::file::{self, PART_MAGIC};
@@ -67,7 +67,7 @@ impl ImageInfo {
 
 /// Reason why a file's settings cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum ImageInfoError {
+pub enum ImageInfoReadError {
     /// The file cannot be read.
     #[error("cannot read {}: {why}", path.display())]
     Unreadable {
@@ -99,8 +99,8 @@ pub enum ImageInfoError {
 ///
 /// # Errors
 /// [`ImageInfoError`].
-pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
-    let unreadable = |why: String| ImageInfoError::Unreadable { path: path.to_owned(), why };
+pub fn read_image_info(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+    let unreadable = |why: String| ImageInfoReadError::Unreadable { path: path.to_owned(), why };
     let (opened, _) = match file::open_regular_file(path) {
         Ok(Ok(found)) => found,
         Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a regular file", kind.description()))),
@@ -110,25 +110,25 @@ pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     if start.starts_with(&PART_MAGIC) {
         // `read_part` opens the file again. Use only one descriptor at a time.
         drop(opened);
-        return read_part(path).map_err(unreadable);
+        return read_part_file_info(path).map_err(unreadable);
     }
     // WebP stores metadata after the pixels.
     if start.len() as u64 == START_BYTES
         && start.starts_with(b"RIFF")
-        && let Some(info) = webp::read_webp(&opened)
+        && let Some(info) = webp::read_webp_info(&opened)
     {
         return Ok(info);
     }
     // GIF frames extend to the end of the file.
     if start.len() as u64 == START_BYTES && start.starts_with(b"GIF") {
         let rest = BufReader::new(&opened);
-        if let Some(info) = gif::read_gif(start.chain(rest)) {
+        if let Some(info) = gif::read_gif_info(start.chain(rest)) {
             return Ok(info);
         }
     }
     read_info_from_start(&start).map_err(|why| match why {
-        Some(why) => ImageInfoError::Damaged { path: path.to_owned(), why },
-        None => ImageInfoError::NotAnImage { path: path.to_owned() },
+        Some(why) => ImageInfoReadError::Damaged { path: path.to_owned(), why },
+        None => ImageInfoReadError::NotAnImage { path: path.to_owned() },
     })
 }
 
@@ -146,12 +146,12 @@ fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => read_png(bytes).ok_or_else(|| wrong("PNG")),
-        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(bytes).ok_or_else(|| wrong("EXR")),
+        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr_info(bytes).ok_or_else(|| wrong("EXR")),
         [b'#', b'?', ..] => text::read_hdr(bytes).ok_or_else(|| wrong("HDR")),
         [b'P', b'6', ..] => text::read_ppm(bytes).ok_or_else(|| wrong("PPM")),
-        [0xff, 0xd8, ..] => text::read_jpeg(bytes).ok_or_else(|| wrong("JPEG")),
-        [b'R', b'I', b'F', b'F', ..] => webp::read_webp(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
-        [b'G', b'I', b'F', ..] => gif::read_gif(bytes).ok_or_else(|| wrong("GIF")),
+        [0xff, 0xd8, ..] => text::read_jpeg_info(bytes).ok_or_else(|| wrong("JPEG")),
+        [b'R', b'I', b'F', b'F', ..] => webp::read_webp_info(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
+        [b'G', b'I', b'F', ..] => gif::read_gif_info(bytes).ok_or_else(|| wrong("GIF")),
         _ => Err(None),
     }
 }
@@ -179,7 +179,7 @@ fn read_png(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-fn read_exr(bytes: &[u8]) -> Option<ImageInfo> {
+fn read_exr_info(bytes: &[u8]) -> Option<ImageInfo> {
     let meta = MetaData::read_from_buffered(BufReader::new(Cursor::new(bytes)), false).ok()?;
     let header = meta.headers.first()?;
     let size =
@@ -195,11 +195,11 @@ fn read_exr(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-fn read_part(path: &Path) -> Result<ImageInfo, String> {
+fn read_part_file_info(path: &Path) -> Result<ImageInfo, String> {
     let head = PartFile::read_header(path).map_err(|error| error.to_string())?;
     let format = match head.kind {
-        PartKind::Part => format!("part {} of {}", head.share.index, head.share.count),
-        PartKind::Checkpoint => "checkpoint".to_owned(),
+        PartOrCheckpoint::Part => format!("part {} of {}", head.share.index, head.share.count),
+        PartOrCheckpoint::Checkpoint => "checkpoint".to_owned(),
     };
     let mut info =
         ImageInfo { format, size: Some((head.picture.width, head.picture.height)), ..ImageInfo::default() };

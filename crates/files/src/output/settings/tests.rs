@@ -105,9 +105,9 @@ fn all_gif_frames_are_counted() {
     bytes.push(b';');
     assert!(bytes.len() as u64 > START_BYTES, "{}", bytes.len());
     std::fs::write(&path, &bytes).expect("written");
-    assert_eq!(read_info(&path).expect("read").frames, Some(30));
+    assert_eq!(read_image_info(&path).expect("read").frames, Some(30));
     std::fs::write(&path, &bytes[..bytes.len() - 9]).expect("written");
-    let cut = read_info(&path).expect("read");
+    let cut = read_image_info(&path).expect("read");
     assert_eq!((cut.frames, cut.size), (None, Some((400, 400))));
     let local = b"GIF89a\x01\0\x01\0\0\0\0,\0\0\0\0\x01\0\x01\0\x80\0\0\0\xff\xff\xff\x02\x02L\x01\0;";
     assert_eq!(read_info_from_start(local).expect("read").frames, Some(1));

@@ -47,7 +47,7 @@ pub(super) fn read_ppm(bytes: &[u8]) -> Option<ImageInfo> {
 }
 
 /// Reads the segments that precede the pixels in a JPEG.
-pub(super) fn read_jpeg(bytes: &[u8]) -> Option<ImageInfo> {
+pub(super) fn read_jpeg_info(bytes: &[u8]) -> Option<ImageInfo> {
     const COMMENT: u8 = 0xfe;
     let mut info = ImageInfo { format: "JPEG".to_owned(), ..ImageInfo::default() };
     let mut at = 2;

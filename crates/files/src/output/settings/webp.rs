@@ -8,7 +8,7 @@ use super::ImageInfo;
 const MAX_XMP: u32 = 1 << 20;
 
 /// Reads the chunks in a WebP file. Returns `None` if the size is missing.
-pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
+pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "WebP".to_owned(), ..ImageInfo::default() };
     file.seek(SeekFrom::Start(12)).ok()?;
     let mut header = [0; 8];
@@ -24,7 +24,9 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
         };
         (&mut file).take(length.min(kept).into()).read_to_end(&mut content).ok()?;
         match &kind {
-            b"VP8X" => info.size = Some((canvas_side(&content, 4)?, canvas_side(&content, 7)?)),
+            b"VP8X" => {
+                info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?))
+            }
             b"VP8L" if info.size.is_none() => info.size = Some(lossless_size(&content)?),
             b"XMP " => add_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
             _ => {}
@@ -35,7 +37,7 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
 }
 
 /// Reads the canvas width or height in an extended file, stored as 24 bits, minus one.
-fn canvas_side(content: &[u8], at: usize) -> Option<u32> {
+fn read_canvas_dimension(content: &[u8], at: usize) -> Option<u32> {
     let [a, b, c] = *content.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes([a, b, c, 0]) + 1)
 }

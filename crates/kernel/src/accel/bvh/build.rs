@@ -2,7 +2,7 @@
 //! Volume Hierarchies*, 2007). Both halves of a large node are built in parallel. The tree does not depend on
 //! the number of threads.
 
-use super::top_node::TopNode;
+use super::top_node::WideTopNode;
 use super::{BinaryNode, Bvh, ChildRef, LEAF_SIZE, SURFACE_AREA_LEVELS};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -41,7 +41,7 @@ impl PrimitiveReference {
 }
 
 /// A finished subtree.
-struct BuiltSubtree {
+struct SubtreeSummary {
     root: ChildRef,
     bounds: Aabb,
     /// Number of node levels.
@@ -69,7 +69,7 @@ impl Bvh {
                 order,
                 bounds: Aabb::EMPTY,
                 depth: 0,
-                top: TopNode::EMPTY,
+                top: WideTopNode::EMPTY,
                 is_nested: false,
                 shells: None,
             });
@@ -87,8 +87,8 @@ impl Bvh {
             nodes[0] = BinaryNode { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
-        let top = TopNode::new((tree.bounds, tree.root), &nodes, &references);
-        let BuiltSubtree { bounds, depth, is_nested, .. } = tree;
+        let top = WideTopNode::new((tree.bounds, tree.root), &nodes, &references);
+        let SubtreeSummary { bounds, depth, is_nested, .. } = tree;
         Ok(Self { nodes, order, bounds, depth: depth.max(1), top, is_nested, shells: None })
     }
 }
@@ -110,17 +110,17 @@ fn build_subtree(
     nodes: &mut [BinaryNode],
     start: OutputPosition,
     token: &CancelToken,
-) -> Result<BuiltSubtree, Cancelled> {
+) -> Result<SubtreeSummary, Cancelled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
     let Some((middle, by_size)) = partition_unless_leaf_is_cheaper(references, bounds, &start) else {
         let leaf = ChildRef { first: start.place as u32, count: references.len() as u32 };
-        return Ok(BuiltSubtree { root: leaf, bounds, depth: 0, is_nested: false });
+        return Ok(SubtreeSummary { root: leaf, bounds, depth: 0, is_nested: false });
     };
     let parallel = references.len() > PARALLEL_SIZE;
     let is_nested = by_size && references.len() >= NESTED_SIZE;
     let (left, right) = references.split_at_mut(middle);
     let Some((node, rest)) = nodes.split_first_mut() else {
-        return Ok(BuiltSubtree { root: ChildRef::NONE, bounds, depth: 0, is_nested: false });
+        return Ok(SubtreeSummary { root: ChildRef::NONE, bounds, depth: 0, is_nested: false });
     };
     let (left_nodes, right_nodes) = rest.split_at_mut(left.len() - 1);
     let depth = start.depth + 1;
@@ -128,7 +128,7 @@ fn build_subtree(
     let right_start =
         OutputPosition { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth };
     let (left, right) = if parallel {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         rayon::join(
             || build_subtree(left, left_nodes, left_start, token),
             || build_subtree(right, right_nodes, right_start, token),
@@ -141,7 +141,7 @@ fn build_subtree(
     *node = BinaryNode { bounds: [left.bounds, right.bounds], child: [left.root, right.root] };
     let root = ChildRef { first: start.node as u32, count: 0 };
     let is_nested = is_nested || left.is_nested || right.is_nested;
-    Ok(BuiltSubtree { root, bounds, depth: 1 + left.depth.max(right.depth), is_nested })
+    Ok(SubtreeSummary { root, bounds, depth: 1 + left.depth.max(right.depth), is_nested })
 }
 
 /// Partitions the references into two halves. Returns the size of the first half and whether the split was by

@@ -10,7 +10,7 @@ use crate::geometry::Aabb;
 
 pub use packet::{AnyHitCallback, ClosestHitCallback};
 pub use shell::{OverlappingItem, SphericalShell};
-use top_node::TopNode;
+use top_node::WideTopNode;
 
 /// Maximum number of primitives in a leaf chosen by the surface area heuristic.
 const LEAF_SIZE: usize = 4;
@@ -38,7 +38,7 @@ pub struct Bvh {
     /// Number of node levels.
     depth: usize,
     /// The upper levels of the tree, flattened for packet traversal.
-    top: TopNode,
+    top: WideTopNode,
     /// Whether many boxes contain other boxes.
     is_nested: bool,
     /// The shells of each node's children. `None` if few boxes are nested.

@@ -12,7 +12,7 @@ use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::packet::{RayPacket, lane_indices};
+use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits for a packet.
@@ -121,7 +121,7 @@ impl PendingSubtrees {
     #[inline(always)]
     fn sorted_by_entry((met, entry): (u32, F32x16)) -> Self {
         let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
-        for i in lane_indices(met) {
+        for i in set_bit_lanes(met) {
             let mut place = near.count;
             while place > 0 && entry[usize::from(near.order[place - 1])] < entry[i] {
                 near.order[place] = near.order[place - 1];
@@ -144,7 +144,7 @@ impl PendingSubtrees {
 impl Bvh {
     /// Mask of the top node's subtrees that the packet may hit, and lower bounds on their entry distances.
     #[inline(always)]
-    fn hit_top_subtrees(
+    fn top_subtree_hit_mask(
         &self,
         slabs: &SlabRayPacket<'_>,
         ends: &F32x16,
@@ -154,8 +154,8 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.hit_subtrees(
-            &RayCoordinateBounds::around(slabs.origin, &slabs.inverse, (ends, traced), simd),
+        self.top.subtrees_hit_by_beam(
+            &RayCoordinateBounds::from_ray_packet(slabs.origin, &slabs.inverse, (ends, traced), simd),
             simd,
         )
     }
@@ -174,7 +174,8 @@ impl Bvh {
     ) {
         let slabs = SlabRayPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = PendingSubtrees::sorted_by_entry(self.hit_top_subtrees(&slabs, ends, traced, simd));
+        let mut near =
+            PendingSubtrees::sorted_by_entry(self.top_subtree_hit_mask(&slabs, ends, traced, simd));
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
@@ -240,7 +241,7 @@ impl Bvh {
         let slabs = SlabRayPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.hit_top_subtrees(&slabs, ends, traced, simd);
+        let (mut subtrees, _) = self.top_subtree_hit_mask(&slabs, ends, traced, simd);
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {

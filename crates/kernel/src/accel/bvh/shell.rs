@@ -175,7 +175,11 @@ impl Bvh {
     /// Visits every primitive whose surface may intersect a box, until `visit` returns false. A subtree whose
     /// primitives all enclose the box is reported as a single item. Without shells, this is equivalent to
     /// [`Bvh::visit_overlapping`].
-    pub fn visit_overlapping_surfaces(&self, other: &Aabb, mut visit: impl FnMut(OverlappingItem) -> bool) {
+    pub fn visit_surfaces_overlapping_box(
+        &self,
+        other: &Aabb,
+        mut visit: impl FnMut(OverlappingItem) -> bool,
+    ) {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;
             return self
@@ -240,7 +244,7 @@ impl Bvh {
     /// [`Bvh::any_hit`] with shells.
     #[cold]
     #[inline(never)]
-    pub(super) fn any_hit_with_shells(
+    pub(super) fn any_hit_culled_by_shells(
         &self,
         shells: &[[SphericalShell; 2]],
         ray: &Ray,

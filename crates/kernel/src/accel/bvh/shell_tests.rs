@@ -82,7 +82,7 @@ fn nested_box_queries_match_brute_force() {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
             let near = Aabb { min: at, max: at }.expanded(Vec3::splat([1e-5, 0.1][i % 2]));
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
-            tree.visit_overlapping_surfaces(&near, |met| {
+            tree.visit_surfaces_overlapping_box(&near, |met| {
                 match met {
                     OverlappingItem::Primitive(id) => visited.push(id),
                     OverlappingItem::Enclosing(subtree) => enclosing.extend(&last[subtree]),
@@ -119,7 +119,7 @@ fn nested_sphere_traversal_is_logarithmic() {
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };
             let mut met = 0;
-            tree.visit_overlapping_surfaces(&near, |_| {
+            tree.visit_surfaces_overlapping_box(&near, |_| {
                 met += 1;
                 true
             });

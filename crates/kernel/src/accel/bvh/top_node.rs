@@ -16,7 +16,7 @@ use crate::math::lanes::{PortableSimd, Simd, TRUE};
 /// Up to [`PACKET_SIZE`] subtrees that together contain all primitives. They replace the tree's upper levels.
 /// Small scenes fit entirely into the top node.
 #[derive(Clone, Debug)]
-pub(super) struct TopNode {
+pub(super) struct WideTopNode {
     min: [F32x16; 3],
     max: [F32x16; 3],
     child: [ChildRef; PACKET_SIZE],
@@ -24,7 +24,7 @@ pub(super) struct TopNode {
     used: u32,
 }
 
-impl TopNode {
+impl WideTopNode {
     /// Top node of an empty tree.
     pub(super) const EMPTY: Self = Self {
         min: [[f32::INFINITY; PACKET_SIZE]; 3],
@@ -87,7 +87,7 @@ impl TopNode {
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn hit_subtrees(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn subtrees_hit_by_beam(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -142,7 +142,7 @@ pub(super) struct RayCoordinateBounds {
 impl RayCoordinateBounds {
     /// Bounds the rays in the mask `traced`, which must not be empty.
     #[inline(always)]
-    pub(super) fn around(
+    pub(super) fn from_ray_packet(
         origin: &[F32x16; 3],
         inverse: &[F32x16; 3],
         (ends, traced): (&F32x16, u32),
@@ -171,7 +171,7 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
+    use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
     use crate::math::random::signed_generator as random;
 
     /// Records which primitives are tested against which rays.
@@ -214,7 +214,7 @@ mod tests {
                     match round % 7 {
                         0 => Ray::new(from + jitter, Vec3::NEG_Y),
                         1 | 2 => Ray::new(from + jitter, to - from),
-                        _ => Ray::segment(from, to * 3.0 + jitter),
+                        _ => Ray::segment_ending_before(from, to * 3.0 + jitter),
                     }
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray()).collect();
@@ -228,7 +228,7 @@ mod tests {
                 tree.closest_hit_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
                 tree.any_hit_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
                 for (id, bounds) in boxes.iter().enumerate() {
-                    for lane in lane_indices((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
+                    for lane in set_bit_lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
                         let is_met = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
                         let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);

@@ -3,9 +3,9 @@
 use arrayvec::ArrayVec;
 
 use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
-use crate::accel::{RayBoxInterval, TreeNodeSummary};
+use crate::accel::{RayBoxInterval, TreeNodeInfo};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
@@ -86,7 +86,7 @@ impl Bvh {
     #[inline]
     pub fn any_hit(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         if let Some(shells) = &self.shells {
-            self.any_hit_with_shells(shells, ray, &mut test)
+            self.any_hit_culled_by_shells(shells, ray, &mut test)
         } else if self.depth < SHALLOW_STACK {
             self.any_hit_with_stack_size::<SHALLOW_STACK>(ray, test)
         } else {
@@ -99,14 +99,14 @@ impl Bvh {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
         mut own: impl FnMut(u32, u32),
     ) {
         let root = (self.bounds, ChildRef { first: 0, count: 0 }, 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
             let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
-            if !visit(&TreeNodeSummary { bounds, depth, shapes: child.count }, &stretch) {
+            if !visit(&TreeNodeInfo { bounds, depth, shapes: child.count }, &stretch) {
                 continue;
             }
             if child.count > 0 {
@@ -123,7 +123,7 @@ impl Bvh {
     /// Visits every primitive in leaves whose boxes overlap `other`.
     pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
-        for subtree in lane_indices(self.top.overlap_mask(other)) {
+        for subtree in set_bit_lanes(self.top.overlap_mask(other)) {
             stack.push(self.top.subtree(subtree).1);
             while let Some(current) = stack.pop() {
                 if current.count > 0 {

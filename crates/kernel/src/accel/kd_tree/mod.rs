@@ -10,7 +10,7 @@ mod node;
 mod traverse;
 mod validate;
 
-use crate::accel::{RayBoxInterval, TreeNodeSummary};
+use crate::accel::{RayBoxInterval, TreeNodeInfo};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
@@ -35,7 +35,7 @@ impl KdTree {
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
-    pub fn build(
+    pub fn from_triangles(
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
@@ -116,7 +116,7 @@ impl KdTree {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
     ) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
@@ -126,7 +126,7 @@ impl KdTree {
                 NodeKind::Inner { .. } => 0,
                 NodeKind::Leaf { count, .. } => count,
             };
-            if !visit(&TreeNodeSummary { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNodeInfo { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let NodeKind::Inner { axis, at, right } = kind {

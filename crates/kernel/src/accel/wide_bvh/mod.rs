@@ -8,13 +8,13 @@ mod node;
 mod simd;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
 pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{F32x16, PACKET_SIZE, RayBoxInterval, TreeNodeSummary};
+use crate::accel::{F32x16, PACKET_SIZE, RayBoxInterval, TreeNodeInfo};
 
 use node::{TrianglePack, WideNode};
 
@@ -95,7 +95,7 @@ impl WideBvh {
         let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
         for node in &self.nodes {
             for slot in 0..node::WIDTH {
-                let Some(bounds) = node.bounds(slot) else { continue };
+                let Some(bounds) = node.child_bounds(slot) else { continue };
                 let share = f64::from(bounds.half_area()) / whole;
                 match node.child(slot) {
                     node::Child::Inner(_) => visits.0 += share,
@@ -111,7 +111,7 @@ impl WideBvh {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeSummary, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
     ) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
@@ -124,12 +124,12 @@ impl WideBvh {
                     packs.iter().map(|pack| pack.ids().count() as u32).sum()
                 }
             };
-            if !visit(&TreeNodeSummary { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNodeInfo { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let node::Child::Inner(place) = child {
                 let node = &self.nodes[place as usize];
-                let below = |slot: usize| Some((node.bounds(slot)?, node.child(slot), depth + 1));
+                let below = |slot: usize| Some((node.child_bounds(slot)?, node.child(slot), depth + 1));
                 pending.extend((0..node::WIDTH).filter_map(below));
             }
         }
@@ -206,7 +206,7 @@ impl WideBvh {
         visit: &mut impl FnMut(u32) -> bool,
     ) -> bool {
         let node = &self.nodes[place as usize];
-        lane_indices(node.overlap_mask(other)).all(|slot| match node.child(slot) {
+        set_bit_lanes(node.overlap_mask(other)).all(|slot| match node.child(slot) {
             node::Child::Inner(child) => self.visit_overlapping_in_subtree(child, other, visit),
             node::Child::Leaf { first, count } => {
                 let packs = &self.packs[first as usize..(first + count) as usize];
@@ -227,7 +227,7 @@ impl WideBvh {
         while let Some((index, outer)) = pending.pop() {
             let node = &self.nodes[index as usize];
             for slot in 0..node::WIDTH {
-                let Some(bounds) = node.bounds(slot) else { continue };
+                let Some(bounds) = node.child_bounds(slot) else { continue };
                 if bounds.union(outer) != outer {
                     return Err(format!("a child of node {index} is larger than the node"));
                 }
@@ -298,7 +298,7 @@ fn for_each_coherent_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F3
 mod tests {
     use super::*;
     use crate::accel::packet_ray_ends;
-    use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, difficult_rays};
+    use crate::accel::pathological::{closest_by_brute_force, difficult_meshes, difficult_rays, hit_bits};
     use crate::geometry::watertight::ShearedRay;
     use crate::math::random::signed_generator as random;
 
@@ -330,7 +330,11 @@ mod tests {
                 for ray in difficult_rays(mesh) {
                     let expected = closest_by_brute_force(mesh, &ray);
                     let found = tree.closest_hit(&ray);
-                    assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
+                    assert_eq!(
+                        hit_bits(found),
+                        hit_bits(expected),
+                        "mesh {number}, {instructions:?}, {ray:?}"
+                    );
                     assert_eq!(
                         tree.any_hit(&ray, None),
                         expected.is_some(),
@@ -450,7 +454,11 @@ mod tests {
             let expected = closest_by_brute_force(&mesh, &ray);
             for instructions in InstructionSet::ALL {
                 let tree = tree.clone().with_instruction_set(instructions);
-                assert_eq!(bits(tree.closest_hit(&ray)), bits(expected), "{instructions:?}, {direction:?}");
+                assert_eq!(
+                    hit_bits(tree.closest_hit(&ray)),
+                    hit_bits(expected),
+                    "{instructions:?}, {direction:?}"
+                );
                 assert_eq!(tree.any_hit(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
             }
         }

@@ -87,16 +87,16 @@ impl WideNode {
             self.rows[2 * axis][slot] = bounds.min[axis];
             self.rows[2 * axis + 1][slot] = bounds.max[axis];
         }
-        self.set_child(slot, child);
+        self.set_child_reference(slot, child);
     }
 
     /// Replaces a slot's child.
-    pub fn set_child(&mut self, slot: usize, child: Child) {
+    pub fn set_child_reference(&mut self, slot: usize, child: Child) {
         self.children[slot] = child.encode();
     }
 
     /// Box of a slot, or `None` if the slot is empty.
-    pub fn bounds(&self, slot: usize) -> Option<Aabb> {
+    pub fn child_bounds(&self, slot: usize) -> Option<Aabb> {
         let corner = |side: usize| {
             Vec3::new(self.rows[side][slot], self.rows[2 + side][slot], self.rows[4 + side][slot])
         };

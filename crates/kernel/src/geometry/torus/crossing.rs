@@ -103,7 +103,7 @@ impl UnitTorusLine {
 
     /// Points between `from` and `to` where the line enters the torus. `from` must be outside. There are at
     /// most two such points.
-    pub(super) fn entry_parameters(&self, from: f64, to: f64) -> [Option<f64>; 2] {
+    pub(super) fn surface_entry_parameters(&self, from: f64, to: f64) -> [Option<f64>; 2] {
         /// Step past a crossing. Long enough to reach the other side despite rounding, unless the line grazes
         /// the surface.
         const BEYOND: f64 = 1e-10;

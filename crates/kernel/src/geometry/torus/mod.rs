@@ -6,10 +6,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
-    self, AxialFrame, LocalLine, direction_at_u, radial_direction, u_from_direction, unrounded_t,
+    self, AxialFrame, LocalLine, direction_at_u, radial_direction_toward, u_from_direction, unrounded_t,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
-use super::{Aabb, AreaPoint, RayF64, ShapeHit};
+use super::{Aabb, RayF64, ShapeHit, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitTorusLine;
 
@@ -30,7 +30,8 @@ pub struct Torus {
 
 impl SurfaceF64 for Torus {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
+        let (out, from_circle) =
+            self.directions_from_axis_and_circle(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
         self.surface_f64_from_directions(out, from_circle)
     }
 }
@@ -76,31 +77,32 @@ impl Torus {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
-        unit_line.entry_parameters(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
+        unit_line.surface_entry_parameters(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
     /// Surface point at a hit.
     pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
+        let (out, from_circle) =
+            self.directions_from_axis_and_circle(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
         self.surface_from_directions(out, from_circle)
     }
 
     /// Direction of a point from the axis, and its direction from the circle in the plane through the axis.
-    fn circle_directions(&self, point: DVec3) -> (DVec2, DVec2) {
+    fn directions_from_axis_and_circle(&self, point: DVec3) -> (DVec2, DVec2) {
         let local = self.frame.point_to_local(point);
-        let out = radial_direction(local.truncate());
-        (out, radial_direction(DVec2::new(local.truncate().length() - self.radius, local.z)))
+        let out = radial_direction_toward(local.truncate());
+        (out, radial_direction_toward(DVec2::new(local.truncate().length() - self.radius, local.z)))
     }
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        let (out, from_circle) = self.circle_directions(point);
+        let (out, from_circle) = self.directions_from_axis_and_circle(point);
         DVec2::new(u_from_direction(out), u_from_direction(from_circle))
     }
 
     /// Mean curvature at a point on the surface.
     pub fn mean_curvature(&self, point: DVec3) -> f64 {
-        let across = self.circle_directions(point).1.x;
+        let across = self.directions_from_axis_and_circle(point).1.x;
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
@@ -148,7 +150,7 @@ impl Torus {
     /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
     /// (tube/radius)·cos ψ. The pdf values at ψ and at the mirrored angle π − ψ have a constant sum, so a
     /// uniformly distributed ψ is either kept or mirrored, with probabilities proportional to these values.
-    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
@@ -157,7 +159,7 @@ impl Torus {
         } else {
             self.point_and_normal_at_uv((x - share) / (1.0 - share), 1.5 - y)
         };
-        AreaPoint { point, normal }
+        SurfaceSample { point, normal }
     }
 
     /// Signed distance to the surface. Negative inside.
@@ -206,7 +208,7 @@ impl Torus {
 
     /// Bounding box.
     pub fn bounds(&self) -> Aabb {
-        self.frame.swept_sphere_bounds(0.0, self.radius, self.tube)
+        self.frame.sphere_swept_circle_bounds(0.0, self.radius, self.tube)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::quad::SphericalRectangle;
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::math::{DVec3, Vec3};
 
 /// A box that emits outward.
@@ -82,14 +82,14 @@ impl ShapeEmitter for BoxEmitter {
         }
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.center
     }
 }
 
 impl BoxEmitter {
     /// Creates an emitter for an entire box.
-    pub fn new(cuboid: &Cuboid) -> Self {
+    pub fn new(cuboid: &OrientedBox) -> Self {
         let axes = cuboid.axes();
         Self {
             center: cuboid.centroid(),

@@ -52,7 +52,7 @@ impl ShapeEmitter for DiskEmitter {
         if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.center
     }
 }

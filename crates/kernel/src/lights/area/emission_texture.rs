@@ -27,12 +27,12 @@ pub enum UvMapping {
     /// The shape's own UV parameterization.
     Shape(Shape),
     /// UVs of a mesh's triangles, sorted by primitive index.
-    Triangles(Vec<UvTriangle>),
+    Triangles(Vec<TriangleWithUvs>),
 }
 
 /// A triangle with UV coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UvTriangle {
+pub struct TriangleWithUvs {
     /// Primitive index in its object.
     pub primitive: u32,
     /// Corners in world coordinates.
@@ -46,11 +46,11 @@ pub struct UvTriangle {
 impl EmissionTexture {
     /// Creates the factor from a texture and an opacity. Returns `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvMapping) -> Option<Self> {
-        Self::with_coat(texture, opacity, None, chart)
+        Self::new_with_coat(texture, opacity, None, chart)
     }
 
     /// [`EmissionTexture::new`] under a clear coat.
-    pub fn with_coat(
+    pub fn new_with_coat(
         texture: Option<&Arc<Texture>>,
         opacity: Option<&Opacity>,
         coat: Option<&Arc<EmissionCoat>>,
@@ -111,7 +111,7 @@ impl EmissionTexture {
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
         // At a shape's edge, the probe ray may miss the shape because of rounding.
-        let normal = self.chart.normal(point, primitive, direction);
+        let normal = self.chart.normal_at_point(point, primitive, direction);
         coat.transmittance(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
@@ -122,7 +122,7 @@ const PROBE: f64 = 1e-3;
 impl UvMapping {
     /// The unit normal at a point that is viewed from either side. `None` if the probe ray misses the
     /// surface.
-    fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
+    fn normal_at_point(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
                 let size = f64::from(shape.bounds()?.extent().max_element());
@@ -146,7 +146,7 @@ impl UvMapping {
             Self::Triangles(patches) => patches,
         };
         let found = patches.binary_search_by_key(&primitive, |patch| patch.primitive);
-        let Ok(UvTriangle { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
+        let Ok(TriangleWithUvs { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
             return TexturePoint::from_uv(DVec2::ZERO);
         };
         let weights = barycentric_weights(corners, point);

@@ -4,7 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
-use crate::geometry::{AreaPoint, RayF64, Shape};
+use crate::geometry::{RayF64, Shape, SurfaceSample};
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
@@ -20,7 +20,7 @@ pub struct InwardEmitter {
 impl ShapeEmitter for InwardEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         match self.shape.encloses_point(point.as_dvec3()) {
-            Some(true) => self.sample_directions(point, u),
+            Some(true) => self.sample_direction(point, u),
             Some(false) => LightSamplePoint::NOTHING,
             None => self.sample_by_area(point, u),
         }
@@ -37,7 +37,7 @@ impl ShapeEmitter for InwardEmitter {
         }
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.shape.centroid()
     }
 }
@@ -52,7 +52,7 @@ impl InwardEmitter {
     }
 
     /// Samples a direction uniformly from a point inside the shape.
-    fn sample_directions(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample_direction(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let cos = 1.0 - 2.0 * u[0];
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
         let (sin_around, cos_around) = sin_cos(TAU * u[1]);
@@ -66,7 +66,7 @@ impl InwardEmitter {
     /// point.
     fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
+        let SurfaceSample { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let direction = offset / distance;

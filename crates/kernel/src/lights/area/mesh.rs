@@ -6,7 +6,7 @@ use super::sample_point::LightSamplePoint;
 use super::triangle::TriangleEmitter;
 use super::{LightHit, ShapeEmitter};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::AreaPoint;
+use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
 use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::{LightBounds, LightTree, MAX_WITHOUT_TREE, Receiver};
@@ -95,19 +95,19 @@ impl MeshEmitter {
     }
 
     /// Primitive indices of the triangles.
-    pub fn primitives(&self) -> impl Iterator<Item = u32> {
+    pub fn primitive_indices(&self) -> impl Iterator<Item = u32> {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
     /// Samples a point uniformly on the triangle at `index`. Returns the point, the triangle's area, and its
     /// primitive index.
-    pub fn sample_point_on_triangle(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
+    pub fn sample_point_on_triangle(&self, index: usize, u: Vec2) -> (SurfaceSample, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
         let point = *a * weights.x + *b * weights.y + *c * weights.z;
         let vector_area = (*b - *a).cross(*c - *a) * 0.5;
         let area = vector_area.length();
-        (AreaPoint { point, normal: vector_area / area }, area, *primitive)
+        (SurfaceSample { point, normal: vector_area / area }, area, *primitive)
     }
 
     /// Bounds on the triangles' positions and emission, for a radiance of 1.
@@ -129,7 +129,7 @@ impl MeshEmitter {
 
     /// The parallelogram, if the light is sampled as a quad.
     #[inline(always)]
-    pub fn as_triangle_pair(&self) -> Option<&TrianglePairQuad> {
+    pub fn as_quad(&self) -> Option<&TrianglePairQuad> {
         if let MeshSampling::Quad(two) = &self.sampling { Some(two) } else { None }
     }
 
@@ -194,7 +194,7 @@ impl MeshEmitter {
     }
 
     /// Centroid of the area.
-    pub fn center(&self) -> DVec3 {
+    pub fn area_centroid(&self) -> DVec3 {
         self.center
     }
 }

@@ -21,7 +21,7 @@ pub mod textured_quad;
 pub mod torus;
 pub mod triangle;
 
-pub use emission_texture::{EmissionTexture, UvMapping, UvTriangle};
+pub use emission_texture::{EmissionTexture, TriangleWithUvs, UvMapping};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
@@ -38,7 +38,7 @@ use disk::DiskEmitter;
 use inside::InwardEmitter;
 use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
-use see_through::SeeThroughSideEmitter;
+use see_through::SeeThroughShapeEmitter;
 use sphere::SphereEmitter;
 use surface_of_revolution::{ConeSide, CylinderSide, RevolutionEmitter};
 use textured_quad::TexturedQuadEmitter;
@@ -54,7 +54,7 @@ pub trait ShapeEmitter {
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centroid of the area.
-    fn center(&self) -> DVec3;
+    fn area_centroid(&self) -> DVec3;
 }
 
 /// A surface that emits uniformly from one side. A two-sided emitter is represented by two lights.
@@ -71,14 +71,14 @@ pub struct AreaLight {
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
-    pub part: EmittingPart,
+    pub part: EmittingTriangleSelection,
     /// Bounds on the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
 /// The part of an object to which a light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EmittingPart {
+pub enum EmittingTriangleSelection {
     /// The entire object.
     Whole,
     /// The triangles that the emitter lists.
@@ -118,7 +118,7 @@ pub enum Emitter {
     /// The inside of a shape.
     Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
-    SeeThrough(Box<SeeThroughSideEmitter>),
+    SeeThrough(Box<SeeThroughShapeEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -164,7 +164,7 @@ impl Emitter {
         if let Self::Quad(quad) = self {
             return Some((quad, None));
         }
-        self.as_mesh().and_then(MeshEmitter::as_triangle_pair).map(|two| (two.quad(), Some(two)))
+        self.as_mesh().and_then(MeshEmitter::as_quad).map(|two| (two.quad(), Some(two)))
     }
 }
 
@@ -185,13 +185,13 @@ pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Ar
         Shape::Plane(_) => return None,
     };
     let bounds = emission_bounds(shape, radiance)?;
-    let (side, texture, part) = (Side::Front, None, EmittingPart::Whole);
+    let (side, texture, part) = (Side::Front, None, EmittingTriangleSelection::Whole);
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
 /// area.
-pub fn see_through_side_area_light(
+pub fn see_through_shape_side_light(
     shape: &Shape,
     side: Side,
     radiance: Vec3,
@@ -208,7 +208,7 @@ pub fn see_through_side_area_light(
         Side::Front => front_area_light(shape, radiance, object)?,
         Side::Back => back_area_light(shape, radiance, object)?,
     };
-    let see_through = if hides_itself { SeeThroughSideEmitter::new(shape, side) } else { None };
+    let see_through = if hides_itself { SeeThroughShapeEmitter::new(shape, side) } else { None };
     Some(match see_through {
         Some(see_through) => AreaLight { shape: Emitter::SeeThrough(Box::new(see_through)), ..light },
         None => light,
@@ -295,7 +295,7 @@ impl AreaLight {
     pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.scene_object());
+            let (end, source) = (ShadowRayEnd::At(target), self.light_geometry());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -304,7 +304,7 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn scene_object(&self) -> LightGeometry {
+    pub(super) fn light_geometry(&self) -> LightGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }
@@ -322,7 +322,7 @@ impl AreaLight {
     }
 
     /// Centroid of the area.
-    pub fn center(&self) -> DVec3 {
-        of_any!(&self.shape, it => it.center(), mesh => mesh.center())
+    pub fn area_centroid(&self) -> DVec3 {
+        of_any!(&self.shape, it => it.area_centroid(), mesh => mesh.area_centroid())
     }
 }

@@ -33,7 +33,7 @@ impl AreaLight {
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.scene_object();
+        let source = self.light_geometry();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {
@@ -51,7 +51,7 @@ impl AreaLight {
                 set_lane(&mut offsets, i, quad.offset_to_corner(lane(points, i)));
             }
             let mut row = packet_of!(source, i => {
-                let sample = quad.sample_with_corner_offset(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
+                let sample = quad.sample_given_corner_offset(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
                 (sample.direction, sample.target, self.radiance * sample.factor)
             });
             if let Some(two) = of_two {

@@ -22,11 +22,11 @@ pub struct QuadEmitter {
     normal: Vec3,
     area: f32,
     /// Lengths and unit directions of the edges, if they are perpendicular.
-    rectangle: Option<PlanarRectangle>,
+    rectangle: Option<RectangleEdges>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct PlanarRectangle {
+struct RectangleEdges {
     x: Vec3,
     y: Vec3,
     width: f32,
@@ -37,7 +37,7 @@ impl ShapeEmitter for QuadEmitter {
     /// Samples rectangles by solid angle and other parallelograms by area.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        self.sample_with_corner_offset(point, self.offset_to_corner(point), u)
+        self.sample_given_corner_offset(point, self.offset_to_corner(point), u)
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
@@ -48,7 +48,7 @@ impl ShapeEmitter for QuadEmitter {
         self.pdf_by_solid_angle(to_corner).unwrap_or_else(|| met.uniform_area_pdf(f64::from(self.area)))
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.corner + ((self.u + self.v) * 0.5).as_dvec3()
     }
 }
@@ -56,7 +56,7 @@ impl ShapeEmitter for QuadEmitter {
 impl QuadEmitter {
     /// [`ShapeEmitter::sample`] with a precomputed offset from the point to the corner.
     #[inline(always)]
-    pub(super) fn sample_with_corner_offset(
+    pub(super) fn sample_given_corner_offset(
         &self,
         point: Vec3,
         to_corner: Vec3,
@@ -85,7 +85,7 @@ impl QuadEmitter {
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let perpendicular = u.dot(v).abs() <= 1e-6 * u.length() * v.length();
-        let rectangle = perpendicular.then(|| PlanarRectangle {
+        let rectangle = perpendicular.then(|| RectangleEdges {
             x: u.normalize().as_vec3(),
             y: v.normalize().as_vec3(),
             width: u.length() as f32,
@@ -158,7 +158,7 @@ pub struct SphericalRectangle {
     solid_angle: f32,
 }
 
-impl PlanarRectangle {
+impl RectangleEdges {
     #[inline(always)]
     fn project_to_sphere(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
         let (x0, y0, z) = (to_corner.dot(self.x), to_corner.dot(self.y), to_corner.dot(normal));

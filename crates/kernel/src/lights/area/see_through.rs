@@ -2,20 +2,20 @@
 
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter, Side};
-use crate::geometry::{AreaPoint, Shape};
+use crate::geometry::{Shape, SurfaceSample};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 
 /// One side of a shape, sampled by area. Shadow rays account for other parts of the shape along the way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeeThroughSideEmitter {
+pub struct SeeThroughShapeEmitter {
     shape: Shape,
     by_area: DiscreteDistribution,
     /// 1 for the front, −1 for the back.
     outwards: f64,
 }
 
-impl SeeThroughSideEmitter {
+impl SeeThroughShapeEmitter {
     /// Creates an emitter for one side of a shape. `None` if the shape has no area.
     pub fn new(shape: &Shape, side: Side) -> Option<Self> {
         let outwards = match side {
@@ -26,10 +26,10 @@ impl SeeThroughSideEmitter {
     }
 }
 
-impl ShapeEmitter for SeeThroughSideEmitter {
+impl ShapeEmitter for SeeThroughShapeEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
+        let SurfaceSample { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let cosine = -self.outwards * normal.dot(offset) / distance;
@@ -45,7 +45,7 @@ impl ShapeEmitter for SeeThroughSideEmitter {
         met.uniform_area_pdf(self.by_area.total())
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.shape.centroid()
     }
 }

@@ -44,7 +44,7 @@ impl ShapeEmitter for SphereEmitter {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.center
     }
 }

@@ -28,7 +28,7 @@ pub trait RevolutionSide {
 /// A curved side seen from a point.
 pub trait RevolutionSideView {
     /// The pole around which the half planes rotate.
-    fn pole(&self) -> &PolarFrame;
+    fn polar_frame(&self) -> &PolarFrame;
 
     /// Largest angle around the pole at which the side is visible.
     fn max_angle(&self) -> SinCos;
@@ -61,7 +61,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
                 let around = SinCos::from_radians(angle);
                 let (from_pole, distance) = side.polar_angle_and_distance_at(around, f64::from(u[0] / share));
                 let factor = side.cosine_extent(around) / (density * f64::from(share));
-                (side.pole().direction(from_pole, around), distance, factor)
+                (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
                 let rest = (u[0] - share) / (1.0 - share);
@@ -81,7 +81,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
         let density = match (view.side, view.cap) {
             (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
             (Some((side, meridians)), _) => {
-                let angle = side.pole().azimuth(met.direction);
+                let angle = side.polar_frame().azimuth(met.direction);
                 share * meridians.pdf(angle) / side.cosine_extent(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
@@ -89,7 +89,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
         density as f32
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.middle
     }
 }
@@ -137,7 +137,7 @@ pub struct CylinderView {
 impl RevolutionEmitter<CylinderSide> {
     /// Creates an emitter for an entire cylinder.
     pub fn from_cylinder(cylinder: &Cylinder) -> Self {
-        let caps = [1, 2].map(|number| cylinder.cap(number));
+        let caps = [1, 2].map(|number| cylinder.cap_disk(number));
         let across = caps[1].centroid() - caps[0].centroid();
         let side = CylinderSide {
             middle: cylinder.centroid(),
@@ -184,7 +184,7 @@ impl CylinderView {
 }
 
 impl RevolutionSideView for CylinderView {
-    fn pole(&self) -> &PolarFrame {
+    fn polar_frame(&self) -> &PolarFrame {
         &self.pole
     }
 
@@ -280,7 +280,7 @@ impl RevolutionSide for ConeSide {
 impl ConeView {
     /// Angle at the tip between the direction to the point and the line where a half plane intersects the
     /// side.
-    fn angle_at_tip(&self, around: SinCos) -> SinCos {
+    fn generatrix_angle_at_tip(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
@@ -292,7 +292,7 @@ impl ConeView {
 }
 
 impl RevolutionSideView for ConeView {
-    fn pole(&self) -> &PolarFrame {
+    fn polar_frame(&self) -> &PolarFrame {
         &self.pole
     }
 
@@ -301,14 +301,14 @@ impl RevolutionSideView for ConeView {
     }
 
     fn cosine_extent(&self, around: SinCos) -> f64 {
-        let at_tip = self.angle_at_tip(around);
+        let at_tip = self.generatrix_angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
     fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
-        let at_tip = self.angle_at_tip(around);
+        let at_tip = self.generatrix_angle_at_tip(around);
         let versine = share * self.cosine_extent(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;

@@ -71,8 +71,8 @@ impl ShapeEmitter for TexturedQuadEmitter {
         if quad_pdf > 0.0 { self.mixture_pdf(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
-    fn center(&self) -> DVec3 {
-        self.quad.center()
+    fn area_centroid(&self) -> DVec3 {
+        self.quad.area_centroid()
     }
 }
 

@@ -96,7 +96,7 @@ impl ShapeEmitter for TorusEmitter {
             return LightSamplePoint::NOTHING;
         };
         let (sine, in_slice) = slice.elevation_density(&view).sample(f64::from(u[1]));
-        let place = slice.near_point(&view, slice.tangent_from_sine(2.0 * sine - 1.0));
+        let place = slice.near_intersection(&view, slice.tangent_from_sine(2.0 * sine - 1.0));
         let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return LightSamplePoint::NOTHING;
@@ -125,7 +125,7 @@ impl ShapeEmitter for TorusEmitter {
         })
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         self.torus.centroid()
     }
 }
@@ -187,7 +187,8 @@ impl TorusView {
             power *= step;
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
             let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
-            slice.map_or(0.0, |slice| slice.near_point(self, slice.tangent_from_sine(0.0)).factor) * cosh
+            slice.map_or(0.0, |slice| slice.near_intersection(self, slice.tangent_from_sine(0.0)).factor)
+                * cosh
         }))
     }
 
@@ -249,7 +250,7 @@ impl TorusView {
         let [u, v] = slice.to_middle;
         let (ahead, beside) = (outwards * u + upwards * v, upwards * u - outwards * v);
         let tangent = beside / ahead;
-        let factor = slice.near_point(self, tangent).factor;
+        let factor = slice.near_intersection(self, tangent).factor;
         if !(ahead > 0.0 && factor > 0.0) {
             return 0.0;
         }
@@ -277,12 +278,12 @@ impl TorusSlice {
     fn elevation_density(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {
-            self.near_point(view, self.tangent_from_sine(sine(i))).factor
+            self.near_intersection(view, self.tangent_from_sine(sine(i))).factor
         }))
     }
 
     /// Finds the near point on the circle from the tangent of the angle to the circle's center.
-    fn near_point(&self, view: &TorusView, tangent: f64) -> SlicePoint {
+    fn near_intersection(&self, view: &TorusView, tangent: f64) -> SlicePoint {
         let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
         let sin = tangent * cos;
         let middle = self.gap + view.tube;

@@ -64,7 +64,7 @@ impl ShapeEmitter for TriangleEmitter {
         }
     }
 
-    fn center(&self) -> DVec3 {
+    fn area_centroid(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         (a + b + c) / 3.0
     }

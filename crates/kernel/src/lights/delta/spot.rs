@@ -43,12 +43,12 @@ impl DeltaLight for SpotLight {
     /// θ)/(blend·H) over the directions between the two cones.
     #[inline]
     fn effective_solid_angle(&self) -> f64 {
-        let SpotCone { inner, faded, .. } = self.cones();
+        let SpotCone { inner, faded, .. } = self.cone_solid_angles();
         inner + faded
     }
 
     fn sample_direction(&self, u: [f32; 2]) -> Vec3 {
-        let SpotCone { half, width, inner, faded } = self.cones();
+        let SpotCone { half, width, inner, faded } = self.cone_solid_angles();
         let goal = f64::from(u[0]) * (inner + faded);
         let local = if goal < inner {
             let one_minus_cos = (goal / (2.0 * std::f64::consts::PI)) as f32;
@@ -70,7 +70,7 @@ impl DeltaLight for SpotLight {
 }
 
 impl SpotLight {
-    fn cones(&self) -> SpotCone {
+    fn cone_solid_angles(&self) -> SpotCone {
         let half = f64::from(self.half_angle);
         let width = f64::from(self.blend) * half;
         let sin = libm::sin((half - width) * 0.5);

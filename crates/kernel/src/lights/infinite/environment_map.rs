@@ -105,7 +105,7 @@ impl EnvironmentMap {
         let density = self.cell_pdf(place.column, place.row);
         (
             interpolate_bilinear(&corners, place.between),
-            density * relative_pdf(&luminances(&corners), place.along),
+            density * relative_pdf_in_cell(&corner_luminances(&corners), place.along),
         )
     }
 
@@ -115,14 +115,14 @@ impl EnvironmentMap {
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let GridSample { column, row, rest } = self.cells.sample(u);
         let corners = self.corner_texels(column as u32, row as u32);
-        let luminances = luminances(&corners);
+        let luminances = corner_luminances(&corners);
         let along = warp::bilinear(rest, &luminances);
         let (direction, down) = self.direction_in_cell(column as f32, row, along, turn);
         let density = self.cell_pdf(column as u32, row as u32);
         (
             direction,
             interpolate_bilinear(&corners, [along[0], down]),
-            density * relative_pdf(&luminances, along),
+            density * relative_pdf_in_cell(&luminances, along),
         )
     }
 
@@ -171,14 +171,14 @@ impl EnvironmentMap {
         let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
-            let luminances = luminances(&corners);
+            let luminances = corner_luminances(&corners);
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
             let y = tops[i] + extents[i] * f64::from(along[1]);
             let (direction, down) =
                 self.direction_at_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
             set_lane(&mut directions, i, direction);
             set_lane(&mut colors, i, interpolate_bilinear(&corners, [along[0], down]));
-            pdfs[i] *= relative_pdf(&luminances, along);
+            pdfs[i] *= relative_pdf_in_cell(&luminances, along);
         }
         (directions, colors, pdfs)
     }
@@ -190,7 +190,7 @@ impl EnvironmentMap {
         let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let (x, y) = self.cell_coordinates(lane(directions, i), turn);
-            (columns[i], rows[i]) = self.cell_column_and_row(x, y);
+            (columns[i], rows[i]) = self.cell_at_coordinates(x, y);
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
@@ -198,13 +198,13 @@ impl EnvironmentMap {
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.cell_pdf(columns[i], rows[i]);
-            heights[i] = self.height_fraction(rows[i], directions[1][i]);
+            heights[i] = self.row_height_fraction(rows[i], directions[1][i]);
         }
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
             set_lane(&mut colors, i, interpolate_bilinear(&corners, [between[i], angles[i]]));
-            pdfs[i] *= relative_pdf(&luminances(&corners), [between[i], heights[i]]);
+            pdfs[i] *= relative_pdf_in_cell(&corner_luminances(&corners), [between[i], heights[i]]);
         }
         (colors, pdfs)
     }
@@ -212,9 +212,14 @@ impl EnvironmentMap {
     #[inline(always)]
     fn texel_position(&self, direction: Vec3, turn: f32) -> TexelPosition {
         let (x, y) = self.cell_coordinates(direction, turn);
-        let (column, row) = self.cell_column_and_row(x, y);
+        let (column, row) = self.cell_at_coordinates(x, y);
         let between = [x - column as f32, y - row as f32];
-        TexelPosition { column, row, between, along: [between[0], self.height_fraction(row, direction.y)] }
+        TexelPosition {
+            column,
+            row,
+            between,
+            along: [between[0], self.row_height_fraction(row, direction.y)],
+        }
     }
 
     /// Cell coordinates of a unit direction.
@@ -230,14 +235,14 @@ impl EnvironmentMap {
 
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
-    fn cell_column_and_row(&self, x: f32, y: f32) -> (u32, u32) {
+    fn cell_at_coordinates(&self, x: f32, y: f32) -> (u32, u32) {
         // Rounding may have moved a coordinate just below 0 to the full width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 
     /// Fraction of a row's height that is above a direction.
     #[inline(always)]
-    fn height_fraction(&self, row: u32, y: f32) -> f32 {
+    fn row_height_fraction(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
         (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }
@@ -276,7 +281,7 @@ impl EnvironmentMap {
             }
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        self.texels.write_color_packets_at_indices(&places, &mut corners);
+        self.texels.read_color_packets_into(&places, &mut corners);
         corners
     }
 
@@ -294,13 +299,13 @@ fn interpolate_bilinear(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
 }
 
 #[inline(always)]
-fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
+fn corner_luminances(corners: &[Vec3; 4]) -> [f32; 4] {
     corners.map(luminance)
 }
 
 /// Pdf at a position in a cell, relative to the mean pdf in the cell.
 #[inline(always)]
-fn relative_pdf(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
+fn relative_pdf_in_cell(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
     let [a, b, c, d] = *luminances;
     let upper = a + (b - a) * along[0];
     let lower = c + (d - c) * along[0];

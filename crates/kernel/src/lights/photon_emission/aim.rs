@@ -56,7 +56,7 @@ impl EmissionProfile<'_> {
 
     /// Upper bound on [`EmissionProfile::relative_intensity`] over a cone of directions. `sin` is the sine of
     /// the cone's half angle, which is at most 90°.
-    fn max_relative_intensity(&self, axis: DVec3, sin: f64) -> f64 {
+    fn max_relative_intensity_in_cone(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
         // Cosine of the smallest angle between a direction and the cone.
         let nearest = |direction: DVec3| {
@@ -79,7 +79,7 @@ impl PhotonTargets {
     /// Creates targets from spheres. `None` if no sphere has a positive radius.
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
-        let balls = merge_spheres(balls);
+        let balls = cluster_spheres(balls);
         let pick_by_disk = DiscreteDistribution::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
         Some(Self { balls, pick_by_disk })
     }
@@ -110,12 +110,12 @@ impl PhotonTargets {
 
     /// The targets seen from an emission point.
     #[inline]
-    pub fn view_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetView<'a> {
-        let mut view = TargetView { sends, seen: ArrayVec::new(), total: 0.0 };
+    pub fn view_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> VisibleTargets<'a> {
+        let mut view = VisibleTargets { sends, seen: ArrayVec::new(), total: 0.0 };
         for ball in &self.balls {
             let cone = TargetCone::from_sphere(ball, from);
             let weight = match &cone {
-                Some(cone) => cone.solid_angle() * sends.max_relative_intensity(cone.axis, cone.sin),
+                Some(cone) => cone.solid_angle() * sends.max_relative_intensity_in_cone(cone.axis, cone.sin),
                 None => sends.effective_solid_angle(),
             };
             if weight > 0.0 {
@@ -128,7 +128,7 @@ impl PhotonTargets {
 }
 
 /// Targets seen from an emission point.
-pub struct TargetView<'a> {
+pub struct VisibleTargets<'a> {
     sends: &'a EmissionProfile<'a>,
     /// Targets that the light can reach.
     seen: ArrayVec<VisibleTarget, MAX_TARGETS>,
@@ -143,7 +143,7 @@ struct VisibleTarget {
     weight: f64,
 }
 
-impl TargetView<'_> {
+impl VisibleTargets<'_> {
     /// Upper bound on the total power that the targets receive, relative to the peak intensity, in sr.
     pub fn total_power_bound(&self) -> f64 {
         self.total
@@ -226,7 +226,7 @@ impl TargetCone {
 
 /// Merges spheres into at most [`MAX_TARGETS`] groups. Repeatedly splits the largest group into two along its
 /// longest axis.
-fn merge_spheres(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
+fn cluster_spheres(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
     if balls.len() <= MAX_TARGETS {
         return balls;
     }

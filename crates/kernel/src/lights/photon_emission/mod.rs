@@ -30,7 +30,7 @@ use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
 use aim::{EmissionProfile, PhotonTargets};
-use surface::EmissiveSurface;
+use surface::DividedEmissiveSurface;
 
 /// A bounding sphere, in the same coordinates as the lights.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,9 +128,9 @@ impl EmittedPhoton {
 
 /// Emits photons from all lights.
 #[derive(Clone, Debug)]
-pub struct PhotonSource {
+pub struct PhotonEmitter {
     lights: Arc<Lights>,
-    sources: Vec<LightEmission>,
+    sources: Vec<LightEmissionInfo>,
     /// Bounding sphere of all finite objects. Light from infinity is emitted toward it.
     around: BoundingSphere,
     by_power: DiscreteDistribution,
@@ -139,13 +139,13 @@ pub struct PhotonSource {
 
 /// Emission data of one light.
 #[derive(Clone, Debug)]
-struct LightEmission {
+struct LightEmissionInfo {
     /// Power in W.
     power: Vec3,
     /// Power divided by peak intensity in sr, for delta lights.
     spread: f64,
     /// The emitting surface, for area lights.
-    surface: Option<EmissiveSurface>,
+    surface: Option<DividedEmissiveSurface>,
 }
 
 /// How photons are aimed.
@@ -162,7 +162,7 @@ struct PhotonAim {
 /// estimated power of 0 may be wrong.
 const BY_POWER: f64 = 0.1;
 
-impl PhotonSource {
+impl PhotonEmitter {
     /// Creates a photon source from all lights. `emitter_geometry` returns the geometry of an object.
     /// `around` is a bounding sphere of all finite objects. Returns `None` if no light emits photons. Lights
     /// without falloff do not emit photons.
@@ -171,8 +171,8 @@ impl PhotonSource {
         emitter_geometry: impl Fn(u32) -> Option<EmissiveObjectGeometry>,
         around: BoundingSphere,
     ) -> Option<Self> {
-        let source = |(_, light): (u32, &Light)| LightEmission::new(light, &emitter_geometry, around);
-        let sources: Vec<LightEmission> = lights.iter().map(source).collect();
+        let source = |(_, light): (u32, &Light)| LightEmissionInfo::new(light, &emitter_geometry, around);
+        let sources: Vec<LightEmissionInfo> = lights.iter().map(source).collect();
         let by_power = DiscreteDistribution::new(sources.iter().map(|source| mean_channel(source.power)))?;
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
@@ -292,7 +292,7 @@ struct PhotonSample {
     ratio: f64,
 }
 
-impl PhotonSource {
+impl PhotonEmitter {
     /// Samples a direction from a point. Returns the direction and a ratio of pdfs: the pdf of aimed
     /// directions divided by the pdf of unaimed directions.
     #[inline(always)]
@@ -392,7 +392,7 @@ fn low_discrepancy_point(i: u32) -> Vec2 {
     Vec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053_3))
 }
 
-impl LightEmission {
+impl LightEmissionInfo {
     fn new(
         light: &Light,
         emitter_geometry: &impl Fn(u32) -> Option<EmissiveObjectGeometry>,
@@ -414,8 +414,8 @@ impl LightEmission {
             }
             LightFamily::Area(light) => {
                 let surface = emitter_geometry(light.object)
-                    .and_then(|emitter_geometry| EmissiveSurface::new(light, &emitter_geometry));
-                let power = surface.as_ref().map_or(Vec3::ZERO, EmissiveSurface::power);
+                    .and_then(|emitter_geometry| DividedEmissiveSurface::new(light, &emitter_geometry));
+                let power = surface.as_ref().map_or(Vec3::ZERO, DividedEmissiveSurface::power);
                 Self { power, spread: 0.0, surface }
             }
         }

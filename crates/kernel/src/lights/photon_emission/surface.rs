@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::EmissiveObjectGeometry;
 use crate::geometry::surface::point_error_bound;
-use crate::geometry::{AreaPoint, Shape};
+use crate::geometry::{Shape, SurfaceSample};
 use crate::lights::area::{AreaLight, Side};
 use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -12,7 +12,7 @@ use crate::sampling::distribution::DiscreteDistribution;
 
 /// A light's surface, divided into pieces. Each piece is chosen in proportion to its power.
 #[derive(Clone, Debug)]
-pub struct EmissiveSurface {
+pub struct DividedEmissiveSurface {
     pieces: DiscreteDistribution,
     on: DividedSurfaceGeometry,
     /// Power in W.
@@ -70,7 +70,7 @@ const LOOKUPS_PER_SIDE: u32 = 4;
 /// Fraction of a piece's weight that is proportional to its area, because the lookups may miss bright areas.
 const BY_AREA: f64 = 0.05;
 
-impl EmissiveSurface {
+impl DividedEmissiveSurface {
     /// Divides a light's surface into pieces. Returns `None` if the surface has no area or emits nothing.
     pub fn new(light: &AreaLight, emitter_geometry: &EmissiveObjectGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
@@ -91,7 +91,7 @@ impl EmissiveSurface {
             }
             EmissiveObjectGeometry::Mesh { rounding } => {
                 let mesh = light.shape.as_mesh()?;
-                (DividedSurfaceGeometry::Mesh { rounding: *rounding }, mesh.primitives().count())
+                (DividedSurfaceGeometry::Mesh { rounding: *rounding }, mesh.primitive_indices().count())
             }
         };
         let per_side = if light.texture.is_some() { LOOKUPS_PER_SIDE } else { 1 };
@@ -149,7 +149,7 @@ impl DividedSurfaceGeometry {
                 let (part, cell) = (index / (all * all), index % (all * all));
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
-                let AreaPoint { point, normal } = shape.sample(part as u32, u);
+                let SurfaceSample { point, normal } = shape.sample(part as u32, u);
                 let normal = match light.side {
                     Side::Front => normal,
                     Side::Back => -normal,

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use super::*;
 use crate::control::CancelToken;
 use crate::geometry::cone::Cone;
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -15,7 +15,8 @@ use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionTexture, Emitter, EmittingPart, MeshEmitter, UvMapping, UvTriangle, front_area_light,
+    AreaLight, EmissionTexture, Emitter, EmittingTriangleSelection, MeshEmitter, TriangleWithUvs, UvMapping,
+    front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
@@ -42,7 +43,7 @@ fn shapes() -> Vec<Shape> {
     vec![
         Shape::Sphere(Sphere { center: p, radius: 0.7 }),
         Shape::Quad(Parallelogram::new(p, DVec3::X, q)),
-        Shape::Box(Cuboid::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
+        Shape::Box(OrientedBox::new(p, DVec3::new(1.0, 0.4, 2.0), DVec3::new(10.0, 70.0, -30.0))),
         Shape::Triangle(Triangle { a: p, b: q, c: DVec3::Y }),
         Shape::Disk(Disk::new(p, q, 0.6)),
         Shape::Cylinder(Cylinder::new(p, q, 0.5, true)),
@@ -95,9 +96,9 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     all
 }
 
-fn source_of(light: Light, shape: Option<Shape>) -> PhotonSource {
+fn source_of(light: Light, shape: Option<Shape>) -> PhotonEmitter {
     let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("never canceled"));
-    PhotonSource::new(&lights, |_| shape.map(EmissiveObjectGeometry::Shape), SCENE).expect("power")
+    PhotonEmitter::new(&lights, |_| shape.map(EmissiveObjectGeometry::Shape), SCENE).expect("power")
 }
 
 /// A mean and its standard error.
@@ -120,7 +121,7 @@ impl MeanEstimate {
 const GROUPS: u32 = 32;
 
 /// Computes the mean of a function over photons. Attempts that do not produce a photon count as 0.
-fn mean(source: &PhotonSource, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
+fn mean(source: &PhotonEmitter, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
             let sampler = PixelSampler::new(3, group, 5, i);
@@ -194,7 +195,7 @@ fn sampled(light: &Light, count: u32) -> MeanEstimate {
 }
 
 #[track_caller]
-fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonSource, shape: Option<&Shape>) {
+fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, shape: Option<&Shape>) {
     let expected = sampled(light, 1 << 13);
     let greatest_error = if light.emission_texture().is_some() { 5e-3 } else { 3e-3 };
     assert!(expected.mean > 0.0, "{name}");
@@ -409,7 +410,7 @@ fn lights_are_chosen_by_power() {
     };
     let lights =
         Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
-    let source = PhotonSource::new(&lights, |_| None, SCENE).expect("power");
+    let source = PhotonEmitter::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit_generator(8)), [0.0; 7]);
     let power = source.power();
     let (mut flux, count) = (DVec3::ZERO, 700_000);
@@ -437,14 +438,14 @@ fn lights_are_chosen_by_power() {
 fn lights_without_falloff_emit_no_photons() {
     let lights = |last: Vec<Light>| Arc::new(Lights::new(last, &CancelToken::new()).expect("never canceled"));
     let none = vec![Light::Point(point(Falloff::None))];
-    assert!(PhotonSource::new(&lights(none), |_| None, SCENE).is_none());
+    assert!(PhotonEmitter::new(&lights(none), |_| None, SCENE).is_none());
     let both = vec![Light::Point(point(Falloff::None)), Light::Point(point(Falloff::Square))];
     let source =
-        PhotonSource::new(&lights(both), |_| None, SCENE).expect("power").with_targets(&targets(), 0.5);
+        PhotonEmitter::new(&lights(both), |_| None, SCENE).expect("power").with_targets(&targets(), 0.5);
     let mut next = numbers(random::unit_generator(9));
     assert!((0..1000).filter_map(|_| source.emit(&next())).all(|photon| photon.light == 1));
     let nowhere = BoundingSphere { center: DVec3::ZERO, radius: 0.0 };
-    assert!(PhotonSource::new(&lights(vec![Light::Directional(sun(0.0))]), |_| None, nowhere).is_none());
+    assert!(PhotonEmitter::new(&lights(vec![Light::Directional(sun(0.0))]), |_| None, nowhere).is_none());
 }
 
 #[test]

@@ -71,11 +71,11 @@ impl EmissionCone {
         let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeFalloff::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
         let Some(axis) = sum.try_normalize() else { return Self { edge, ..Self::ALL } };
-        Self { axis, cos: cones.map(|cone| cone.cos_max_angle(axis)).fold(1.0, f64::min), edge }
+        Self { axis, cos: cones.map(|cone| cone.cos_max_angle_to_axis(axis)).fold(1.0, f64::min), edge }
     }
 
     /// Cosine of the largest angle between `axis` and any direction in the cone.
-    fn cos_max_angle(&self, axis: DVec3) -> f64 {
+    fn cos_max_angle_to_axis(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine_from_cosine(cos), sine_from_cosine(self.cos));
         // The sum of the angles exceeds 180°.
@@ -126,7 +126,7 @@ impl LightBounds {
             space,
             center,
             radius: reaches.fold(0.0, f64::max).min((max - min).length() * 0.5),
-            power: expected_intensity(all.clone()),
+            power: direction_averaged_intensity(all.clone()),
             cone: EmissionCone::union_of_all(all.map(|one| &one.cone)),
         })
     }
@@ -135,7 +135,7 @@ impl LightBounds {
 /// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine
 /// emitters contribute all of their power if their axes agree, and a quarter of it if the axes are uniformly
 /// distributed.
-fn expected_intensity<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
+fn direction_averaged_intensity<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
         match cone.edge {

@@ -92,7 +92,7 @@ impl LightTreeBuilder<'_> {
 /// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
 /// possible, so that the nodes are full.
 fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     if leaves.len() <= PACKET_SIZE {
         return Ok(vec![1; leaves.len()]);
     }
@@ -100,10 +100,10 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
     while unit * PACKET_SIZE < leaves.len() {
         unit *= PACKET_SIZE;
     }
-    let mut groups: Vec<LeafGroup> = Vec::with_capacity(PACKET_SIZE);
+    let mut groups: Vec<LeafRange> = Vec::with_capacity(PACKET_SIZE);
     let mut start = 0;
     for own in leaves.chunk_by(|a, b| a.bounds.space == b.bounds.space) {
-        groups.push(LeafGroup::new(start, own));
+        groups.push(LeafRange::new(start, own));
         start += own.len();
     }
     while groups.len() < PACKET_SIZE {
@@ -112,33 +112,33 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
         else {
             break;
         };
-        let LeafGroup { start, count, .. } = groups[most_expensive];
+        let LeafRange { start, count, .. } = groups[most_expensive];
         let own = &mut leaves[start..start + count];
-        token.check()?;
-        let middle = split_leaves(own, unit);
+        token.check_pause_and_cancel()?;
+        let middle = split_leaves_along_longest_axis(own, unit);
         let (left, right) = own.split_at(middle);
-        groups[most_expensive] = LeafGroup::new(start, left);
-        groups.insert(most_expensive + 1, LeafGroup::new(start + middle, right));
+        groups[most_expensive] = LeafRange::new(start, left);
+        groups.insert(most_expensive + 1, LeafRange::new(start + middle, right));
     }
     Ok(groups.into_iter().map(|group| group.count).collect())
 }
 
 /// A range of leaves.
-struct LeafGroup {
+struct LeafRange {
     start: usize,
     count: usize,
     cost: f64,
 }
 
-impl LeafGroup {
+impl LeafRange {
     fn new(start: usize, leaves: &[LightLeaf]) -> Self {
-        Self { start, count: leaves.len(), cost: LeafSums::from_leaves(leaves).cost() }
+        Self { start, count: leaves.len(), cost: NodeCostSums::from_leaves(leaves).cost() }
     }
 }
 
 /// Sums over several leaves, used to compute the cost of a node.
 #[derive(Clone, Copy)]
-struct LeafSums {
+struct NodeCostSums {
     count: usize,
     power: f64,
     min: DVec3,
@@ -147,7 +147,7 @@ struct LeafSums {
     axes: DVec3,
 }
 
-impl LeafSums {
+impl NodeCostSums {
     const NOTHING: Self =
         Self { count: 0, power: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, axes: DVec3::ZERO };
 
@@ -195,7 +195,7 @@ const BINS: usize = 64;
 
 /// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part. It is a
 /// multiple of `unit`, unless there are too many leaves to sort.
-fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
+fn split_leaves_along_longest_axis(leaves: &mut [LightLeaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
         (min, max) = (min.min(leaf.bounds.center), max.max(leaf.bounds.center));
@@ -207,7 +207,7 @@ fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
             let share = (leaf.bounds.center[axis] - min[axis]) / extent[axis];
             ((share * BINS as f64) as usize).min(BINS - 1)
         };
-        let mut bins = [LeafSums::NOTHING; BINS];
+        let mut bins = [NodeCostSums::NOTHING; BINS];
         for leaf in &*leaves {
             bins[bin_of(leaf)].add(leaf);
         }
@@ -220,18 +220,18 @@ fn split_leaves(leaves: &mut [LightLeaf], unit: usize) -> usize {
     }
     // A stable sort makes the tree identical on all machines.
     leaves.sort_by(|a, b| a.bounds.center[axis].total_cmp(&b.bounds.center[axis]));
-    let parts: Vec<LeafSums> = leaves.chunks(unit).map(LeafSums::from_leaves).collect();
+    let parts: Vec<NodeCostSums> = leaves.chunks(unit).map(NodeCostSums::from_leaves).collect();
     cheapest_split_index(&parts) * unit
 }
 
 /// Finds the split with the lowest total cost for a sequence of parts. Returns the number of parts in the
 /// first half. Neither half is empty.
-fn cheapest_split_index(parts: &[LeafSums]) -> usize {
+fn cheapest_split_index(parts: &[NodeCostSums]) -> usize {
     let mut right = parts.to_vec();
     for i in (0..parts.len() - 1).rev() {
         right[i] = right[i].plus(&right[i + 1]);
     }
-    let (mut left, mut best) = (LeafSums::NOTHING, (f64::INFINITY, 1));
+    let (mut left, mut best) = (NodeCostSums::NOTHING, (f64::INFINITY, 1));
     for i in 1..parts.len() {
         left = left.plus(&parts[i - 1]);
         let cost = left.cost() + right[i].cost();

@@ -5,9 +5,10 @@
 
 use arrayvec::ArrayVec;
 
-use super::node::{ExpectedContributions, NodeChild, Receiver};
+use super::node::{ExpectedChildContributions, NodeChild, Receiver};
 use super::{
-    CumulativeImportance, DescentCache, LightPick, LightTree, NOT_IN_TREE, ROOT, clamp_below, scale_to_total,
+    CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PreviousPickPath, ROOT, clamp_below,
+    scale_u_to_total,
 };
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
@@ -67,7 +68,7 @@ impl<'a> LightTreeCut<'a> {
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let ExpectedContributions { mut importance, nearness } = node.child_importances(receiver);
+            let ExpectedChildContributions { mut importance, nearness } = node.child_importances(receiver);
             for i in 0..node.count as usize {
                 if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0
@@ -102,13 +103,13 @@ impl<'a> LightTreeCut<'a> {
             return;
         }
         let inverse = 1.0 / all;
-        let (mut index, mut way) = (0, DescentCache::NEW);
+        let (mut index, mut way) = (0, PreviousPickPath::NEW);
         let (mut of, mut shares) = (usize::MAX, CumulativeImportance::NONE);
         // `before` is the sum over the preceding nodes. `scale`, which corrects for rounding, is the exact
         // sum over the children divided by the node's share of the rounded total.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
-            let target = scale_to_total(u, all);
+            let target = scale_u_to_total(u, all);
             while self.sums[index] <= target {
                 index += 1;
             }
@@ -124,7 +125,8 @@ impl<'a> LightTreeCut<'a> {
             match self.tree.nodes[self.nodes[index] as usize].children[child] {
                 NodeChild::Light(light) => picked(place, light, probability),
                 NodeChild::LightTreeNode(node) => {
-                    let so_far = LightPick { light: 0, probability, rest: shares.remap(part, child) };
+                    let so_far =
+                        LightPick { light: 0, probability, rest: shares.remap_within_child(part, child) };
                     if let Some(pick) = self.tree.pick_in_subtree(node, &self.receiver, so_far, &mut way) {
                         picked(place, pick.light, pick.probability);
                     }

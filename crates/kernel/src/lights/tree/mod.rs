@@ -11,7 +11,7 @@ mod single_node;
 pub use bounds::{EmissionCone, LightBounds};
 pub use cut::LightTreeCut;
 pub use node::{LightTreeNode, NodeChild, Receiver, ReceiverLobe, ReceiverPacket};
-pub use single_node::{LightPickPacket, SingleNodeImportance};
+pub use single_node::{LightPickPacket, SingleNodeLightImportances};
 
 use crate::math::lanes::{F32x16, PACKET_SIZE};
 
@@ -51,7 +51,7 @@ impl LightTree {
     /// Picks a light for a surface point. `u` is in [0, 1). `None` if no light reaches the point.
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
-        let mut way = DescentCache::NEW;
+        let mut way = PreviousPickPath::NEW;
         self.pick_in_subtree(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
@@ -71,7 +71,7 @@ impl LightTree {
         mut node: u32,
         receiver: &Receiver,
         mut pick: LightPick,
-        way: &mut DescentCache,
+        way: &mut PreviousPickPath,
     ) -> Option<LightPick> {
         let mut level = 0;
         loop {
@@ -85,10 +85,10 @@ impl LightTree {
             if !(total > 0.0) {
                 return None;
             }
-            let target = scale_to_total(pick.rest, total);
+            let target = scale_u_to_total(pick.rest, total);
             let child = shares.find_child(target);
             pick.probability *= shares.probability(child);
-            pick.rest = shares.remap(target, child);
+            pick.rest = shares.remap_within_child(target, child);
             match one.children[child] {
                 NodeChild::Light(light) => return Some(LightPick { light, ..pick }),
                 NodeChild::LightTreeNode(below) => node = below,
@@ -146,12 +146,12 @@ const LEVELS: usize = 3;
 
 /// The nodes on the previous pick's path, and the importance of their children. Successive picks for the same
 /// point often share part of the path.
-struct DescentCache {
+struct PreviousPickPath {
     nodes: [u32; LEVELS],
     shares: [CumulativeImportance; LEVELS],
 }
 
-impl DescentCache {
+impl PreviousPickPath {
     const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [CumulativeImportance::NONE; LEVELS] };
 }
 
@@ -201,7 +201,7 @@ impl CumulativeImportance {
 
     /// Position of `target` within a child's interval, in [0, 1).
     #[inline(always)]
-    fn remap(&self, target: f64, child: usize) -> f64 {
+    fn remap_within_child(&self, target: f64, child: usize) -> f64 {
         let before = if child == 0 { 0.0 } else { self.0[child - 1] };
         remap_to_unit(target - before, self.0[child] - before)
     }
@@ -221,7 +221,7 @@ fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZ
 /// Scales `u` in [0, 1) to a total. The result is always below the total, so rounding never selects a
 /// position past the last interval.
 #[inline(always)]
-fn scale_to_total(u: f64, total: f64) -> f64 {
+fn scale_u_to_total(u: f64, total: f64) -> f64 {
     clamp_below(u * total, total)
 }
 

@@ -209,7 +209,7 @@ impl LobePacket {
 
 /// Expected contributions of a node's children at a point.
 #[repr(align(64))]
-pub struct ExpectedContributions {
+pub struct ExpectedChildContributions {
     /// Importance in the tree's unit of power. 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
     /// Squared sines of half the angles that the bounding spheres subtend. 1 for points inside a sphere.
@@ -256,14 +256,14 @@ impl LightTreeNode {
     /// × cosine of the smallest angle between the emission cone and a direction from the child (section 4.2,
     /// with bounds on cosines) × the lobe's response. Never 0 if light from the child may reach the point.
     #[inline(always)]
-    pub fn child_importances(&self, receiver: &Receiver) -> ExpectedContributions {
+    pub fn child_importances(&self, receiver: &Receiver) -> ExpectedChildContributions {
         let receivers = ReceiverPacket::splat(receiver);
         expected_contributions(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
     /// [`LightTreeNode::child_importances`] of one child for a packet of surface points.
     #[inline(always)]
-    pub fn child_importance_packet(
+    pub fn importance_packet_of_child(
         &self,
         child: usize,
         receivers: &ReceiverPacket,
@@ -286,7 +286,7 @@ fn expected_contributions(
     receivers: &ReceiverPacket,
     is_plain: bool,
     has_lobes: bool,
-) -> ExpectedContributions {
+) -> ExpectedChildContributions {
     match (is_plain, has_lobes) {
         (true, false) => specialized_contributions::<true, false>(bounds, receivers),
         (false, false) => specialized_contributions::<false, false>(bounds, receivers),
@@ -299,7 +299,7 @@ fn expected_contributions(
 fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
-) -> ExpectedContributions {
+) -> ExpectedChildContributions {
     let ReceiverPacket { point, normal, lobes } = receivers;
     let mut offset = bounds.center;
     for axis in 0..3 {
@@ -367,14 +367,14 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
     for i in 0..PACKET_SIZE {
-        let value = clamp_max(clamp_min(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
+        let value = min_or_second_if_nan(clamp_min(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
         let arrives = (towards[i] > -MIN_COSINE)
             & (IS_PLAIN | (away[i] > bounds.end[i] - MIN_COSINE))
             & (bounds.power[i] > 0.0);
         importance[i] = if arrives { value } else { 0.0 };
         nearness[i] = sin[i] * sin[i];
     }
-    ExpectedContributions { importance, nearness }
+    ExpectedChildContributions { importance, nearness }
 }
 /// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
 /// divisions would take longer than the rest of the node test.
@@ -382,7 +382,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
 fn replace_by_inverse_sqrt(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {
         let x = &mut x[i];
-        let square = clamp_max(*x, MAX_SQUARED_DISTANCE);
+        let square = min_or_second_if_nan(*x, MAX_SQUARED_DISTANCE);
         let half = 0.5 * square;
         let root = f32::from_bits(0x5f37_5a86_u32.wrapping_sub(square.to_bits() >> 1));
         let root = root * (1.5 - half * root * root);
@@ -394,7 +394,7 @@ fn replace_by_inverse_sqrt(x: &mut F32x16) {
 /// Clamps a bound on a cosine.
 #[inline(always)]
 fn clamp_to_min_cosine(bound: f32) -> f32 {
-    clamp_max(clamp_min(bound, MIN_COSINE), 1.0)
+    min_or_second_if_nan(clamp_min(bound, MIN_COSINE), 1.0)
 }
 
 #[inline(always)]
@@ -403,7 +403,7 @@ fn clamp_min(x: f32, least: f32) -> f32 {
 }
 
 #[inline(always)]
-fn clamp_max(x: f32, most: f32) -> f32 {
+fn min_or_second_if_nan(x: f32, most: f32) -> f32 {
     if x < most { x } else { most }
 }
 
@@ -415,7 +415,8 @@ mod tests {
     fn inverse_roots_match_exact_division() {
         for exponent in -35..37 {
             let mut x: F32x16 = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
-            let expected = x.map(|x| (1.0 / f64::from(clamp_max(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
+            let expected =
+                x.map(|x| (1.0 / f64::from(min_or_second_if_nan(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
             replace_by_inverse_sqrt(&mut x);
             for (root, expected) in x.iter().zip(expected) {
                 assert!((root / expected - 1.0).abs() < 4.0 * f32::EPSILON, "{root} {expected}");

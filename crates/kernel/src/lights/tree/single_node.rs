@@ -5,7 +5,7 @@ use super::{LightTree, ROOT};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel};
 
 /// Importance of each light in a single-node tree, for a packet of points.
-pub struct SingleNodeImportance<'a> {
+pub struct SingleNodeLightImportances<'a> {
     node: &'a LightTreeNode,
     /// Importance, indexed by child, then by point.
     importance: [F32x16; PACKET_SIZE],
@@ -32,7 +32,7 @@ impl LightTree {
         receivers: &ReceiverPacket,
         has_lobes: bool,
         simd: impl Simd,
-    ) -> Option<SingleNodeImportance<'_>> {
+    ) -> Option<SingleNodeLightImportances<'_>> {
         if !self.is_single_node() {
             return None;
         }
@@ -58,23 +58,23 @@ struct ImportanceKernel<'a, 'b> {
 }
 
 impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
-    type Output = SingleNodeImportance<'a>;
+    type Output = SingleNodeLightImportances<'a>;
 
     #[inline(always)]
-    fn run(self, _: impl Simd) -> SingleNodeImportance<'a> {
+    fn run(self, _: impl Simd) -> SingleNodeLightImportances<'a> {
         let Self { node, receivers, has_lobes } = self;
         let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for child in 0..node.count as usize % (PACKET_SIZE + 1) {
-            importance[child] = node.child_importance_packet(child, receivers, has_lobes);
+            importance[child] = node.importance_packet_of_child(child, receivers, has_lobes);
             for i in 0..PACKET_SIZE {
                 totals[i] += f64::from(importance[child][i]);
             }
         }
-        SingleNodeImportance { node, importance, totals }
+        SingleNodeLightImportances { node, importance, totals }
     }
 }
 
-impl SingleNodeImportance<'_> {
+impl SingleNodeLightImportances<'_> {
     /// Picks a light for each point. `u` is in [0, 1).
     #[inline(always)]
     pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> LightPickPacket {
@@ -105,7 +105,7 @@ impl SingleNodeImportance<'_> {
 
     /// Probabilities of `picks` with these importances.
     #[inline(always)]
-    pub fn probabilities(&self, picks: &LightPickPacket) -> F32x16 {
+    pub fn pick_probabilities(&self, picks: &LightPickPacket) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];

@@ -4,7 +4,7 @@ use super::bounds::{ConeFalloff, DistanceFalloff};
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
-use crate::geometry::cuboid::Cuboid;
+use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -12,7 +12,9 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light};
+use crate::lights::{
+    AreaLight, Emitter, EmittingTriangleSelection, Light, Lights, MeshEmitter, Side, front_area_light,
+};
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
@@ -39,7 +41,7 @@ fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
         5 => Shape::Quad(Parallelogram::new(place, direction * size, across * size)),
         6 => Shape::Triangle(Triangle { a: place, b: place + direction * size, c: place + across * size }),
         7 => Shape::Disk(Disk::new(place, direction, size)),
-        8 => Shape::Box(Cuboid::new(place, across.abs() * size + 0.001, direction * 90.0)),
+        8 => Shape::Box(OrientedBox::new(place, across.abs() * size + 0.001, direction * 90.0)),
         _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
     };
     Light::Area(front_area_light(&shape, color, object).expect("expected a finite shape"))
@@ -395,7 +397,7 @@ fn packet_picks_match_single_picks() {
             let shares = tree.single_node_importance(&row, round % 2 == 0, PortableSimd).expect("one node");
             let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
             let picks = shares.pick(&numbers);
-            assert_eq!(shares.probabilities(&picks), picks.probabilities);
+            assert_eq!(shares.pick_probabilities(&picks), picks.probabilities);
             for (i, receiver) in receivers.iter().enumerate() {
                 let alone = tree.pick(receiver, numbers[i]);
                 let Some(alone) = alone else {
@@ -444,7 +446,7 @@ fn mesh_pdf_matches_its_samples() {
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,
-            part: EmittingPart::Listed,
+            part: EmittingTriangleSelection::Listed,
             bounds,
             texture: None,
         };

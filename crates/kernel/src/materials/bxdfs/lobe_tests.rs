@@ -2,7 +2,7 @@
 //! reference, samples with pdfs, and albedos.
 
 use crate::materials::bsdf::{DielectricSamplePacket, LobeFilter, SampledLobes};
-use crate::materials::bxdf::{Bxdf, SurfaceDirections};
+use crate::materials::bxdf::{Bxdf, ShadingGeometry};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::random::unit_generator as random;
@@ -115,7 +115,7 @@ impl<B: Bxdf> TestSurface<B> {
         row.reset_flags();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.light_side_sign() as f32;
-            let place = SurfaceDirections { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
+            let place = ShadingGeometry { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
             row.set_bsdf(i, point, LobeFilter::ALL, &place);
         }
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
@@ -437,7 +437,7 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
             let mut row = BxdfPacket::<B>::default();
             row.reset_flags();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
-                let place = SurfaceDirections {
+                let place = ShadingGeometry {
                     normal: Vec3::Z * lit.light_side_sign() as f32,
                     wo: to_eye[i],
                     tangent: TANGENT,
@@ -486,7 +486,7 @@ pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
             let near_mirror = DVec3::new(-to_eye.x, -to_eye.y, to_eye.z) + any * 0.1_f64.powi(round % 5);
             let way = if round % 2 == 0 { any } else { near_mirror.normalize() };
             let way = DVec3::new(way.x, way.y, way.z * lit.light_side_sign()).as_vec3();
-            let place = SurfaceDirections {
+            let place = ShadingGeometry {
                 normal: Vec3::Z * lit.light_side_sign() as f32,
                 wo: to_eye.as_vec3(),
                 tangent: TANGENT,

@@ -20,11 +20,11 @@ use crate::materials::bsdf::{
     BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes,
     UvPacket,
 };
-use crate::materials::bxdf::{Bxdf, SurfaceDirections, facing_normal};
+use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
-use crate::materials::lookup::{PointLookup, TextureCollector, WhiteLookup};
-use crate::materials::texture::{ColorParameter, Texture};
+use crate::materials::lookup::{MaterialTextureCollector, PointLookup, WhiteLookup};
+use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
 use conductor::ConductorBxdf;
@@ -399,7 +399,7 @@ kinds! {
 impl NonSpecular {
     /// All textures.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let TextureCollector { scattering, ambient } = self.collect_textures();
+        let MaterialTextureCollector { scattering, ambient } = self.collect_textures();
         scattering.into_iter().chain(ambient)
     }
 
@@ -460,8 +460,8 @@ impl BsdfPacket {
         simd: impl Simd,
     ) -> Option<DielectricSamplePacket> {
         match self {
-            Self::DielectricReflection(row) => Some(row.dispatch_sample_either_side(choices, u, simd)),
-            Self::DielectricTransmission(row) => Some(row.dispatch_sample_either_side(choices, u, simd)),
+            Self::DielectricReflection(row) => Some(row.sample_either_side_outlined(choices, u, simd)),
+            Self::DielectricTransmission(row) => Some(row.sample_either_side_outlined(choices, u, simd)),
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)

@@ -54,7 +54,7 @@ impl CheckpointLock {
     }
 
     /// Records a failure. Returns whether it is the first one in the request.
-    pub(super) fn record_first_failure(&mut self, request: u64) -> bool {
+    pub(super) fn mark_failure_reported(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 pub(crate) use self::lock::CheckpointLock;
-use self::state::SavedRenderState;
+use self::state::NonFilmRenderState;
 use super::film_state::FilmState;
 use super::share::Shard;
 use crate::control::CancelToken;
@@ -18,15 +18,15 @@ use crate::inputs::ProtectedInputs;
 use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
-    self, Dependency, ImageHeader, PartError, PartFile, PartHeader, PartKind, PartShare,
+    self, ImageHeader, PartError, PartFile, PartHeader, PartOrCheckpoint, PartShare, RenderInput,
     dependency_differences,
 };
 use crate::output::write::{Durability, WritePolicy};
-use crate::output::{AttributeLossPolicy, DevelopSettings, OutputError};
+use crate::output::{AttributeLossPolicy, FilmEncodingSettings, OutputError};
 use crate::protocol::CheckpointUpdate;
 use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
-use crate::stages::StopReason;
+use crate::stages::AbortReason;
 use crate::system::describe_error;
 use crate::system::file::open_regular_file;
 
@@ -38,10 +38,10 @@ const ENDING: &str = ".checkpoint";
 
 /// Creates the header of a part or checkpoint file.
 pub(crate) fn create_header(
-    kind: PartKind,
+    kind: PartOrCheckpoint,
     state: &FilmState,
-    identity: Vec<Dependency>,
-    finish: &DevelopSettings,
+    identity: Vec<RenderInput>,
+    finish: &FilmEncodingSettings,
 ) -> PartHeader {
     let share = shard_header(state.share.as_ref());
     let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
@@ -53,7 +53,7 @@ fn shard_header(share: Option<&Shard>) -> PartShare {
         Some(share) => PartShare {
             index: share.index,
             count: share.count,
-            block_count: share.block_count(),
+            block_count: share.image_block_count(),
             blocks: share.blocks().to_vec(),
         },
         None => PartShare { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
@@ -73,11 +73,11 @@ pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
 /// Context for rendering with checkpoints.
 #[derive(Clone, Copy)]
 pub(crate) struct CheckpointContext<'a> {
-    pub(crate) finish: &'a DevelopSettings,
+    pub(crate) finish: &'a FilmEncodingSettings,
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) sink: &'a EventSink,
     /// Computes the names and values of everything that affects the image. Slow.
-    pub(crate) name: &'a dyn Fn() -> Vec<Dependency>,
+    pub(crate) name: &'a dyn Fn() -> Vec<RenderInput>,
     /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
     /// The process's checkpoint state.
@@ -90,7 +90,7 @@ pub(crate) struct Checkpointer<'a> {
     path: PathBuf,
     settings: CheckpointSettings,
     around: CheckpointContext<'a>,
-    identity: OnceCell<Vec<Dependency>>,
+    identity: OnceCell<Vec<RenderInput>>,
     due: Cell<Instant>,
     /// Whether the checkpoint held by this process belongs to this render.
     is_own: Cell<bool>,
@@ -110,7 +110,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn image_dependencies(&self) -> &[Dependency] {
+    fn image_dependencies(&self) -> &[RenderInput] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -121,10 +121,10 @@ impl<'a> Checkpointer<'a> {
     /// # Errors
     /// A requested checkpoint belongs to another image, is damaged or has too many samples, or the output
     /// file is a part of another render.
-    pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, StopReason> {
+    pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, AbortReason> {
         let resume = self.settings.resume;
         let is_there = self.path.symlink_metadata().is_ok();
-        if resume == ResumeMode::Asked && self.restore_finished_part(state)? {
+        if resume == ResumeMode::Asked && self.restore_from_finished_output(state)? {
             return Ok(true);
         }
         match resume {
@@ -155,7 +155,7 @@ impl<'a> Checkpointer<'a> {
             return Ok(true);
         };
         if resume == ResumeMode::Asked {
-            return Err(StopReason::command_line_error(
+            return Err(AbortReason::from_command_line_error(
                 format!("--resume: {error}"),
                 "remove --resume to start over, or name another file with -o",
             ));
@@ -174,13 +174,13 @@ impl<'a> Checkpointer<'a> {
     ///
     /// # Errors
     /// The output file is a part of another render.
-    fn restore_finished_part(&self, state: &mut FilmState) -> Result<bool, StopReason> {
+    fn restore_from_finished_output(&self, state: &mut FilmState) -> Result<bool, AbortReason> {
         if state.share.is_none() || !part::is_part(&self.output) {
             return Ok(false);
         }
         let path = self.output.clone();
         let file = match PartFile::open(&self.output, &CancelToken::new()) {
-            Ok(file) if file.head.kind == PartKind::Part => file,
+            Ok(file) if file.head.kind == PartOrCheckpoint::Part => file,
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
@@ -190,13 +190,13 @@ impl<'a> Checkpointer<'a> {
         };
         let mut differences = self.differences_from(&file.head, state);
         let PartHeader { scene, references, .. } = file.head.clone();
-        let head = PartHeader { scene, references, ..self.create_header(PartKind::Part, state) };
+        let head = PartHeader { scene, references, ..self.create_header(PartOrCheckpoint::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }
         let refused = |error: PartError| {
             let remedy = "remove --resume to replace it, or name another file with -o";
-            Err(StopReason::command_line_error(format!("--resume: {error}"), remedy))
+            Err(AbortReason::from_command_line_error(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
@@ -225,8 +225,10 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.move_aside_unless_longer(|_| false),
-                Ok(head) if head.kind == PartKind::Part => Err(finished_part_conflict_message(&self.path)),
+                Err(PartError::Version { .. }) => self.back_up_unless_shorter(|_| false),
+                Ok(head) if head.kind == PartOrCheckpoint::Part => {
+                    Err(finished_part_conflict_message(&self.path))
+                }
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
@@ -249,14 +251,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.move_aside_unless_longer(is_longer)
+        self.back_up_unless_shorter(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn move_aside_unless_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn back_up_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
         let aside = PathBuf::from(aside);
@@ -278,7 +280,7 @@ impl<'a> Checkpointer<'a> {
     fn is_superseded_by_this_render(
         &self,
         head: &PartHeader,
-        there: &SavedRenderState,
+        there: &NonFilmRenderState,
         state: &FilmState,
         rays: RayCounters,
     ) -> bool {
@@ -295,10 +297,10 @@ impl<'a> Checkpointer<'a> {
             return Err(other(unlike));
         }
         let file = PartFile::open(&self.path, &CancelToken::new())?;
-        file.check_kind(PartKind::Checkpoint)?;
+        file.check_kind(PartOrCheckpoint::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
-        let read: SavedRenderState =
+        let read: NonFilmRenderState =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
         if !read.is_plausible() {
             return Err(damaged("its state contains implausible numbers"));
@@ -315,7 +317,7 @@ impl<'a> Checkpointer<'a> {
         Ok(())
     }
 
-    fn create_header(&self, kind: PartKind, state: &FilmState) -> PartHeader {
+    fn create_header(&self, kind: PartOrCheckpoint, state: &FilmState) -> PartHeader {
         create_header(kind, state, self.image_dependencies().to_vec(), self.around.finish)
     }
 
@@ -358,7 +360,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Checks whether this process has already saved a checkpoint of this render during an earlier request.
-    pub(crate) fn record_whether_already_saved(&self, state: &FilmState) {
+    pub(crate) fn detect_own_checkpoint(&self, state: &FilmState) {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         let is_own = is_held
             && PartFile::read_header(&self.path)
@@ -415,8 +417,8 @@ impl<'a> Checkpointer<'a> {
             self.report_failure(&why);
             return false;
         }
-        let head = self.create_header(PartKind::Checkpoint, state);
-        let written = serde_json::to_value(SavedRenderState::from_film(state, rays, seconds))
+        let head = self.create_header(PartOrCheckpoint::Checkpoint, state);
+        let written = serde_json::to_value(NonFilmRenderState::from_film(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save_and_keep_locked(&head, &state.film, &value, durability));
         match &written {
@@ -446,7 +448,7 @@ impl<'a> Checkpointer<'a> {
                     path.display(),
                     foreign_file_problem(at)
                 )),
-                Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartKind::Part) => {
+                Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartOrCheckpoint::Part) => {
                     Err(OutputError::Refused { reason: finished_part_conflict_message(path) })
                 }
                 // Another process may have locked the file since the last check.
@@ -470,7 +472,7 @@ impl<'a> Checkpointer<'a> {
 
     fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = self.around;
-        if lock.borrow_mut().record_first_failure(sink.generation) {
+        if lock.borrow_mut().mark_failure_reported(sink.generation) {
             self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }
     }
@@ -509,10 +511,10 @@ fn rejection_reason(error: &PartError) -> String {
 }
 
 /// Reads the header and state of a valid checkpoint.
-fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, SavedRenderState)> {
+fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, NonFilmRenderState)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
-    file.check_kind(PartKind::Checkpoint).ok()?;
-    let state: SavedRenderState = serde_json::from_value(file.state).ok()?;
+    file.check_kind(PartOrCheckpoint::Checkpoint).ok()?;
+    let state: NonFilmRenderState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))
 }
 /// Describes why a file does not count as a checkpoint: its content, or an error when opening it.

@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::integrators::RayCounters;
-use crate::render::film_state::{EarlierWork, FilmState};
+use crate::render::film_state::{EarlierProcessWork, FilmState};
 
 /// Render state that is not part of the film.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct SavedRenderState {
+pub(super) struct NonFilmRenderState {
     /// Sample goals decided for both halves of each cell.
     goals: Vec<[u32; 2]>,
     /// Sample count at which each tile's noise was last evaluated.
@@ -25,7 +25,7 @@ pub(super) struct SavedRenderState {
     processor_seconds: f64,
 }
 
-impl SavedRenderState {
+impl NonFilmRenderState {
     pub(super) fn from_film(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
         let RayCounters {
             camera_rays,
@@ -94,7 +94,7 @@ impl SavedRenderState {
         state.goals.judged = self.judged;
         state.goals.brightness = self.brightness;
         state.rays = self.cell_rays;
-        state.before = EarlierWork { rays, seconds: self.seconds };
+        state.before = EarlierProcessWork { rays, seconds: self.seconds };
         state.render_seconds = self.seconds;
         state.seconds = self.processor_seconds;
         Some(())
@@ -105,8 +105,8 @@ impl SavedRenderState {
 mod tests {
     use super::*;
 
-    fn state() -> SavedRenderState {
-        SavedRenderState {
+    fn state() -> NonFilmRenderState {
+        NonFilmRenderState {
             goals: vec![[4, 4]],
             judged: vec![2],
             brightness: Some(0.5),
@@ -121,16 +121,19 @@ mod tests {
     fn implausible_numbers_are_detected() {
         assert!(state().is_plausible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
-            assert!(!SavedRenderState { seconds, ..state() }.is_plausible(), "{seconds}");
-            assert!(!SavedRenderState { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!NonFilmRenderState { seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(
+                !NonFilmRenderState { processor_seconds: seconds, ..state() }.is_plausible(),
+                "{seconds}"
+            );
         }
         for brightness in [-1.0, f64::NAN, f64::INFINITY] {
             assert!(
-                !SavedRenderState { brightness: Some(brightness), ..state() }.is_plausible(),
+                !NonFilmRenderState { brightness: Some(brightness), ..state() }.is_plausible(),
                 "{brightness}"
             );
         }
-        assert!(!SavedRenderState { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
-        assert!(!SavedRenderState { cell_rays: vec![1 << 57], ..state() }.is_plausible());
+        assert!(!NonFilmRenderState { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
+        assert!(!NonFilmRenderState { cell_rays: vec![1 << 57], ..state() }.is_plausible());
     }
 }

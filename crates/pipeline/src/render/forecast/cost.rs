@@ -8,12 +8,12 @@ pub(crate) struct CellCost {
     units: f64,
     /// Total number of pixels in all jobs.
     pixels: f64,
-    last: Option<JobCost>,
+    last: Option<MeasuredJobCost>,
 }
 
 /// Cost of a job in a cell.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct JobCost {
+pub(crate) struct MeasuredJobCost {
     pub(crate) seconds: f64,
     pub(crate) pixels: f64,
     /// Samples per pixel.
@@ -25,7 +25,7 @@ impl CellCost {
     /// later ones.
     const KEPT: f64 = 0.25;
 
-    pub(crate) fn record(&mut self, job: JobCost, share: &mut PixelOverhead) {
+    pub(crate) fn record(&mut self, job: MeasuredJobCost, share: &mut PixelOverhead) {
         share.record(self.last, job);
         self.seconds = Self::KEPT * self.seconds + job.seconds;
         self.units = Self::KEPT * self.units + job.pixels * job.samples;
@@ -63,7 +63,7 @@ impl PixelOverhead {
     /// Maximum overhead per pixel, in samples.
     const MOST: f64 = 4.0;
 
-    fn record(&mut self, before: Option<JobCost>, now: JobCost) {
+    fn record(&mut self, before: Option<MeasuredJobCost>, now: MeasuredJobCost) {
         if let Some(before) =
             before.filter(|before| before.pixels == now.pixels && before.samples < now.samples)
         {
@@ -91,7 +91,7 @@ mod tests {
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
                 let seconds = 100.0 * rate * (samples + 0.5);
-                cell.record(JobCost { seconds, pixels: 100.0, samples }, &mut share);
+                cell.record(MeasuredJobCost { seconds, pixels: 100.0, samples }, &mut share);
             }
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
@@ -105,7 +105,7 @@ mod tests {
         let of = |seconds: [f64; 2]| {
             let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
             for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
-                cell.record(JobCost { seconds, pixels: 1.0, samples }, &mut share);
+                cell.record(MeasuredJobCost { seconds, pixels: 1.0, samples }, &mut share);
             }
             share.samples_including_overhead(0.0, 1.0)
         };
@@ -120,7 +120,7 @@ mod tests {
         let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
         // The first job covers a cell, and the second covers half of it with twice the samples.
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
-            cell.record(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
+            cell.record(MeasuredJobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
         }
         assert_eq!(share.samples_including_overhead(0.0, 1.0), 0.0);
     }
@@ -128,11 +128,11 @@ mod tests {
     #[test]
     fn cell_without_pixels_has_unknown_cost() {
         let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
-        cell.record(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
+        cell.record(MeasuredJobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
         assert!(!cell.is_unknown());
         // Halves without pixels also have jobs.
         for _ in 0..2000 {
-            cell.record(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
+            cell.record(MeasuredJobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
         }
         assert!(cell.is_unknown(), "{cell:?}");
     }

@@ -22,7 +22,7 @@ use rayon::ThreadPool;
 use self::noise::NoiseForecast;
 use self::work_rate::{WorkAmount, WorkRate};
 use super::film_state::FilmState;
-use crate::film::Convergence;
+use crate::film::ConvergenceModel;
 use crate::plan::RenderPlan;
 use crate::protocol::RenderProgress;
 use crate::scene::description::RenderOptions;
@@ -88,7 +88,7 @@ impl Forecast {
     }
 
     /// Updates the total work after goals have changed.
-    pub(crate) fn update_work_estimate(&mut self, state: &FilmState, most: u32) {
+    pub(crate) fn update_total_work(&mut self, state: &FilmState, most: u32) {
         self.total_units = state.expected_pixel_samples(most);
         self.expectation.due = Instant::now();
     }
@@ -112,11 +112,11 @@ impl Forecast {
     }
 
     /// Returns the progress, including the predicted time and noise.
-    pub(crate) fn progress(&mut self, moment: &RenderSnapshot<'_>) -> RenderProgress {
+    pub(crate) fn progress_and_predictions(&mut self, moment: &RenderSnapshot<'_>) -> RenderProgress {
         let elapsed_seconds = moment.elapsed_seconds;
         // Predict the end from the remaining work.
-        let work = self.work(moment);
-        let (mut fraction, mut eta_seconds) = self.rate.update_progress(elapsed_seconds, work);
+        let work = self.done_and_total_work(moment);
+        let (mut fraction, mut eta_seconds) = self.rate.update_fraction_and_time_left(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
@@ -128,7 +128,7 @@ impl Forecast {
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
         let pixels = moment.state.film.crop().area() as u64;
-        let left = eta_seconds.filter(|_| can_predict_noise(moment));
+        let left = eta_seconds.filter(|_| has_predictable_convergence(moment));
         RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
@@ -138,13 +138,13 @@ impl Forecast {
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
-            noise: self.noise.noise_progress(work, self.rate.rate(), left),
+            noise: self.noise.current_and_predicted_noise(work, self.rate.rate(), left),
         }
     }
 
     /// Returns the current and the total amount of work. With a noise target, the total is unknown until the
     /// noise has been evaluated.
-    fn work(&mut self, moment: &RenderSnapshot<'_>) -> WorkAmount {
+    fn done_and_total_work(&mut self, moment: &RenderSnapshot<'_>) -> WorkAmount {
         if Instant::now() >= self.expectation.due {
             self.expectation = estimate_work(moment);
         }
@@ -173,10 +173,10 @@ impl Forecast {
 
 /// Whether future noise can be predicted from past noise. This is impossible with `error`, because fewer and
 /// fewer tiles receive samples, and with photons, because the radius shrinks from pass to pass.
-fn can_predict_noise(moment: &RenderSnapshot<'_>) -> bool {
+fn has_predictable_convergence(moment: &RenderSnapshot<'_>) -> bool {
     match moment.state.film.convergence() {
-        Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),
-        Convergence::Photons => false,
+        ConvergenceModel::Stratified => !(moment.plan.settings.render.error > 0.0),
+        ConvergenceModel::Photons => false,
     }
 }
 

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::work_rate::WorkAmount;
-use crate::film::{Film, ImageNoise};
-use crate::protocol::NoiseProgress;
+use crate::film::{Film, ImageNoiseAndConvergence};
+use crate::protocol::NoisePrediction;
 use crate::render::noise_goals::LEAST;
 
 /// Minimum time before the first measurement and between measurements, each of which requires a sum over all
@@ -23,7 +23,7 @@ pub(crate) struct NoiseForecast {
 /// A noise measurement.
 #[derive(Clone, Copy, Debug)]
 struct NoiseMeasurement {
-    noise: ImageNoise,
+    noise: ImageNoiseAndConvergence,
     /// Amount of work done when the noise was measured.
     done: f64,
     /// Seconds from the start of the stage to the measurement.
@@ -46,25 +46,27 @@ impl NoiseForecast {
 
     /// Returns the last measured noise and its predicted decrease. `rate` is the work done per second, and
     /// `left` is the number of seconds until the end. Returns `None` before the first measurement.
-    pub(crate) fn noise_progress(
+    pub(crate) fn current_and_predicted_noise(
         &self,
         work: WorkAmount,
         rate: Option<f64>,
         left: Option<f64>,
-    ) -> Option<NoiseProgress> {
-        let NoiseMeasurement { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
+    ) -> Option<NoisePrediction> {
+        let NoiseMeasurement { noise: ImageNoiseAndConvergence { relative_error, power }, done, seconds } =
+            self.told?;
         // Returns the fraction of the noise that remains with `times` times as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
-        let next =
-            rate.zip(left).and_then(|(rate, left)| predict_next_noise_level(by_now, work, rate, power, left));
-        Some(NoiseProgress { now: relative_error, seconds, next })
+        let next = rate
+            .zip(left)
+            .and_then(|(rate, left)| predict_next_noise_milestone(by_now, work, rate, power, left));
+        Some(NoisePrediction { now: relative_error, seconds, next })
     }
 }
 
 /// Returns the next lower round noise level and the number of seconds until it is reached. Returns `None` if
 /// the render ends before that.
-fn predict_next_noise_level(
+fn predict_next_noise_milestone(
     by_now: f64,
     work: WorkAmount,
     rate: f64,
@@ -106,7 +108,7 @@ mod tests {
 
     /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
     fn measured() -> NoiseForecast {
-        let noise = ImageNoise { relative_error: 0.021, power: 1.0 };
+        let noise = ImageNoiseAndConvergence { relative_error: 0.021, power: 1.0 };
         NoiseForecast {
             due: Instant::now(),
             told: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),
@@ -117,21 +119,24 @@ mod tests {
     fn next_level_is_predicted_from_sample_count() {
         // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
         let work = WorkAmount { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().noise_progress(work, Some(10.0), Some(100.0)).expect("noise");
+        let told = measured().current_and_predicted_noise(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
         let half = WorkAmount { aside: [10.0, 10.0], ..work };
-        let (_, seconds) =
-            measured().noise_progress(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
+        let (_, seconds) = measured()
+            .current_and_predicted_noise(half, Some(10.0), Some(100.0))
+            .expect("noise")
+            .next
+            .expect("a level");
         assert!((seconds - 68.2).abs() < 1e-6, "{seconds}");
     }
 
     #[test]
     fn prediction_accounts_for_work_since_measurement() {
         let work = WorkAmount { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().noise_progress(work, Some(10.0), Some(1000.0)).expect("noise");
+        let told = measured().current_and_predicted_noise(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = told.next.expect("a level");
@@ -143,11 +148,14 @@ mod tests {
         let work = WorkAmount { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(
-                measured().noise_progress(work, Some(10.0), left).expect("noise").next,
+                measured().current_and_predicted_noise(work, Some(10.0), left).expect("noise").next,
                 None,
                 "{left:?}"
             );
         }
-        assert_eq!(measured().noise_progress(work, None, Some(100.0)).expect("noise").next, None);
+        assert_eq!(
+            measured().current_and_predicted_noise(work, None, Some(100.0)).expect("noise").next,
+            None
+        );
     }
 }

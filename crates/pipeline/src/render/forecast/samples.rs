@@ -1,8 +1,8 @@
 //! Predicts how many samples each part of the image needs to reach the noise target. Each prediction is
 //! needed only until the part's goal is decided.
 
-use crate::film::{CELLS, Convergence, total_samples_to_reduce_error};
-use crate::render::noise_goals::{AIM, LEAST, MOST, NoiseMeasurements, SampleGoals, TileNoise};
+use crate::film::{CELLS, ConvergenceModel, total_samples_to_reduce_error};
+use crate::render::noise_goals::{AIM, CellSampleGoals, LEAST, MOST, NoiseMeasurements, TileNoise};
 
 /// Assumed factor by which the variance decreases from two to four samples and again from four to eight. This
 /// is the median over all tiles in the bundled scenes.
@@ -33,11 +33,16 @@ impl ExpectedSamples {
     /// Updates the predictions from the noise in both halves of each tile and the rate at which it decreases.
     /// `judgement.samples` is a power of two. `done` is the number of samples in each half. Predictions for
     /// halves with a goal do not change.
-    pub(crate) fn predict(&mut self, judgement: &NoiseMeasurements, goals: &SampleGoals, done: &[[u32; 2]]) {
+    pub(crate) fn predict(
+        &mut self,
+        judgement: &NoiseMeasurements,
+        goals: &CellSampleGoals,
+        done: &[[u32; 2]],
+    ) {
         let NoiseMeasurements { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
-            noise.filter(|_| goals.has_undecided_half(tile, done, *samples)).map(|noise| (tile, noise))
+            noise.filter(|_| goals.tile_has_undecided_half(tile, done, *samples)).map(|noise| (tile, noise))
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
@@ -45,7 +50,7 @@ impl ExpectedSamples {
         for (tile, TileNoise { halves, fall }) in tiles {
             // Average the noise of both halves of the tile.
             let squares = halves.iter().flatten().map(|half| {
-                let noise = aim.relative_noise(half);
+                let noise = aim.noise_relative_to_brightness(half);
                 noise * noise
             });
             let mean = squares.sum::<f64>() / halves.iter().flatten().count() as f64;
@@ -82,9 +87,9 @@ struct NoiseDecay {
 
 impl NoiseDecay {
     /// Fits the model to each tile's ratio of variances before and after the last doubling of samples.
-    fn fit(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
+    fn fit(convergence: ConvergenceModel, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
-        if convergence == Convergence::Photons {
+        if convergence == ConvergenceModel::Photons {
             return Self {
                 samples,
                 doublings,
@@ -131,8 +136,8 @@ mod tests {
     use super::*;
     use crate::render::noise_goals::tests::film;
 
-    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (SampleGoals, ExpectedSamples) {
-        let (mut goals, mut expected) = (SampleGoals::undecided(1), ExpectedSamples::unknown(1));
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (CellSampleGoals, ExpectedSamples) {
+        let (mut goals, mut expected) = (CellSampleGoals::new_undecided(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
         let judgement = goals.decide_goals(&film(halves, samples), &done, samples, error).expect("samples");
         expected.predict(&judgement, &goals, &done);
@@ -163,7 +168,7 @@ mod tests {
     #[test]
     fn recent_noise_decrease_is_extrapolated() {
         let (stratified, usual) =
-            (Convergence::Stratified, Convergence::Stratified.typical_variance_exponent());
+            (ConvergenceModel::Stratified, ConvergenceModel::Stratified.typical_variance_exponent());
         let of = |falls: &[f64]| NoiseDecay::fit(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
             (vec![], libm::exp2(usual), usual),
@@ -185,7 +190,7 @@ mod tests {
         assert!(near(of(&[4.0]).samples_to_reach(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
         assert!(near(of(&[1.0]).samples_to_reach(0.25, 1.0, None), 16.0 * 64.0));
         assert!(near(
-            NoiseDecay::fit(Convergence::Photons, vec![9.0], 4).samples_to_reach(0.25, 1.0, Some(9.0)),
+            NoiseDecay::fit(ConvergenceModel::Photons, vec![9.0], 4).samples_to_reach(0.25, 1.0, Some(9.0)),
             64.0
         ));
     }
@@ -200,7 +205,7 @@ mod tests {
 
     #[test]
     fn smooth_tiles_need_few_samples() {
-        let law = NoiseDecay::fit(Convergence::Stratified, vec![], 4);
+        let law = NoiseDecay::fit(ConvergenceModel::Stratified, vec![], 4);
         assert_eq!((law.doublings, law.fall), (2, None));
         let [smooth, unknown, rough] =
             [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to_reach(0.2, 1.0, fall));

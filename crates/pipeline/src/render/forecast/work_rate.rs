@@ -35,7 +35,11 @@ impl WorkRate {
     }
 
     /// Returns the completed fraction, which never decreases, and the remaining seconds if the rate is known.
-    pub(crate) fn update_progress(&mut self, seconds: f64, work: WorkAmount) -> (f64, Option<f64>) {
+    pub(crate) fn update_fraction_and_time_left(
+        &mut self,
+        seconds: f64,
+        work: WorkAmount,
+    ) -> (f64, Option<f64>) {
         let WorkAmount { done, total, aside: [aside, aside_to_come] } = work;
         let seconds = seconds - aside;
         let (since, before) = self.measured;
@@ -72,48 +76,52 @@ mod tests {
         // Two seconds are spent on other activities and one second on the first 100 of 400 units of work.
         let mut pace = WorkRate::new(0.0);
         let work = WorkAmount { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };
-        let (fraction, eta) = pace.update_progress(3.0, work);
+        let (fraction, eta) = pace.update_fraction_and_time_left(3.0, work);
         assert_eq!((fraction, eta), (0.25, Some(9.0)));
     }
 
     #[test]
     fn unknown_total_has_no_eta() {
         let mut pace = WorkRate::new(0.0);
-        assert_eq!(pace.update_progress(1.0, WorkAmount { total: None, ..of(100.0, 0.0) }), (0.0, None));
-        assert_eq!(pace.update_progress(2.0, of(200.0, 400.0)), (0.5, Some(2.0)));
+        assert_eq!(
+            pace.update_fraction_and_time_left(1.0, WorkAmount { total: None, ..of(100.0, 0.0) }),
+            (0.0, None)
+        );
+        assert_eq!(pace.update_fraction_and_time_left(2.0, of(200.0, 400.0)), (0.5, Some(2.0)));
     }
 
     #[test]
     fn steady_work_is_predicted_exactly() {
         let mut pace = WorkRate::new(0.0);
-        assert_eq!(pace.update_progress(0.0, of(0.0, 1000.0)), (0.0, None));
+        assert_eq!(pace.update_fraction_and_time_left(0.0, of(0.0, 1000.0)), (0.0, None));
         for step in 1..10_u32 {
-            let (fraction, eta) = pace.update_progress(f64::from(step), of(f64::from(step) * 100.0, 1000.0));
+            let (fraction, eta) =
+                pace.update_fraction_and_time_left(f64::from(step), of(f64::from(step) * 100.0, 1000.0));
             assert!((fraction - f64::from(step) / 10.0).abs() < 1e-12);
             assert!((eta.expect("the rate should be known") - f64::from(10 - step)).abs() < 1e-9);
         }
-        assert_eq!(pace.update_progress(10.0, of(1000.0, 1000.0)), (1.0, Some(0.0)));
+        assert_eq!(pace.update_fraction_and_time_left(10.0, of(1000.0, 1000.0)), (1.0, Some(0.0)));
     }
 
     #[test]
     fn fraction_is_monotonic_and_eta_ignores_old_work() {
         let mut pace = WorkRate::new(500.0);
-        let (fraction, eta) = pace.update_progress(1.0, of(600.0, 1000.0));
+        let (fraction, eta) = pace.update_fraction_and_time_left(1.0, of(600.0, 1000.0));
         assert_eq!(fraction, 0.6);
         assert!((eta.expect("a rate") - 4.0).abs() < 1e-9);
-        assert_eq!(pace.update_progress(2.0, of(550.0, 1000.0)).0, 0.6);
+        assert_eq!(pace.update_fraction_and_time_left(2.0, of(550.0, 1000.0)).0, 0.6);
     }
 
     #[test]
     fn rate_adapts_to_speed_changes() {
         let mut pace = WorkRate::new(0.0);
         for step in 1..=100_u32 {
-            pace.update_progress(f64::from(step) * 0.1, of(f64::from(step) * 100.0, 100_000.0));
+            pace.update_fraction_and_time_left(f64::from(step) * 0.1, of(f64::from(step) * 100.0, 100_000.0));
         }
         let mut eta = None;
         for step in 1..=100_u32 {
             let done = 10_000.0 + f64::from(step) * 10.0;
-            eta = pace.update_progress(10.0 + f64::from(step) * 0.1, of(done, 100_000.0)).1;
+            eta = pace.update_fraction_and_time_left(10.0 + f64::from(step) * 0.1, of(done, 100_000.0)).1;
         }
         let truth = (100_000.0 - 11_000.0) / 100.0;
         assert!((eta.expect("a rate") / truth - 1.0).abs() < 0.35, "{eta:?} against {truth}");

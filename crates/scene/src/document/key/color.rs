@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::super::description::{ColorSource, EmissionSource};
-use super::super::super::keys::{color_names, hex_digits, parse_color_bytes};
+use super::super::super::keys::{color_names, hex_digits, parse_hex_or_named_srgb8};
 use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -50,18 +50,18 @@ impl TableKey<'_> {
     fn inline_table_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
-        table.report_key_errors();
+        table.report_unknown_and_missing_keys();
         texture
     }
 
     /// Reads emitted radiance: a non-negative color, or a texture with a scale factor.
-    pub(in super::super) fn emission(&self, textures: &DefinedNames) -> Option<EmissionSource> {
+    pub(in super::super) fn emission_source(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
             let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
             let scale = table.optional_key("scale");
             let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
-            table.report_key_errors();
+            table.report_unknown_and_missing_keys();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
         self.reject_texture_name(textures, EMISSION)?;
@@ -72,12 +72,12 @@ impl TableKey<'_> {
     /// Returns `None` and reports an error if the value is a bare texture name.
     fn reject_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
         if let TomlValue::String(text) = self.value?.decode()
-            && parse_color_bytes(text).is_none()
-            && textures.find(text).is_some()
+            && parse_hex_or_named_srgb8(text).is_none()
+            && textures.find_and_mark_used(text).is_some()
         {
-            let issue = Issue::error(self.span()?, format!("`{}` must be {expected}", self.name))
+            let issue = Issue::error(self.value_span()?, format!("`{}` must be {expected}", self.name))
                 .with_label("found the name of a texture")
-                .with_help(format!("write {{ texture = {} }}", self.context.span_text(&self.span()?)));
+                .with_help(format!("write {{ texture = {} }}", self.context.span_text(&self.value_span()?)));
             self.context.report(issue);
             return None;
         }
@@ -98,7 +98,7 @@ impl TableKey<'_> {
             }
             TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
-        if value.array().is_some_and(|array| array.len() == 3) {
+        if value.as_array().is_some_and(|array| array.len() == 3) {
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
             return Some(DVec3::from_array(rgb));
         }
@@ -109,7 +109,7 @@ impl TableKey<'_> {
     /// If the value looks like a color with components from 0 to 255, reports `issue` at the value's span and
     /// suggests the equivalent `#rrggbb`. Returns whether it does.
     pub(in super::super) fn report_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
-        let (Some(span), Some(color)) = (self.span(), self.byte_color_to_hex()) else { return false };
+        let (Some(span), Some(color)) = (self.value_span(), self.byte_color_to_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
         self.context.report(issue(span).with_label("this looks like 0–255").with_help(help));
         true
@@ -128,7 +128,7 @@ impl TableKey<'_> {
             | TomlValue::Table(_) => None,
         };
         let value = self.value?;
-        let bytes: Vec<u8> = match value.array() {
+        let bytes: Vec<u8> = match value.as_array() {
             Some(array) => array.iter().map(byte).collect::<Option<_>>()?,
             None => vec![byte(value)?; 3],
         };
@@ -138,10 +138,10 @@ impl TableKey<'_> {
 
     /// Converts `#rrggbb` or a case-insensitive color name from sRGB to linear.
     fn parse_hex_or_named_color(&self, text: &str) -> Option<Vec3> {
-        if let Some(bytes) = parse_color_bytes(text) {
+        if let Some(bytes) = parse_hex_or_named_srgb8(text) {
             return Some(srgb8_to_linear(bytes));
         }
-        let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
+        let issue = Issue::error(self.value_span()?, format!("`{}` must be {COLOR}", self.name));
         let small = text.to_ascii_lowercase();
         let issue = match (normalize_hex_color(text), nearest_name(&small, color_names())) {
             (Some(long), _) => issue

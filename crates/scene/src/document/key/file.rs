@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::super::super::description::Spanned;
 use super::super::super::nearest::nearest_name;
 use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
-use super::super::super::sanitize::{escape_invisible_chars, shortened};
+use super::super::super::sanitize::{escape_and_truncate, escape_invisible_chars};
 use super::super::context::Issue;
 use super::TableKey;
 use crate::system::describe_error;
@@ -17,7 +17,7 @@ impl TableKey<'_> {
     /// of the extensions `endings`, unless the list is empty.
     pub(in super::super) fn existing_file(&self, endings: &[&str]) -> Option<Spanned<PathBuf>> {
         let text = self.string("a file path")?;
-        let span = self.span()?;
+        let span = self.value_span()?;
         if text.is_empty() {
             self.context
                 .report(Issue::error(span, format!("`{}` is empty; expected a file path", self.name)));
@@ -32,10 +32,15 @@ impl TableKey<'_> {
         };
         if let Err((message, is_missing)) = check_regular_file(&path) {
             let help = is_missing.then(|| {
-                match self.context.search_similar_name(MAX_FOLDER_FILES, || similar_file(&path, may_be_meant))
+                match self
+                    .context
+                    .run_limited_name_search(MAX_FOLDER_FILES, || similar_file(&path, may_be_meant))
                 {
                     Some(near) => {
-                        format!("did you mean {}?", escape_invisible_chars(&relative_to_scene(text, &near)))
+                        format!(
+                            "did you mean {}?",
+                            escape_invisible_chars(&suggested_scene_path(text, &near))
+                        )
                     }
                     None => "paths are relative to the scene file".to_owned(),
                 }
@@ -52,9 +57,9 @@ impl TableKey<'_> {
         if endings.contains(&ending.as_str()) {
             return true;
         }
-        let Some(span) = self.span() else { return false };
+        let Some(span) = self.value_span() else { return false };
         let list = endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>().join(", ");
-        let shown = shortened(&ending, 16);
+        let shown = escape_and_truncate(&ending, 16);
         let message = match ending.as_str() {
             "" => format!("`{}` needs a file extension", self.name),
             _ => format!("`{}`: unknown file extension .{shown}", self.name),
@@ -69,7 +74,7 @@ impl TableKey<'_> {
 }
 
 /// Returns a suggested file's path as written in scenes: relative to the scene's folder.
-fn relative_to_scene(text: &str, near: &Path) -> String {
+fn suggested_scene_path(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
@@ -82,7 +87,7 @@ fn lowercase_extension(text: &str) -> String {
 /// Checks that a file is a regular file. The error contains a message, and a flag that is set if the file is
 /// missing.
 fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
-    let shown = shortened(&path.to_string_lossy(), 200);
+    let shown = escape_and_truncate(&path.to_string_lossy(), 200);
     match file::file_kind(path) {
         Ok((FileKind::Regular, _)) => Ok(()),
         Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.description()), false)),
@@ -103,7 +108,10 @@ mod tests {
     #[test]
     fn suggestions_are_relative_to_the_scene() {
         let near = Path::new("scenes/../assets/textures/bricks.png");
-        assert_eq!(relative_to_scene("../assets/textures/brick.png", near), "../assets/textures/bricks.png");
-        assert_eq!(relative_to_scene("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
+        assert_eq!(
+            suggested_scene_path("../assets/textures/brick.png", near),
+            "../assets/textures/bricks.png"
+        );
+        assert_eq!(suggested_scene_path("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
     }
 }

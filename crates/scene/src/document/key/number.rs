@@ -23,7 +23,7 @@ impl TableKey<'_> {
         }
         let value = self.value?;
         if let TomlValue::String(text) = value.decode()
-            && textures.find(text).is_some()
+            && textures.find_and_mark_used(text).is_some()
         {
             let issue = Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.name))
                 .with_label("found the name of a texture")
@@ -53,7 +53,7 @@ impl TableKey<'_> {
         let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
         let key = table.optional_key("channel");
         let channel = if key.is_present() { key.choice().map(Some) } else { Some(None) };
-        table.report_key_errors();
+        table.report_unknown_and_missing_keys();
         Some((texture?, channel?))
     }
 }

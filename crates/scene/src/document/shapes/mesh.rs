@@ -10,7 +10,7 @@ use super::super::key::TableKey;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
 use crate::math::DVec3;
-use crate::math::limits::{SHORTEST, is_too_short, robust_length};
+use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 
 /// The mesh files referenced so far. A file referenced through different paths is listed once.
 #[derive(Default)]
@@ -51,8 +51,8 @@ pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Opt
 /// Reads the index of a glTF part.
 fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional_key("part");
-    let Some(span) = key.span() else { return Some(None) };
-    let number = key.integer(table.integer_range("part")).map(Some);
+    let Some(span) = key.value_span() else { return Some(None) };
+    let number = key.integer(table.integer_key_range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
@@ -92,7 +92,7 @@ fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
     let wrong = |message: &str, label: String| {
-        key.context.report(Issue::error(key.span().unwrap_or_default(), message).with_label(label));
+        key.context.report(Issue::error(key.value_span().unwrap_or_default(), message).with_label(label));
         None
     };
     if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
@@ -103,7 +103,7 @@ fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
     if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
         return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
     }
-    if [x, y, z].iter().any(|axis| is_too_short(robust_length(*axis))) {
+    if [x, y, z].iter().any(|axis| is_nonzero_but_too_short(robust_length(*axis))) {
         return wrong(
             "`matrix` makes the mesh too small",
             format!("its columns must be more than {SHORTEST:e} long"),

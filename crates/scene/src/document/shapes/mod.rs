@@ -78,9 +78,9 @@ fn read_object(
     };
     let material = key.index_by_name(&materials.names);
     let name = table.optional_key("name").optional_object_name();
-    table.report_key_errors();
+    table.report_unknown_and_missing_keys();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
-        let issue = Issue::error(key.span()?, "an infinite plane cannot emit light")
+        let issue = Issue::error(key.value_span()?, "an infinite plane cannot emit light")
             .with_label("this material has `emission`")
             .with_help("use a [[quad]] or a material without emission");
         table.context.report(issue);
@@ -102,11 +102,11 @@ pub(super) fn read_direction(
 ) -> Option<DVec3> {
     let key = table.optional_key(name);
     let direction = key.vector_or(Limits::Any, default)?;
-    if !key.check_vector_length(direction) {
+    if !key.check_vector_magnitude(direction) {
         return None;
     }
     if direction == DVec3::ZERO {
-        let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
+        let issue = Issue::error(key.value_span()?, format!("the {what} has no direction"))
             .with_label(format!("`{name}` has length 0"))
             .with_help("use any nonzero vector, such as [0, 1, 0] for up");
         table.context.report(issue);
@@ -125,7 +125,7 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
         return None;
     }
     if first == second {
-        let span = keys[1].span().or_else(|| keys[0].span())?;
+        let span = keys[1].value_span().or_else(|| keys[0].value_span())?;
         let [from, to] = names;
         let issue = Issue::error(span, format!("the {what} has no length"))
             .with_label(format!("`{from}` and `{to}` are the same point"))

@@ -14,12 +14,12 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
     let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
     let (corner, u, v) = (corner?, u?, v?);
-    if !(u_key.check_vector_length(u) & v_key.check_vector_length(v)) {
+    if !(u_key.check_vector_magnitude(u) & v_key.check_vector_magnitude(v)) {
         return None;
     }
     if !edges_span_area(u, v) {
-        let wrong = if u == DVec3::ZERO { u_key.span() } else { v_key.span() };
-        let span = wrong.or(u_key.span())?;
+        let wrong = if u == DVec3::ZERO { u_key.value_span() } else { v_key.value_span() };
+        let span = wrong.or(u_key.value_span())?;
         let issue = Issue::error(span, format!("the quad {NO_AREA}"))
             .with_label("`u` and `v` are parallel, or one of them is 0")
             .with_help("use two edges in different directions");

@@ -15,7 +15,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let tube = read_length(table, "tube", radius.unwrap_or(0.5) / 4.0);
     let (radius, tube) = (radius?, tube?);
     if tube >= radius {
-        let issue = Issue::error(table.optional_key("tube").span()?, "the torus intersects itself")
+        let issue = Issue::error(table.optional_key("tube").value_span()?, "the torus intersects itself")
             .with_label(format!("`tube` must be less than `radius` = {radius}"))
             .with_help(
                 "`radius` is measured to the middle of the tube, and `tube` from there to the surface",

@@ -24,7 +24,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
         return None;
     }
     if !edges_span_area(b - a, c - a) {
-        let span = keys.iter().rev().find_map(TableKey::span)?;
+        let span = keys.iter().rev().find_map(TableKey::value_span)?;
         let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
             .with_label("`a`, `b` and `c` are collinear")
             .with_help("use three points that are not collinear");

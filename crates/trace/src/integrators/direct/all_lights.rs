@@ -2,7 +2,7 @@
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
-use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
+use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
@@ -56,7 +56,7 @@ impl std::ops::AddAssign for DirectLightCounters {
 
 /// Direct light that a packet of vertices reflects toward the viewer.
 #[repr(align(64))]
-pub struct ReflectedLight {
+pub struct ReflectedDirectLightPacket {
     /// Reflected radiance, before multiplication by the path throughput.
     pub light: Vec3x16,
     /// The part of `light` from wide lobes, if it was requested.
@@ -64,7 +64,7 @@ pub struct ReflectedLight {
     pub rays: DirectLightCounters,
 }
 
-impl ReflectedLight {
+impl ReflectedDirectLightPacket {
     /// Adds reflected light and its part from wide lobes in the lanes set in `bits`.
     pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2]) {
         add_masked_lanes(bits, light, &mut self.light);
@@ -94,14 +94,14 @@ impl LightSums {
 
     /// Converts the sums to the reflected light.
     #[inline(always)]
-    pub fn into_reflected_or_lit_fraction(mut self, aov: LightAov) -> ReflectedLight {
+    pub fn into_reflected_or_lit_fraction(mut self, aov: LightAov) -> ReflectedDirectLightPacket {
         if aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
                 set_lane(&mut self.light, i, Vec3::splat(share));
             }
         }
-        ReflectedLight { light: self.light, diffuse: self.diffuse, rays: self.rays }
+        ReflectedDirectLightPacket { light: self.light, diffuse: self.diffuse, rays: self.rays }
     }
 }
 
@@ -149,7 +149,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let is_single = light.is_single_direction();
             let count = if is_single { 1 } else { render.shadow_samples };
             if !is_single && sampler.is_none() {
-                sampler = Some(self.row.sampler(self.tile));
+                sampler = Some(self.row.sampler_packet(self.tile));
             }
             for repetition in 0..count {
                 let u = match &sampler {
@@ -200,7 +200,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
             // Trace the single ray to the light's center.
             if pending.active != 0 {
-                self.resolve_pending_light(light.center_and_geometry(), &pending, sums, simd);
+                self.add_unoccluded_pending_light(light.center_and_geometry(), &pending, sums, simd);
             }
         }
     }
@@ -214,7 +214,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         samples: &LightSamplePacket,
         mut values: Vec3x16,
     ) -> Vec3x16 {
-        for i in lane_indices(self.used) {
+        for i in set_bit_lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
@@ -236,7 +236,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         active: u32,
         mut values: Vec3x16,
     ) -> Vec3x16 {
-        for i in lane_indices(active) {
+        for i in set_bit_lanes(active) {
             let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
             let color = pattern.radiance_factor(target, samples.sources.part[i], direction);
             let color = match self.aov {
@@ -285,7 +285,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Adds deferred light after tracing one shadow ray to the light's center.
     #[inline(always)]
-    fn resolve_pending_light(
+    fn add_unoccluded_pending_light(
         &self,
         middle: Option<(LightCenter, LightGeometry)>,
         pending: &PendingLight,
@@ -307,7 +307,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             let from = lane(&self.row.from, i);
             let ray = match middle {
-                LightCenter::At(middle) => Ray::segment(from, middle),
+                LightCenter::At(middle) => Ray::segment_ending_before(from, middle),
                 LightCenter::Towards(direction) => Ray::new(from, direction),
             };
             set_lane(&mut direction, i, ray.direction);
@@ -343,7 +343,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if self.aov == LightAov::TraversalCost {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
-        if self.tile.world.has_see_through() {
+        if self.tile.world.has_null_interaction_surfaces() {
             return self.add_attenuated_light((rays, ends, traced), sources, (values, fraction), sums);
         }
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
@@ -368,7 +368,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         sums.rays.lookups += weakened.lookups;
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
-        for i in lane_indices(arriving) {
+        for i in set_bit_lanes(arriving) {
             let value = lane(&values, i) * convert_transmittance_for_aov(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
@@ -415,11 +415,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn shadow_rays(&self, samples: &LightSamplePacket, active: u32) -> (RayPacket, F32x16) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
+            let ray = Ray::segment_ending_before(lane(&self.row.from, i), lane(&samples.targets, i));
             set_lane(&mut direction, i, ray.direction);
             ends[i] = if active & 1 << i != 0 { ray.t_max } else { -1.0 };
         }
-        for i in lane_indices(samples.beyond & active) {
+        for i in set_bit_lanes(samples.beyond & active) {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
@@ -441,7 +441,7 @@ pub fn add_traversal_cost(
     traced: u32,
     sums: &mut Vec3x16,
 ) {
-    for i in lane_indices(traced) {
+    for i in set_bit_lanes(traced) {
         let work = tile.world.geometry.traversal_cost(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);
         set_lane(sums, i, sum);

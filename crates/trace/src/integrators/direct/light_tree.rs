@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::all_lights::{LightSums, SampleAllLights, add_fraction, add_masked_lanes};
 use super::shadow_rays::ShadowRayQueue;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::LightAov;
 use crate::lights::{
     LightCenter, LightSamplePacket, LightSampler, LightSamplingEffort, LightTree, Receiver, ReceiverLobe,
@@ -50,7 +50,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> LightSums {
         let Self { lighting, selection, number, pool } = self;
-        let sampler = lighting.row.sampler(lighting.tile);
+        let sampler = lighting.row.sampler_packet(lighting.tile);
         let mut sums = LightSums::ZERO;
         // Sample all infinite lights, if the tree excludes them.
         if selection.leaves_beyond {
@@ -156,7 +156,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if tree.is_single_node() {
             self.pick_from_single_node_tree(tree, &numbers, &mut picks, simd);
         } else {
-            self.pick_with_tree_cuts(tree, way, &numbers, &mut picks);
+            self.pick_per_vertex_with_tree_cut(tree, way, &numbers, &mut picks);
         }
         for row in &mut picks {
             row.invert_probabilities(count as f32, MIS);
@@ -177,7 +177,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Estimate the light from each source at each vertex, including glossy lobes.
         let plain = ReceiverPacket::with_unknown_lobe(&row.from, &row.normal);
         let mut glossy = plain.clone();
-        for i in lane_indices(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
+        for i in set_bit_lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.receiver_lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
@@ -194,7 +194,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
             pick.weighed = match &without {
-                Some(without) => without.probabilities(&picked),
+                Some(without) => without.pick_probabilities(&picked),
                 None => picked.probabilities,
             };
             pick.shares = picked.probabilities;
@@ -207,7 +207,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks lights from a tree of any size, one vertex at a time.
     #[inline(always)]
-    fn pick_with_tree_cuts(
+    fn pick_per_vertex_with_tree_cut(
         &self,
         tree: &LightTree,
         way: LightSamplingEffort,
@@ -216,7 +216,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     ) {
         let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.new_tree_cut(tree), MIS.then(|| way.new_tree_cut(tree)));
-        for i in lane_indices(self.used) {
+        for i in set_bit_lanes(self.used) {
             let plain = Receiver::with_unknown_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
             cut.adapt_to_receiver(&Receiver { lobe, ..plain });
@@ -345,7 +345,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         lights: &[u32; PACKET_SIZE],
         active: u32,
     ) {
-        for i in lane_indices(active) {
+        for i in set_bit_lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center_and_geometry() else {
                 continue;
             };

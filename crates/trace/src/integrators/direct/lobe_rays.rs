@@ -1,8 +1,8 @@
 //! Rays in narrow lobes, which complement light samples.
 
-use super::all_lights::{ReflectedLight, add_traversal_cost};
-use super::unshadowed::UnshadowedLobeRay;
-use crate::geometry::packet::{RayPacket, lane_indices};
+use super::all_lights::{ReflectedDirectLightPacket, add_traversal_cost};
+use super::unshadowed::LobeRayIgnoringOcclusion;
+use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
@@ -16,7 +16,7 @@ use crate::world::{Hit, SimdKernel};
 
 /// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample. Light samples on a large
 /// light rarely fall into a narrow lobe.
-pub struct LobeRayKernel<'a> {
+pub struct LobeRayTracingKernel<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub sharp: u32,
@@ -24,17 +24,17 @@ pub struct LobeRayKernel<'a> {
     /// Media at the vertices. `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,
     /// The reflected light to which the results are added.
-    pub arrived: ReflectedLight,
+    pub arrived: ReflectedDirectLightPacket,
 }
 
-impl SimdKernel for LobeRayKernel<'_> {
-    type Output = ReflectedLight;
+impl SimdKernel for LobeRayTracingKernel<'_> {
+    type Output = ReflectedDirectLightPacket;
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> ReflectedLight {
+    fn run(self, simd: impl Simd) -> ReflectedDirectLightPacket {
         let Self { tile, row, sharp, aov, interior_lists, mut arrived } = self;
         let count = tile.settings.render.shadow_samples;
-        let sampler = row.sampler(tile);
+        let sampler = row.sampler_packet(tile);
         let transmittance = |i: usize, distance: f32| {
             interior_lists.map_or(Vec3::ONE, |interior_lists| {
                 medium_transmittance(tile.world, &interior_lists.get(row.interiors[i]), distance)
@@ -66,8 +66,9 @@ impl SimdKernel for LobeRayKernel<'_> {
             if tile.settings.render.shadows != ShadowMode::Soft {
                 // Traversal cost is counted only for the rays to the lights' centers.
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };
-                for i in lane_indices(lit) {
-                    let found = UnshadowedLobeRay { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
+                for i in set_bit_lanes(lit) {
+                    let found =
+                        LobeRayIgnoringOcclusion { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
                     let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
                     let value = lane(narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
                     let sum = lane(&arrived.light, i) + value;
@@ -78,18 +79,18 @@ impl SimdKernel for LobeRayKernel<'_> {
             let (hits, objects) = tile.world.geometry.closest_hit_packet_simd(&rays, &mut ends, sent, simd);
             // If the view shows the traversal cost, add the cost of the rays.
             if aov == LightAov::TraversalCost {
-                for i in lane_indices(sent) {
+                for i in set_bit_lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }
                 add_traversal_cost(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
             // Add the light found by the rays.
-            for i in lane_indices(sent) {
+            for i in set_bit_lanes(sent) {
                 let pdf = pdfs[i];
                 let lookups = &mut arrived.rays.lookups;
                 let radiance = match hits.get(i) {
-                    hit if tile.world.has_see_through() => {
+                    hit if tile.world.has_null_interaction_surfaces() => {
                         let hit = hit.map(|shape| Hit { shape, object: objects[i] });
                         let (ray, normal) = (rays.ray(i), lane(&row.normal, i));
                         let left = |distance| transmittance(i, distance);

@@ -27,7 +27,7 @@ pub enum CompetingTechnique {
 
 impl CompetingTechnique {
     /// Lobe rays at the vertices in `sharp`. No technique if the mask is 0.
-    pub fn from_lobe_mask(sharp: u32) -> Self {
+    pub fn from_sharp_vertex_mask(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
@@ -71,7 +71,7 @@ impl CompetingTechnique {
         let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, simd);
         let mut weights = [1.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            let weight = power_heuristic(pdfs[i] * of_light[i] * competing);
+            let weight = power_heuristic_from_ratio(pdfs[i] * of_light[i] * competing);
             weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
         }
         // Apply the weights to the light reflected by these lobes.
@@ -85,7 +85,7 @@ impl CompetingTechnique {
             SampledLobes::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = mean_mis_weight_of_lobes(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -117,7 +117,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn mean_mis_weight_of_lobes(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
@@ -127,7 +127,7 @@ fn mean_mis_weight_of_lobes(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
 
 /// Power-heuristic weight of a sample. `ratio` is the other technique's pdf divided by the sample's own pdf.
 #[inline(always)]
-pub fn power_heuristic(ratio: f32) -> f32 {
+pub fn power_heuristic_from_ratio(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
@@ -140,7 +140,9 @@ impl TileContext<'_> {
         }
         let normal = self.world.geometry.surface(&path.ray, hit).normal;
         let samples = self.settings.render.shadow_samples as f32;
-        power_heuristic(self.light_pdf(&path.ray, path.state.normal, (hit, normal)) * samples / pdf)
+        power_heuristic_from_ratio(
+            self.light_pdf(&path.ray, path.state.normal, (hit, normal)) * samples / pdf,
+        )
     }
 
     /// MIS-weighted radiance of infinite lights along a path. Light samples contribute the rest.
@@ -158,11 +160,11 @@ impl TileContext<'_> {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
         if pdf.is_nan() || pdf <= 0.0 {
-            return lights.radiance_from_infinity_with_sky(sky, path.ray.direction, |_, _| 1.0);
+            return lights.radiance_from_infinity_with_precomputed_sky(sky, path.ray.direction, |_, _| 1.0);
         }
         // If light samples skip the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.paths_find_sky { 0.0 } else { of_sky }));
-        let share = |of_light: f32| power_heuristic(of_light * samples / pdf);
+        let share = |of_light: f32| power_heuristic_from_ratio(of_light * samples / pdf);
         self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, share)
     }
 
@@ -183,7 +185,9 @@ impl TileContext<'_> {
             self.world.lights.environment().map(|environment| environment.radiance_and_pdf(ray.direction));
         // If lobe rays account for the environment, light samples skip it, and its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
-        self.weighted_infinite_light((number, sky), ray, normal, |of_light| power_heuristic(of_light / pdf))
+        self.weighted_infinite_light((number, sky), ray, normal, |of_light| {
+            power_heuristic_from_ratio(of_light / pdf)
+        })
     }
 
     /// Weighted radiance of infinite lights along a ray from a surface with this normal that leaves the
@@ -201,7 +205,7 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
-        lights.radiance_from_infinity_with_sky(sky, ray.direction, |number, pdf| {
+        lights.radiance_from_infinity_with_precomputed_sky(sky, ray.direction, |number, pdf| {
             if only.is_none_or(|only| only == number) { share(pdf * samples.for_light(number)) } else { 0.0 }
         })
     }
@@ -213,7 +217,7 @@ impl TileContext<'_> {
         let met = LightHit { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
         let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
-        lights.light_at(hit.object, primitive, side).map_or(0.0, |(number, light)| {
+        lights.light_on_primitive(hit.object, primitive, side).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
                 * lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal).for_light(number)
         })
@@ -245,7 +249,7 @@ impl TileContext<'_> {
         if let Some(opacity) = &material.opacity {
             radiance *= opacity.evaluate(&at, lookups);
         }
-        radiance * power_heuristic(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
+        radiance * power_heuristic_from_ratio(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
     }
 
     /// MIS-weighted radiance along a lobe ray, including null interactions, starting at its first hit.
@@ -276,7 +280,7 @@ impl TileContext<'_> {
             if !self.world.materials[self.world.material_index(&hit)].has_null_interaction() {
                 return sum;
             }
-            let (part, beyond) = self.world.continue_ray_past(&along, &hit, lookups);
+            let (part, beyond) = self.world.transmittance_and_continued_ray(&along, &hit, lookups);
             (left, along, passed) = (left * part, beyond, distance);
             if left == Vec3::ZERO {
                 return sum;
@@ -290,9 +294,9 @@ impl TileContext<'_> {
     /// rays cannot reach the hit point.
     pub fn emitter_weight_at_glass(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
-        let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
+        let shadow = Ray::segment_ending_before(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0
-            && !self.world.has_zero_transmittance(&shadow, LightGeometry::Object(hit.object))
+            && !self.world.has_zero_transmittance_along(&shadow, LightGeometry::Object(hit.object))
         {
             self.emitter_weight(path, hit)
         } else {

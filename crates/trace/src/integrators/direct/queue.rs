@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use arrayvec::ArrayVec;
 
-use super::all_lights::{LightSums, ReflectedLight, SampleAllLights};
+use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
 use super::light_tree::SampleLightTree;
-use super::lobe_rays::LobeRayKernel;
+use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, lane_indices, nonnegative_end_mask};
+use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -30,7 +30,7 @@ use crate::world::{Geometry, SimdKernel};
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
 /// packet.
 #[derive(Default)]
-pub struct DirectLightQueue {
+pub struct DirectLightVertexQueue {
     rows: Vec<VertexBatch>,
     /// Number of packets in use. The remaining packets are kept for reuse.
     count: usize,
@@ -71,7 +71,7 @@ pub enum ShadingSides<'m> {
 /// Number of packets in a group if lights are picked from a tree.
 pub const MAX_GROUP_SIZE: usize = 64;
 
-impl DirectLightQueue {
+impl DirectLightVertexQueue {
     /// The queue is processed when it contains this many packets, while their data is still in the cache.
     const FULL: usize = 64;
 
@@ -104,7 +104,7 @@ impl DirectLightQueue {
     }
 
     /// Ends the bounce of these paths and adds their direct light to the accumulator, in path order.
-    pub fn flush_to_accumulator(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
+    pub fn add_arrived_light(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let path = &paths[place];
             let (slot, only_specular_before) = (path.slot, path.state.only_specular_before);
@@ -115,7 +115,7 @@ impl DirectLightQueue {
     }
 
     /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
-    pub fn flush_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn flush_consecutive_to_accumulator(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_consecutive(first, &self.arrived, &self.arrived_diffuse);
     }
 
@@ -129,7 +129,7 @@ impl DirectLightQueue {
     }
 
     /// Keeps the vertices in the spare packet.
-    pub fn commit_spare_batch(&mut self) {
+    pub fn commit_spare_vertices(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
         row.retain_lanes(row.used);
@@ -141,8 +141,8 @@ impl DirectLightQueue {
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.accepts(row.bsdf.kind(), (false, false))) {
-            for lane in lane_indices(row.used).take((ALL & !open.used).count_ones() as usize) {
-                open.copy_vertex(open.used.trailing_ones() as usize, row, lane);
+            for lane in set_bit_lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
+                open.copy_vertex_from(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
             }
         }
@@ -163,16 +163,20 @@ impl DirectLightQueue {
         sides: ShadingSides<'_>,
     ) {
         self.store_cone(lit.place, lit.vertex.cone);
-        let interiors = self.interior_lists.insert(lit.interiors);
+        let interiors = self.interior_lists.push_list(lit.interiors);
         let far_side = match sides {
             ShadingSides::OneSide { .. } => None,
             ShadingSides::TwoSides { beyond, interiors, .. } => {
-                Some((beyond, self.interior_lists.insert(interiors)))
+                Some((beyond, self.interior_lists.push_list(interiors)))
             }
         };
         let (row, lane) = match sides {
-            ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
-            ShadingSides::TwoSides { is_dark, .. } => self.open_packet(lit.bsdf.kind(), (is_dark, true)),
+            ShadingSides::OneSide { is_dark } => {
+                self.packet_with_free_lane(lit.bsdf.kind(), (is_dark, false))
+            }
+            ShadingSides::TwoSides { is_dark, .. } => {
+                self.packet_with_free_lane(lit.bsdf.kind(), (is_dark, true))
+            }
         };
         row.set_vertex(lane, tile, lit, aov, interiors);
         if let Some((beyond, interiors)) = far_side {
@@ -182,7 +186,7 @@ impl DirectLightQueue {
 
     /// Returns a packet for this kind of BSDF and the index of a free lane in the packet. `which` specifies
     /// whether the vertex is dark and whether it is two-sided.
-    fn open_packet(&mut self, kind: BxdfKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
+    fn packet_with_free_lane(&mut self, kind: BxdfKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
@@ -239,7 +243,7 @@ impl DirectLightQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
         shares_with_paths: bool,
-    ) -> Result<ArrayVec<ReflectedLight, MAX_GROUP_SIZE>, Cancelled> {
+    ) -> Result<ArrayVec<ReflectedDirectLightPacket, MAX_GROUP_SIZE>, Cancelled> {
         let mut sums: ArrayVec<LightSums, MAX_GROUP_SIZE> = ArrayVec::new();
         let request = |number: usize, row: &VertexBatch| DirectLightPacketRequest {
             number,
@@ -248,13 +252,13 @@ impl DirectLightQueue {
         };
         // Sample lights at each packet, and pool the shadow rays to picked lights.
         for number in group.clone() {
-            tile.token.check()?;
+            tile.token.check_pause_and_cancel()?;
             let row = &mut self.rows[number];
             if row.may_lift != 0 {
                 tile.world
                     .geometry
                     .instruction_set()
-                    .run(LiftShadowOrigins { geometry: &tile.world.geometry, row });
+                    .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
             }
             let request = request(number, row);
             sums.push(self.sample_lights_at_packet(request, tile, aov, sums.len() as u32));
@@ -286,15 +290,15 @@ impl DirectLightQueue {
             CompetingTechnique::NarrowPaths
         } else if row.bsdf.extends_narrow_lobe_paths() && !is_soft && aov != LightAov::LitFraction {
             // Paths in microfacet lobes do not account for lights.
-            CompetingTechnique::from_lobe_mask(row.bsdf.narrow_lobe_mask() & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
-            CompetingTechnique::from_lobe_mask(row.sharp_lobes(tile, aov) & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobes(tile, aov) & request.used)
         }
     }
 
     /// Media at a packet's vertices. `None` if all vertices are in air.
-    fn interiors_of(&self, row: &VertexBatch) -> Option<&InteriorLists> {
-        (!self.interior_lists.are_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
+    fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorLists> {
+        (!self.interior_lists.are_all_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
@@ -311,7 +315,7 @@ impl DirectLightQueue {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
-            (self.competing_technique(request, tile, aov), self.interiors_of(row));
+            (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
         let (only_infinite, splits_lobes) = (false, self.lobe_split(row) == LobeSplit::Mixed);
         let plain = SampleAllLights::<false> {
@@ -356,13 +360,13 @@ impl DirectLightQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
         sums: LightSums,
-    ) -> ReflectedLight {
+    ) -> ReflectedDirectLightPacket {
         let row = &self.rows[request.number];
         let arrived = sums.into_reflected_or_lit_fraction(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
-                let interior_lists = self.interiors_of(row);
-                let lobes = LobeRayKernel { tile, row, sharp, aov, interior_lists, arrived };
+                let interior_lists = self.interiors_of_batch(row);
+                let lobes = LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived };
                 tile.world.geometry.instruction_set().run(lobes)
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
@@ -384,7 +388,12 @@ impl DirectLightQueue {
     }
 
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    pub fn store_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &ReflectedLight) {
+    pub fn accumulate_reflected_light(
+        &mut self,
+        number: usize,
+        aov: LightAov,
+        arrived: &ReflectedDirectLightPacket,
+    ) {
         let row = &self.rows[number];
         let light = match aov {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
@@ -396,7 +405,7 @@ impl DirectLightQueue {
             LobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
         };
         if let Some(diffuse) = diffuse {
-            for i in lane_indices(row.used) {
+            for i in set_bit_lanes(row.used) {
                 self.arrived_diffuse[row.place[i] as usize] += lane(&diffuse, i);
             }
         }
@@ -408,7 +417,7 @@ impl DirectLightQueue {
                 }
             }
             None => {
-                for i in lane_indices(row.used) {
+                for i in set_bit_lanes(row.used) {
                     self.arrived[row.place[i] as usize] += lane(&light, i);
                 }
             }
@@ -451,12 +460,12 @@ struct DirectLightPacketRequest {
 }
 
 /// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
-struct LiftShadowOrigins<'a> {
+struct ShadowOriginLiftKernel<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,
 }
 
-impl SimdKernel for LiftShadowOrigins<'_> {
+impl SimdKernel for ShadowOriginLiftKernel<'_> {
     type Output = ();
 
     #[inline(always)]

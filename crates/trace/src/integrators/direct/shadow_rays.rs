@@ -2,7 +2,7 @@
 //! boxes, whereas the rays of one packet diverge.
 
 use super::all_lights::{LightSums, add_fraction, add_masked_lanes, convert_transmittance_for_aov};
-use crate::geometry::packet::{F32x16, RayPacket, lane_indices};
+use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{LightGeometry, LightGeometryPacket};
@@ -60,7 +60,7 @@ impl ShadowRayQueue {
         places: &[u32; PACKET_SIZE],
     ) {
         let number = self.rows.len() as u32 * PACKET_SIZE as u32;
-        self.order.extend(lane_indices(traced).map(|i| (places[i], number + i as u32)));
+        self.order.extend(set_bit_lanes(traced).map(|i| (places[i], number + i as u32)));
         self.rows.push(QueuedShadowRays {
             row,
             rays,
@@ -81,7 +81,7 @@ impl ShadowRayQueue {
         self.group_by_light_tree_position();
         let Self { rows, fractions, sorted, .. } = self;
         let world = tile.world;
-        world.geometry.instruction_set().run(TraceShadowRays { world, aov, rows, rays: sorted });
+        world.geometry.instruction_set().run(ShadowRayKernel { world, aov, rows, rays: sorted });
         let mut fractions = fractions.iter();
         for QueuedShadowRays { row, traced, values, has_fraction, .. } in &*rows {
             let sums = &mut sums[*row as usize];
@@ -122,7 +122,7 @@ impl ShadowRayQueue {
 }
 
 /// Traces the queued rays and clears the bits of occluded rays.
-struct TraceShadowRays<'a> {
+struct ShadowRayKernel<'a> {
     world: &'a World,
     aov: LightAov,
     rows: &'a mut [QueuedShadowRays],
@@ -130,7 +130,7 @@ struct TraceShadowRays<'a> {
     rays: &'a [u32],
 }
 
-impl SimdKernel for TraceShadowRays<'_> {
+impl SimdKernel for ShadowRayKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -151,12 +151,12 @@ impl SimdKernel for TraceShadowRays<'_> {
                 sources.copy_lane(to, &row.sources, from);
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
-            let occluded = if world.has_see_through() {
+            let occluded = if world.has_null_interaction_surfaces() {
                 attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
                 world.geometry.occluded_ray_packet(&packet, &ends, traced, &sources, simd)
             };
-            for to in lane_indices(occluded) {
+            for to in set_bit_lanes(occluded) {
                 let ray = rays[to] as usize;
                 rows[ray / PACKET_SIZE].traced &= !(1 << (ray % PACKET_SIZE));
             }
@@ -176,7 +176,7 @@ fn attenuate(
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);
-    for from in lane_indices(traced & !weakened.occluded) {
+    for from in set_bit_lanes(traced & !weakened.occluded) {
         let left = convert_transmittance_for_aov(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;

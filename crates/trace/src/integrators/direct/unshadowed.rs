@@ -14,7 +14,7 @@ use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 use super::all_lights::DirectLightCounters;
 
 /// A ray in a vertex's narrow lobe, and the pdf of its direction.
-pub struct UnshadowedLobeRay<'a> {
+pub struct LobeRayIgnoringOcclusion<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     /// Lane of the vertex in the packet.
@@ -23,7 +23,7 @@ pub struct UnshadowedLobeRay<'a> {
     pub pdf: f32,
 }
 
-impl UnshadowedLobeRay<'_> {
+impl LobeRayIgnoringOcclusion<'_> {
     /// Radiance from the lights along the ray, with MIS weights for equal numbers of light samples and lobe
     /// rays. `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
@@ -45,11 +45,11 @@ impl UnshadowedLobeRay<'_> {
             if radiance != Vec3::ZERO {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
-                let light = world.lights.light_at(hit.object, hit.shape.primitive, side);
+                let light = world.lights.light_on_primitive(hit.object, hit.shape.primitive, side);
                 let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.visibility_of_light(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
-            (along, passed) = (world.continue_ray_past(&along, &hit, &mut 0).1, distance);
+            (along, passed) = (world.transmittance_and_continued_ray(&along, &hit, &mut 0).1, distance);
         }
         // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
@@ -69,11 +69,13 @@ impl UnshadowedLobeRay<'_> {
         }
         // An environment has no center, so test the ray itself.
         let (segment, source) = match light.center_and_geometry() {
-            Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
+            Some((LightCenter::At(middle), source)) => {
+                (Ray::segment_ending_before(self.ray.origin, middle), source)
+            }
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
             None => (self.ray, LightGeometry::Nothing),
         };
-        if self.row.is_below_horizon(self.lane, segment.direction) {
+        if self.row.is_direction_below_horizon(self.lane, segment.direction) {
             return Vec3::ZERO;
         }
         rays.shadow += 1;

@@ -1,13 +1,13 @@
 //! Emission and ambient light found by camera paths.
 
 use super::CameraWavefront;
-use crate::geometry::packet::{RayPacket, lane_indices};
+use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::behavior::PathBehavior;
 use crate::integrators::transport::accumulator::NonReflectedTerm;
 use crate::integrators::transport::packet::{PacketHits, PacketSource};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::vertex::SurfaceVertex;
-use crate::integrators::transport::walk::OpaqueHit;
+use crate::integrators::transport::walk::DirectOrCoincidentHit;
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::ShadowMode;
@@ -36,7 +36,7 @@ impl CameraWavefront<'_, '_> {
         let render = &tile.settings.render;
         // Add the emission and ambient light of plain surfaces.
         let mut known = None;
-        for lane in lane_indices(plain) {
+        for lane in set_bit_lanes(plain) {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
@@ -54,10 +54,13 @@ impl CameraWavefront<'_, '_> {
         }
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
-        for lane in lane_indices(beyond) {
-            let sky = lights.environment().map(|_| packet.sky_radiance(lane));
-            let beyond =
-                lights.radiance_from_infinity_with_sky(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+        for lane in set_bit_lanes(beyond) {
+            let sky = lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
+            let beyond = lights.radiance_from_infinity_with_precomputed_sky(
+                sky,
+                lane_of(&rays.direction, lane),
+                |_, _| 1.0,
+            );
             self.accumulator.add_non_reflected(
                 first + lane as u32,
                 NonReflectedTerm::Emitted,
@@ -85,12 +88,12 @@ impl CameraWavefront<'_, '_> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
-        hit: OpaqueHit,
+        hit: DirectOrCoincidentHit,
     ) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                OpaqueHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
+                DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
+                DirectOrCoincidentHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);

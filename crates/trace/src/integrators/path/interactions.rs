@@ -3,9 +3,9 @@
 
 use super::CameraWavefront;
 use crate::geometry::Ray;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::aov::{record_first_hit, record_plain_first_hits, record_vertex};
-use crate::integrators::transport::crossing::CrossingBuffers;
+use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected_path};
 use crate::integrators::transport::interiors::InteriorList;
 use crate::integrators::transport::packet::{PacketHits, PacketSource};
@@ -13,7 +13,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::SurfaceVertex;
 use crate::integrators::transport::walk::{
-    Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk_to_interaction,
+    DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
 use crate::materials::{Bsdf, Coated, Mirror, ThinDielectric};
@@ -29,7 +29,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         self.tile
     }
 
-    fn crossing_buffers(&mut self) -> &mut CrossingBuffers {
+    fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers {
         self.crossing
     }
 
@@ -44,7 +44,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
-                if !has_passed && matches!(hit, OpaqueHit::Direct(_)) {
+                if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
                 if self.add_emission(path, vertex, hit) {
@@ -60,7 +60,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission(path, vertex, OpaqueHit::Direct(hit)) {
+                if self.add_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -81,7 +81,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        hit: OpaqueHit,
+        hit: DirectOrCoincidentHit,
         pane: &ThinDielectric,
     ) -> NullInteraction {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
@@ -91,7 +91,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         if !self.add_emission(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -129,7 +129,7 @@ impl CameraWavefront<'_, '_> {
                 let surface = packet.surface_unless_plain(self.surfaces, lane);
                 let camera_path = (self.depth == 0 && self.accumulator.first_hit_layers().is_some())
                     .then_some(path)
-                    .filter(|_| !tile.world.has_see_through());
+                    .filter(|_| !tile.world.has_null_interaction_surfaces());
                 self.is_first_hit_pending = camera_path.is_some();
                 walk_to_interaction(self, &mut path, (hit, surface));
                 if let Some(path) = camera_path.filter(|_| self.is_first_hit_pending)
@@ -140,7 +140,7 @@ impl CameraWavefront<'_, '_> {
                 }
             }
             None => {
-                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance(lane));
+                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
                 self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
             }
         }
@@ -153,10 +153,10 @@ impl CameraWavefront<'_, '_> {
         let Some(values) = self.accumulator.first_hit_layers() else { return };
         let mut left = record_plain_first_hits(tile, (packet, self.surfaces), first, values);
         // Paths may pass through surfaces that the layers show.
-        if tile.world.has_see_through() {
+        if tile.world.has_null_interaction_surfaces() {
             left |= packet.any & !packet.plain & rays.mask();
         }
-        for lane in lane_indices(left) {
+        for lane in set_bit_lanes(left) {
             let Some(hit) = packet.hit(lane) else { continue };
             record_first_hit(tile, (&packet.path(tile, rays, lane), &hit), values, self.counters);
         }
@@ -173,7 +173,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     pub(super) fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let is_colored = self.accumulator.aov.has_surface_colors_applied();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
@@ -188,7 +188,7 @@ impl CameraWavefront<'_, '_> {
         coated: &Coated,
         far: &InteriorList,
     ) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -213,7 +213,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     pub(super) fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));

@@ -1,7 +1,7 @@
 //! Vertices of camera paths at diffuse and glossy surfaces, queued for light and BSDF sampling.
 
 use super::CameraWavefront;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::direct::queue::ShadingSides;
 use crate::integrators::transport::interface::sheet_transmission_between_media;
 use crate::integrators::transport::interiors::InteriorList;
@@ -22,9 +22,9 @@ impl CameraWavefront<'_, '_> {
     /// Stores the ray cones at the vertices of plain surfaces, if ray cones are used.
     pub(super) fn store_cones(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
         if self.tile.pixel_spread > 0.0 {
-            for lane in lane_indices(packet.plain) {
+            for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };
-                let cone = packet.path(self.tile, rays, lane).cone.at_distance(hit.shape.t);
+                let cone = packet.path(self.tile, rays, lane).cone.propagated_by(hit.shape.t);
                 self.direct.store_cone(rays.queue_index(lane), cone);
             }
         }
@@ -79,7 +79,7 @@ impl CameraWavefront<'_, '_> {
         far: &InteriorList,
     ) {
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
         let aov = self.light_aov_selection_at_vertex(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
@@ -108,7 +108,7 @@ impl CameraWavefront<'_, '_> {
             return;
         }
         let (tile, place) = (self.tile, self.place);
-        let shading = vertex.shading_normals(self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let aov = self.light_aov_selection_at_vertex(path);
         let near = &path.interiors;
         let reflection = BxdfPoint::DielectricReflection(rough);
@@ -122,7 +122,7 @@ impl CameraWavefront<'_, '_> {
         // Without shadows, lights also illuminate the inside of solids.
         let has_shadows = tile.settings.render.shadows != ShadowMode::Off;
         let is_dark = |interiors: &InteriorList| {
-            interiors.glass().is_some_and(|inside| tile.world.is_unlit_glass(inside.body))
+            interiors.glass().is_some_and(|inside| tile.world.is_glass_interior_shadowed(inside.body))
         };
         let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
         // Photons are stored on both sides, so each side needs a vertex.

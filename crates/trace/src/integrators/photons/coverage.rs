@@ -5,9 +5,9 @@
 
 use arrayvec::ArrayVec;
 
-use super::kernel::polygon_weight;
+use super::kernel::kernel_integral_over_polygon;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::local_geometry::{FlatPolygon, NearestSurface, SurfaceExtent};
+use crate::geometry::local_geometry::{FlatPolygon, LocalSurfaceShape, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, NonSpecular};
 use crate::math::frame::Frame;
@@ -154,30 +154,30 @@ impl KernelNeighborhood {
             if !self.walls.iter().all(|wall| wall.has_all_on_inner_side(&corners)) {
                 return None;
             }
-            part += polygon_weight(&corners);
+            part += kernel_integral_over_polygon(&corners);
         }
         (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
     /// Adds a shape and returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
-        match shape.local_geometry(self.point) {
+        match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
-                .filter_map(|number| shape.flat_polygon(number))
+                .filter_map(|number| shape.polygon_face(number))
                 .all(|piece| self.add_polygon(&piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
-                    || ground.is_some_and(|ground| self.add_covering_surface(&ground, receives))
+                    || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
             }
         }
     }
 
     /// Adds a surface if it extends over the whole kernel and has the kernel's normal. Otherwise, returns
     /// false.
-    fn add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
+    fn try_add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
-            SurfaceExtent::Flat(reach) => reach > FAR * self.radius,
-            SurfaceExtent::Round(radius) => radius > WIDE * self.radius,
+            LocalSurfaceShape::Flat(reach) => reach > FAR * self.radius,
+            LocalSurfaceShape::Round(radius) => radius > WIDE * self.radius,
         };
         let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
         self.whole += u32::from(is_wide && is_same && receives());
@@ -233,7 +233,7 @@ impl KernelNeighborhood {
         if high < -reach
             || low > reach
             || !rises && (is_steep || !receives())
-            || !overlaps_unit_disk(&self.project_polygon(piece))
+            || !polygon_overlaps_unit_disk(&self.project_polygon(piece))
         {
             return true;
         }
@@ -250,7 +250,7 @@ impl KernelNeighborhood {
 }
 
 /// Whether a polygon overlaps the unit disk.
-fn overlaps_unit_disk(corners: &[DVec2]) -> bool {
+fn polygon_overlaps_unit_disk(corners: &[DVec2]) -> bool {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1));
     let is_near = |a: DVec2, b: DVec2| {
         let way = b - a;
@@ -264,7 +264,7 @@ fn overlaps_unit_disk(corners: &[DVec2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::cuboid::Cuboid;
+    use crate::geometry::cuboid::OrientedBox;
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::sphere::Sphere;
     use crate::math::Vec3;
@@ -301,7 +301,7 @@ mod tests {
         ));
         // A wall between two pieces, a box on the floor, a sheet above the floor, and a ball on the floor.
         assert_eq!(coverage_at(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
-        let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
+        let cuboid = Shape::Box(OrientedBox::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
         assert_eq!(coverage_at(0.35, 0.5, &[floor, cuboid]), None);
         assert_eq!(coverage_at(0.25, 0.5, &[floor, cuboid]), Some(1.0));
         let sheet = quad(DVec3::new(0.4, 0.01, 0.4), DVec3::Z * 0.2, DVec3::X * 0.2);

@@ -8,29 +8,29 @@
 
 use super::map::Photon;
 use crate::control::Cancelled;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
-use crate::integrators::transport::crossing::CrossingBuffers;
+use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{
     FresnelSplit, fresnel_split, reflected_path, sheet_transmission_between_media,
 };
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathHistory, PathRay};
-use crate::integrators::transport::scatter::{ContinuationPolicy, SampleBsdf};
+use crate::integrators::transport::scatter::{BsdfSampler, ContinuationPolicy};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, OpaqueHit, PathStepper, opacity_at,
-    walk_to_interaction,
+    DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, PathStepper,
+    opacity_at, walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
-use crate::lights::{EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource};
+use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
 use crate::materials::bsdf::SampledLobes;
 use crate::materials::{Bsdf, BxdfPoint, Coated, NonSpecular, ThinDielectric};
 use crate::math::Vec3;
@@ -46,7 +46,7 @@ pub struct PhotonTracer<'a> {
     /// Tile context. Photons are numbered as samples of a single pixel, with slots starting at 0.
     pub tile: &'a TileContext<'a>,
     /// Photon source, which represents all lights.
-    pub emission: &'a PhotonSource,
+    pub emission: &'a PhotonEmitter,
     /// Closed glass shapes that may contain lights, with their materials.
     pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
@@ -83,7 +83,7 @@ impl PhotonTracer<'_> {
             open: VertexBatch::empty(),
             open_behind: VertexBatch::empty(),
             interior_lists: InteriorLists::default(),
-            crossing: CrossingBuffers::default(),
+            crossing: CoincidentSurfaceBuffers::default(),
             stored: PhotonChunk::default(),
             counters: RayCounters::default(),
         };
@@ -93,7 +93,7 @@ impl PhotonTracer<'_> {
         let (mut row, mut surfaces) = (VertexBatch::empty(), SurfacePacket::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET_SIZE) {
-                self.tile.token.check()?;
+                self.tile.token.check_pause_and_cancel()?;
                 wavefront.trace_and_shade_packet(packet, &mut row, &mut surfaces);
             }
             // Scatter the individually queued vertices, and apply Russian roulette.
@@ -110,7 +110,7 @@ impl PhotonTracer<'_> {
 
     /// Ray for a photon from an infinite light. Its origin is moved back past any transmissive infinite
     /// planes. `None` if an opaque surface blocks the ray.
-    fn move_origin_before_planes(&self, ray: Ray) -> Option<Ray> {
+    fn move_past_infinite_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
         for _ in 0..MAX_PASSED_SURFACES {
@@ -160,7 +160,7 @@ struct PhotonWavefront<'a> {
     open_behind: VertexBatch,
     /// Media at the individually queued vertices.
     interior_lists: InteriorLists,
-    crossing: CrossingBuffers,
+    crossing: CoincidentSurfaceBuffers,
     stored: PhotonChunk,
     counters: RayCounters,
 }
@@ -170,7 +170,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         self.tracing.tile
     }
 
-    fn crossing_buffers(&mut self) -> &mut CrossingBuffers {
+    fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers {
         &mut self.crossing
     }
 
@@ -208,7 +208,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        _: OpaqueHit,
+        _: DirectOrCoincidentHit,
         pane: &ThinDielectric,
     ) -> NullInteraction {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
@@ -219,7 +219,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         if !self.tracing.tile.chooses_reflection(path, reflectance) {
             return NullInteraction::Passed(tint);
         }
-        let shading = vertex.shading_normals(&mut self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
         self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
         NullInteraction::Ended
@@ -241,7 +241,7 @@ impl PhotonWavefront<'_> {
                 let past_planes = is_from_infinite_light(&emitted) && has_planes;
                 let ray = emitted.ray();
                 let Some(ray) =
-                    (if past_planes { tracing.move_origin_before_planes(ray) } else { Some(ray) })
+                    (if past_planes { tracing.move_past_infinite_planes(ray) } else { Some(ray) })
                 else {
                     continue;
                 };
@@ -278,19 +278,19 @@ impl PhotonWavefront<'_> {
         self.counters.texture_lookups += packet.lookups;
         // Direct light is found by light samples.
         if self.depth > 0 {
-            for i in lane_indices(row.used) {
+            for i in set_bit_lanes(row.used) {
                 let (point, normal) = row.surface_point_and_normal(i);
-                self.store(&rays[i], point, normal);
+                self.store_photon(&rays[i], point, normal);
             }
             row.retain_lanes(row.only_specular_before);
-            for i in lane_indices(row.used & row.has_facet) {
+            for i in set_bit_lanes(row.used & row.has_facet) {
                 let counts = row.adjoint_photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
             }
             self.scatter(row);
         }
         // Shade other surfaces one by one.
-        for i in lane_indices(packet.any & !packet.plain) {
+        for i in set_bit_lanes(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
                 walk_to_interaction(self, &mut { rays[i] }, (hit, packet.surface_unless_plain(surfaces, i)));
             }
@@ -298,7 +298,7 @@ impl PhotonWavefront<'_> {
     }
 
     /// Stores a photon at its hit point.
-    fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
+    fn store_photon(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
         let (direction, flux) = (-path.ray.direction, path.throughput);
         let photon = Photon { point, direction, flux, normal, depth: self.depth };
         let kept =
@@ -322,7 +322,7 @@ impl PhotonWavefront<'_> {
                 self.store_and_reflect_at_coat(path, vertex, coated, (far, lacks_photons));
             }
             Bsdf::Mirror(mirror) if self.may_scatter() => {
-                let shading = vertex.shading_normals(&mut self.counters);
+                let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected_path(path, vertex, &shading, reflectance);
                 self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
@@ -341,7 +341,7 @@ impl PhotonWavefront<'_> {
         coated: &Coated,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
-        let shading = vertex.shading_normals(&mut self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
@@ -384,15 +384,15 @@ impl PhotonWavefront<'_> {
         // Store the photon. It also represents photons that passed through the surface as a null interaction.
         let chance = opacity_at(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
-        self.store(&all, vertex.surface.point, vertex.normal);
+        self.store_photon(&all, vertex.surface.point, vertex.normal);
         let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter())
         else {
             return;
         };
         // Queue the photon for scattering.
-        let shading = vertex.shading_normals(&mut self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
-        let interiors = self.interior_lists.insert(&path.interiors);
+        let interiors = self.interior_lists.push_list(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
             self.open.bsdf.set_kind(bsdf.kind());
@@ -411,7 +411,7 @@ impl PhotonWavefront<'_> {
             // For a camera path, this is transmission from the other side.
             sheet_transmission_between_media(tile.world, far, &path.interiors)
         };
-        let interiors = self.interior_lists.insert(far);
+        let interiors = self.interior_lists.push_list(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
             self.open_behind.bsdf.set_kind(bsdf.kind());
@@ -434,7 +434,7 @@ impl PhotonWavefront<'_> {
             return;
         }
         let tile = self.tracing.tile;
-        let shading = vertex.shading_normals(&mut self.counters);
+        let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let FresnelSplit { reflectance, refracted } = fresnel_split(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
@@ -493,7 +493,7 @@ impl PhotonWavefront<'_> {
         if !self.may_scatter() || row.used == 0 {
             return;
         }
-        for i in lane_indices(row.used & row.has_facet) {
+        for i in set_bit_lanes(row.used & row.has_facet) {
             let facet = lane(&row.facet, i);
             set_lane(&mut row.normal, i, facet);
             row.shading_normal_cosine[i] = UNPERTURBED;
@@ -501,7 +501,7 @@ impl PhotonWavefront<'_> {
         let continuation =
             ContinuationPolicy { continues: true, uses_roulette: false, lobes: SampledLobes::All };
         let used = row.used;
-        SampleBsdf { tile: self.tracing.tile, row, used, continuation, has_fractions: false }.scatter(
+        BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }.scatter(
             &self.interior_lists,
             &[],
             &mut self.next,
@@ -519,7 +519,7 @@ impl PhotonWavefront<'_> {
                 .world
                 .geometry
                 .instruction_set()
-                .run(RouletteSampleKernel { tile, rays: &self.next[begin..end] });
+                .run(RouletteRandomKernel { tile, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
                 let flux = max_flux_component(tile.world, &ray);
@@ -563,7 +563,7 @@ impl SimdKernel for EmissionRandomKernel<'_> {
     #[inline(always)]
     fn run(self, _: impl Simd) -> Self::Output {
         let slots = std::array::from_fn(|i| self.first + i as u32);
-        let (xs, ys, samples) = self.tile.block.samples_of(&slots);
+        let (xs, ys, samples) = self.tile.block.samples_of_slots(&slots);
         let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
@@ -578,12 +578,12 @@ impl SimdKernel for EmissionRandomKernel<'_> {
 }
 
 /// Draws the random numbers for Russian roulette.
-struct RouletteSampleKernel<'a> {
+struct RouletteRandomKernel<'a> {
     tile: &'a TileContext<'a>,
     rays: &'a [PathRay],
 }
 
-impl SimdKernel for RouletteSampleKernel<'_> {
+impl SimdKernel for RouletteRandomKernel<'_> {
     type Output = [f32; PACKET_SIZE];
 
     #[inline(always)]
@@ -592,7 +592,7 @@ impl SimdKernel for RouletteSampleKernel<'_> {
         for (i, ray) in self.rays.iter().enumerate().take(PACKET_SIZE) {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
-        let (xs, ys, samples) = self.tile.block.samples_of(&slots);
+        let (xs, ys, samples) = self.tile.block.samples_of_slots(&slots);
         let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let [risks, _] = sampler.pairs(&paths, Dimension::Roulette, 0, 1);
         risks

@@ -6,7 +6,7 @@ use super::map::{GatherPoint, PhotonMap};
 use super::occlusion::is_occluded;
 use super::reservoir::PhotonPositionAndNormal;
 use super::trials::inverse_coverage;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::PACKET_SIZE;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
@@ -25,7 +25,7 @@ const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
 /// Gathers photons at a packet of vertices.
-pub struct GatherPhotons<'a> {
+pub struct GatherPhotonsKernel<'a> {
     /// Tile context.
     pub tile: &'a TileContext<'a>,
     /// The vertices.
@@ -38,7 +38,7 @@ pub struct GatherPhotons<'a> {
     pub aov: LightAov,
 }
 
-impl SimdKernel for GatherPhotons<'_> {
+impl SimdKernel for GatherPhotonsKernel<'_> {
     type Output = [Vec3x16; 2];
 
     /// Returns the gathered light reflected toward the viewer, before multiplication by the path throughput, and
@@ -47,12 +47,12 @@ impl SimdKernel for GatherPhotons<'_> {
     fn run(self, simd: impl Simd) -> [Vec3x16; 2] {
         let Self { tile, row, maps, depth, aov } = self;
         let mut sums = [[[0.0; PACKET_SIZE]; 3]; 2];
-        let [looks, choices] = row.sampler(tile).pairs(&row.path, Dimension::Gather, 0, 1);
+        let [looks, choices] = row.sampler_packet(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
         let narrow = row.bsdf.narrow_lobe_mask();
-        for i in lane_indices(row.used) {
-            let (_, _, sample) = tile.block.sample_of(row.slot[i]);
+        for i in set_bit_lanes(row.used) {
+            let (_, _, sample) = tile.block.pixel_and_sample(row.slot[i]);
             let pass = maps.pass_for_sample(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.surface_point_and_normal(i);
@@ -150,7 +150,7 @@ fn gather_with_bsdf_per_photon(
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
     let (mut sum, mut total, mut left, mut chosen) = ([Vec3::ZERO; 2], 0.0, random[0], None);
-    map.visit_photons(look, simd, |photon, density| {
+    map.visit_weighted_photons(look, simd, |photon, density| {
         let [shown, wide, all] = row.bsdf.lane_f(i, photon.direction);
         let scale = density * row.adjoint_photon_weight(i, photon.direction);
         sum[0] += shown * photon.flux * scale;

@@ -7,7 +7,7 @@ use crate::math::{DVec2, Vec2};
 
 /// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon whose corners are specified in order. It is 1
 /// if the polygon contains the disk.
-pub fn polygon_weight(corners: &[DVec2]) -> f64 {
+pub fn kernel_integral_over_polygon(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
     let (mut is_around, mut is_beside) = (true, false);
@@ -84,11 +84,11 @@ mod tests {
             let at = |i: i32| (1.0 - (d + (f64::from(i) + 0.5) * step).powi(2)).powf(1.5);
             let exact = 8.0 / (3.0 * std::f64::consts::PI) * (0..steps).map(at).sum::<f64>() * step;
             let far = [(d, -9.0), (40.0, -9.0), (40.0, 9.0), (d, 9.0)].map(|(x, y)| DVec2::new(x, y));
-            let weight = polygon_weight(&far);
+            let weight = kernel_integral_over_polygon(&far);
             assert!((weight - exact).abs() < 1e-6, "distance {d}: got {weight}, expected {exact}");
             let mut mirrored = far;
             mirrored.reverse();
-            assert_eq!(polygon_weight(&mirrored), weight, "for either orientation");
+            assert_eq!(kernel_integral_over_polygon(&mirrored), weight, "for either orientation");
         }
     }
 
@@ -102,14 +102,14 @@ mod tests {
             let of_cell = |i: i32, j: i32| {
                 let at = corner + DVec2::new(f64::from(i), f64::from(j)) * side;
                 let [a, b, c, d] = square(at, side);
-                polygon_weight(&[a, b, c]) + polygon_weight(&[c, d, a])
+                kernel_integral_over_polygon(&[a, b, c]) + kernel_integral_over_polygon(&[c, d, a])
             };
             let cells = || -cells..=cells;
             let sum: f64 = cells().flat_map(|i| cells().map(move |j| of_cell(i, j))).sum();
             assert!((sum - 1.0).abs() < 2e-5, "{side}: {sum}");
         }
-        assert_eq!(polygon_weight(&square(DVec2::splat(-1.5), 3.0)), 1.0);
-        assert_eq!(polygon_weight(&square(DVec2::new(1.0, -4.0), 8.0)), 0.0);
+        assert_eq!(kernel_integral_over_polygon(&square(DVec2::splat(-1.5), 3.0)), 1.0);
+        assert_eq!(kernel_integral_over_polygon(&square(DVec2::new(1.0, -4.0), 8.0)), 0.0);
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
             let from = (place.as_dvec2() - part[0]) / 0.8;
             inside += u32::from(from.min_element() > 0.0 && from.max_element() < 1.0);
         }
-        let (found, exact) = (f64::from(inside) / f64::from(DRAWS), polygon_weight(&part));
+        let (found, exact) = (f64::from(inside) / f64::from(DRAWS), kernel_integral_over_polygon(&part));
         assert!(
             (found - exact).abs() < 4.0 * (exact / f64::from(DRAWS)).sqrt(),
             "got {found}, expected {exact}"

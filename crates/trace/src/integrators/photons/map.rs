@@ -1,11 +1,11 @@
 //! A photon map: photons sorted into the cells of a hashed grid. Because of the hashing, the cells can be as
 //! small as the radius requires. Lookups weight sixteen photons at a time.
 
-use super::packed::{self, PackedDirections};
+use super::packed::{self, PackedDirectionPacket};
 use super::reservoir::{PhotonPositionAndNormal, ReservoirPacket};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 
@@ -32,8 +32,8 @@ const POLL_INTERVAL: usize = 1 << 16;
 #[repr(align(64))]
 struct PhotonBlock {
     point: Vec3x16,
-    normal: PackedDirections,
-    direction: PackedDirections,
+    normal: PackedDirectionPacket,
+    direction: PackedDirectionPacket,
     flux: Vec3x16,
 }
 
@@ -86,13 +86,13 @@ pub struct GatherPoint {
 impl GatherPoint {
     /// The bounding box of a kernel with this radius.
     pub fn kernel_box(&self, radius: f32) -> Aabb {
-        let half = self.half_extents() * radius;
+        let half = self.unit_kernel_half_extents() * radius;
         Aabb { min: self.point - half, max: self.point + half }
     }
 
     /// Half extents of the bounding box of a unit-radius kernel.
     #[inline(always)]
-    fn half_extents(&self) -> Vec3 {
+    fn unit_kernel_half_extents(&self) -> Vec3 {
         let own = self.normal.abs();
         let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
         Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * REACH
@@ -109,7 +109,7 @@ impl PhotonRanges {
     /// Adds a range and merges it with any overlapping ranges, because columns of different cells may have
     /// the same hash.
     #[inline(always)]
-    fn add(&mut self, mut range: [u32; 2]) {
+    fn merge_range(&mut self, mut range: [u32; 2]) {
         if range[0] == range[1] {
             return;
         }
@@ -142,7 +142,7 @@ impl PhotonMap {
         let mut starts = vec![0_u32; mask as usize + 2];
         let mut buckets = Vec::with_capacity(photons.len());
         for photons in photons.chunks(POLL_INTERVAL) {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             for photon in photons {
                 let [x, y, z] = cell_of(photon.point, cells);
                 let bucket = bucket(x, y, z, mask);
@@ -154,11 +154,11 @@ impl PhotonMap {
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let mut next = starts.clone();
         let mut order = vec![0_u32; photons.len()];
         for (part, buckets) in buckets.chunks(POLL_INTERVAL).enumerate() {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             for (number, &bucket) in ((part * POLL_INTERVAL) as u32..).zip(buckets) {
                 let place = &mut next[bucket as usize];
                 order[*place as usize] = number;
@@ -169,7 +169,7 @@ impl PhotonMap {
         let rows = photons.len().div_ceil(PACKET_SIZE);
         let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
-            token.check()?;
+            token.check_pause_and_cancel()?;
             for order in order.chunks(PACKET_SIZE) {
                 let (mut block, mut depth) = (EMPTY, [0; PACKET_SIZE]);
                 for (i, &number) in order.iter().enumerate() {
@@ -184,7 +184,7 @@ impl PhotonMap {
     }
 
     /// All photons, in bucket order.
-    pub fn photons(&self) -> impl Iterator<Item = Photon> + '_ {
+    pub fn iter_photons(&self) -> impl Iterator<Item = Photon> + '_ {
         (0..self.count).map(|number| self.photon(number / PACKET_SIZE, number % PACKET_SIZE))
     }
 
@@ -194,9 +194,9 @@ impl PhotonMap {
         let PhotonBlock { point, normal, direction, flux } = &self.blocks[block];
         Photon {
             point: lane(point, i),
-            direction: packed::unpack_unit(direction[i]),
+            direction: packed::unpack_unit_vector(direction[i]),
             flux: lane(flux, i),
-            normal: packed::unpack_unit(normal[i]),
+            normal: packed::unpack_unit_vector(normal[i]),
             depth: self.depths[block][i],
         }
     }
@@ -249,7 +249,7 @@ impl PhotonMap {
             }
         }
         let chosen = choices
-            .sample_lane_by_weight(random[1])
+            .choose_lane_by_total_weight(random[1])
             .map(|(block, i)| self.position_and_normal(block as usize, i));
         (Vec3::from(sums.map(sum_lanes)) * self.peak_weight(), chosen)
     }
@@ -258,7 +258,7 @@ impl PhotonMap {
     #[inline(always)]
     fn position_and_normal(&self, block: usize, i: usize) -> PhotonPositionAndNormal {
         let PhotonBlock { point, normal, .. } = &self.blocks[block];
-        PhotonPositionAndNormal { point: lane(point, i), normal: packed::unpack_unit(normal[i]) }
+        PhotonPositionAndNormal { point: lane(point, i), normal: packed::unpack_unit_vector(normal[i]) }
     }
 
     /// Number of photons in the kernel around a point.
@@ -279,13 +279,18 @@ impl PhotonMap {
     /// kernel with an integral of 1 over the tangent plane (Silverman, *Density Estimation for Statistics and
     /// Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit_photons(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn visit_weighted_photons(
+        &self,
+        look: &GatherPoint,
+        simd: impl Simd,
+        mut visit: impl FnMut(&Photon, f32),
+    ) {
         let peak = self.peak_weight();
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_in_range(*range) {
                 let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
-                for i in lane_indices(positive_lanes(&weights, simd)) {
+                for i in set_bit_lanes(positive_lanes(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -305,7 +310,7 @@ impl PhotonMap {
         if self.count == 0 {
             return ranges;
         }
-        let half = look.half_extents() * self.radius;
+        let half = look.unit_kernel_half_extents() * self.radius;
         let first = cell_of(look.point - half, self.cells);
         let last = cell_of(look.point + half, self.cells);
         let more = |axis: usize| u32::from(first[axis] != last[axis]);
@@ -316,10 +321,10 @@ impl PhotonMap {
                 let begin = bucket(first[0], y, z, self.mask);
                 let end = begin + run;
                 if end <= self.mask {
-                    ranges.add([self.starts[begin as usize], self.starts[end as usize + 1]]);
+                    ranges.merge_range([self.starts[begin as usize], self.starts[end as usize + 1]]);
                 } else {
-                    ranges.add([self.starts[begin as usize], self.starts[begin as usize + 1]]);
-                    ranges.add([self.starts[0], self.starts[1]]);
+                    ranges.merge_range([self.starts[begin as usize], self.starts[begin as usize + 1]]);
+                    ranges.merge_range([self.starts[0], self.starts[1]]);
                 }
             }
         }
@@ -479,7 +484,7 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit_photons(
+                    map.visit_weighted_photons(
                         &GatherPoint { point, normal, most_depth: 1 },
                         PortableSimd,
                         |photon, density| {
@@ -522,7 +527,7 @@ mod tests {
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
             let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
-            map.visit_photons(&look, PortableSimd, |_, density| sum += density * step * step);
+            map.visit_weighted_photons(&look, PortableSimd, |_, density| sum += density * step * step);
             let flux =
                 f64::from(map.irradiance_and_chosen_photon(&look, [0.5; 2], PortableSimd).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "got {flux}, expected {sum}");

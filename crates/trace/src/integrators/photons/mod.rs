@@ -55,10 +55,10 @@ use crate::integrators::behavior::PathBehavior;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
 use crate::integrators::transport::interiors::Interior;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
-use crate::lights::{BoundingSphere, PhotonSource};
+use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, photon_source};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, scene_photon_source};
 use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -83,7 +83,7 @@ pub struct PhotonMapper {
     /// Maximum number of bounces per photon before it is gathered.
     most_depth: u32,
     /// Source of the photons. `None` if the scene has no mirrors or glass.
-    emission: Option<PhotonSource>,
+    emission: Option<PhotonEmitter>,
     /// Closed glass shapes that may contain lights.
     glasses: Vec<u32>,
     /// Other glass solids that may contain lights.
@@ -107,7 +107,7 @@ pub struct PhotonPass {
 
 impl PhotonPass {
     /// Number of stored photons.
-    pub fn photon_count(&self) -> u64 {
+    pub fn stored_photon_count(&self) -> u64 {
         (self.caustic.len() + self.bounced.len()) as u64
     }
 
@@ -148,10 +148,10 @@ impl PhotonMapper {
     ) -> Result<(Self, PhotonPass), Cancelled> {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::from_world(world);
-        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.has_any());
+        let emission = scene_photon_source(&world.geometry, &world.lights).filter(|_| specular.has_any());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
-        let (glasses, bodies) = glass_that_may_contain_lights(world);
+        let (glasses, bodies) = light_enclosing_glass_candidates(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
         let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
@@ -285,7 +285,7 @@ impl PhotonMapper {
         let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
-                token.check()?;
+                token.check_pause_and_cancel()?;
                 all.extend_from_slice(of(chunk));
             }
             Ok(all)
@@ -357,11 +357,11 @@ fn radius_for_neighbor_count(
 }
 
 /// Closed glass shapes and other glass solids that may contain lights.
-fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
-    let lamps = world.light_boxes();
+fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
+    let lamps = world.finite_light_boxes();
     let may_hold_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
+        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.may_intersect_box(&bounds)))
     };
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
@@ -371,7 +371,9 @@ fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
-        lamps.iter().any(|lamp| lamp.meets(&body.bounds) || body.is_covered && is_around(body, lamp))
+        lamps
+            .iter()
+            .any(|lamp| lamp.may_intersect_box(&body.bounds) || body.is_covered && is_around(body, lamp))
     });
     (closed, bodies)
 }

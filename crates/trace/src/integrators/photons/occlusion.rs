@@ -31,8 +31,9 @@ pub fn is_occluded(
         let above = lift * radius;
         [look.point + above * look.normal, photon.point + above * photon.normal]
     };
-    let is_blocked =
-        |from, to| geometry.is_occluded_except_by_light(&Ray::segment(from, to), LightGeometry::Nothing);
+    let is_blocked = |from, to| {
+        geometry.is_occluded_except_by_light(&Ray::segment_ending_before(from, to), LightGeometry::Nothing)
+    };
     let [from, to] = lifted(ABOVE);
     if !is_blocked(from, to) {
         return false;

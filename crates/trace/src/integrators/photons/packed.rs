@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Vec3x16};
 
 /// Sixteen encoded directions.
-pub type PackedDirections = [u32; PACKET_SIZE];
+pub type PackedDirectionPacket = [u32; PACKET_SIZE];
 
 /// Half the side length of the square onto which directions are mapped.
 const SIDE: f32 = 32767.0;
@@ -20,14 +20,14 @@ pub fn pack_direction(direction: Vec3) -> u32 {
 
 /// Decodes a unit vector.
 #[inline(always)]
-pub fn unpack_unit(packed: u32) -> Vec3 {
+pub fn unpack_unit_vector(packed: u32) -> Vec3 {
     let [x, y, z] = unpack_unnormalized_vector(packed);
     Vec3::new(x, y, z).normalize()
 }
 
 /// Decodes vectors without normalizing them. Their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
-pub fn unpack_unnormalized_lanes(packed: &PackedDirections) -> Vec3x16 {
+pub fn unpack_unnormalized_lanes(packed: &PackedDirectionPacket) -> Vec3x16 {
     let mut vectors = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         let [x, y, z] = unpack_unnormalized_vector(packed[i]);
@@ -62,9 +62,9 @@ mod tests {
         for direction in some.into_iter().filter_map(Vec3::try_normalize) {
             let packed = pack_direction(direction);
             assert!(
-                (unpack_unit(packed) - direction).length() < 7e-5,
+                (unpack_unit_vector(packed) - direction).length() < 7e-5,
                 "{direction}: {}",
-                unpack_unit(packed)
+                unpack_unit_vector(packed)
             );
             let long = unpack_unnormalized_lanes(&[packed; PACKET_SIZE]);
             let first = Vec3::new(long[0][0], long[1][0], long[2][0]);

@@ -2,7 +2,7 @@
 
 use super::ray::PathRay;
 use crate::integrators::layers::{LayerValues, SampleLayer};
-use crate::integrators::view::{LightAov, RadianceComponents};
+use crate::integrators::view::{LightAov, RadianceComponentMask};
 use crate::math::Vec3;
 
 /// A contribution other than reflected light.
@@ -120,10 +120,10 @@ impl Accumulator<'_> {
     }
 
     /// Radiance components to accumulate.
-    fn components_to_accumulate(&self) -> RadianceComponents {
+    fn components_to_accumulate(&self) -> RadianceComponentMask {
         match self.aov {
             LightAov::Radiance(parts) => parts,
-            LightAov::LitFraction | LightAov::TraversalCost => RadianceComponents::NONE,
+            LightAov::LitFraction | LightAov::TraversalCost => RadianceComponentMask::NONE,
         }
     }
 

@@ -3,10 +3,10 @@
 use super::tile::TileContext;
 use super::vertex::ShadingVertex;
 use crate::geometry::Ray;
-use crate::geometry::packet::lane_indices;
-use crate::integrators::view::{LightAov, RadianceComponents};
+use crate::geometry::packet::set_bit_lanes;
+use crate::integrators::view::{LightAov, RadianceComponentMask};
 use crate::materials::bsdf::BsdfValues;
-use crate::materials::bxdf::SurfaceDirections;
+use crate::materials::bxdf::ShadingGeometry;
 use crate::materials::{BsdfPacket, BxdfKind};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
@@ -90,7 +90,7 @@ impl VertexBatch {
     /// Mask of vertices whose highlights are too narrow for reliable light sampling.
     pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
-            LightAov::Radiance(RadianceComponents { specular, .. }) => specular,
+            LightAov::Radiance(RadianceComponentMask { specular, .. }) => specular,
             LightAov::LitFraction => false,
             LightAov::TraversalCost => true,
         };
@@ -108,14 +108,14 @@ impl VertexBatch {
 
     /// Returns the vertices' samplers.
     #[inline(always)]
-    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
+    pub fn sampler_packet(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
         let mut is_run = true;
         for i in 0..PACKET_SIZE {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) =
-            if is_run { block.samples_of_consecutive_slots(slots[0]) } else { block.samples_of(slots) };
+            if is_run { block.samples_of_consecutive_slots(slots[0]) } else { block.samples_of_slots(slots) };
         SamplerPacket::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
@@ -150,7 +150,7 @@ impl VertexBatch {
     }
 
     /// Copies a vertex from another packet with the same kind of BSDF. Neither packet may be two-sided.
-    pub fn copy_vertex(&mut self, i: usize, other: &Self, from: usize) {
+    pub fn copy_vertex_from(&mut self, i: usize, other: &Self, from: usize) {
         BatchVertex::get(other, from).set(self, i);
         self.bsdf.copy_lane(i, &other.bsdf, from);
         self.is_perturbed |= other.is_perturbed;
@@ -194,7 +194,7 @@ impl VertexBatch {
             ..BatchVertex::default()
         }
         .set(self, i);
-        let directions = SurfaceDirections { normal, wo: vertex.wo, tangent: vertex.tangent() };
+        let directions = ShadingGeometry { normal, wo: vertex.wo, tangent: vertex.tangent() };
         self.bsdf.set_bsdf(i, bsdf, aov.lobes(), &directions);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;
@@ -267,7 +267,7 @@ impl VertexBatch {
     }
 
     /// Whether a direction is below the horizon of a vertex.
-    pub fn is_below_horizon(&self, i: usize, direction: Vec3) -> bool {
+    pub fn is_direction_below_horizon(&self, i: usize, direction: Vec3) -> bool {
         self.has_horizon & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
     }
 
@@ -320,7 +320,7 @@ impl VertexBatch {
 
     /// Whether any vertex is in glass.
     pub fn has_vertex_in_glass(&self) -> bool {
-        lane_indices(self.used).any(|i| self.interiors[i] != 0)
+        set_bit_lanes(self.used).any(|i| self.interiors[i] != 0)
     }
 
     /// Mask of lanes whose direction is below the vertex's horizon.
@@ -382,8 +382,8 @@ mod tests {
         let plain = VertexBatch { used: ALL, ..VertexBatch::empty() };
         let mut row = noisy;
         row.retain_lanes(0b11);
-        row.copy_vertex(2, &plain, 7);
-        row.copy_vertex(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
+        row.copy_vertex_from(2, &plain, 7);
+        row.copy_vertex_from(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
         let bits = [
             row.used,
             row.has_horizon,

@@ -99,7 +99,7 @@ impl TileContext<'_> {
         for lane in 0..PACKET_SIZE {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
-            let place = settings.pixel_to_camera(place);
+            let place = settings.pixel_to_image_plane(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
         // Generate rays through these positions, from points on the lens if it has an aperture.
@@ -167,13 +167,13 @@ mod tests {
             for first in [0, 1, 2, 15, 33] {
                 let (xs, ys, samples) = block.samples_of_consecutive_slots(first);
                 for lane in 0..PACKET_SIZE {
-                    let place = block.sample_of(first + lane as u32);
+                    let place = block.pixel_and_sample(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
                 }
                 let slots = std::array::from_fn(|lane| first + 7 * lane as u32);
-                let (xs, ys, samples) = block.samples_of(&slots);
+                let (xs, ys, samples) = block.samples_of_slots(&slots);
                 for lane in 0..PACKET_SIZE {
-                    let place = block.sample_of(slots[lane]);
+                    let place = block.pixel_and_sample(slots[lane]);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + 7 * {lane}");
                 }
             }

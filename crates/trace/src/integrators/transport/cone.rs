@@ -26,7 +26,7 @@ pub enum SpecularEvent {
 impl RayCone {
     /// Returns the beam at a distance along the ray.
     #[inline(always)]
-    pub fn at_distance(self, distance: f32) -> Self {
+    pub fn propagated_by(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, ..self }
     }
 
@@ -63,15 +63,15 @@ mod tests {
         // A concave mirror of radius 3 focuses at distance 3/2; a convex mirror of radius 2 has a virtual focus at
         // distance 1.
         let concave = PARALLEL.after_specular(SpecularEvent::Reflected, -1.0 / 3.0, 1.0);
-        assert!(concave.at_distance(1.5).width.abs() < 1e-8);
+        assert!(concave.propagated_by(1.5).width.abs() < 1e-8);
         let convex = PARALLEL.after_specular(SpecularEvent::Reflected, 0.5, 1.0);
         assert!(
-            convex.at_distance(-1.0).width.abs() < 1e-8
-                && (convex.at_distance(1.0).width - 0.04).abs() < 1e-8
+            convex.propagated_by(-1.0).width.abs() < 1e-8
+                && (convex.propagated_by(1.0).width - 0.04).abs() < 1e-8
         );
         // A surface of radius 2 on glass with an index of 1.5 focuses at nR/(n − 1).
         let glass = PARALLEL.after_specular(SpecularEvent::Refracted(1.5), 0.5, 1.0);
-        assert!(glass.at_distance(6.0).width.abs() < 1e-7);
+        assert!(glass.propagated_by(6.0).width.abs() < 1e-7);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::vertex::SurfaceVertex;
 use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, Hit, OffsetPoints};
 
 /// Surfaces and media crossed by a ray at a hit on glass.
-pub struct Crossing {
+pub struct InterfaceCrossing {
     /// Origins for rays leaving on either side.
     pub sides: OffsetPoints,
     /// The medium traversed by the ray, and the medium on the near side. `None` if both are the ray's
@@ -32,29 +32,29 @@ pub struct GlassBoundary {
 
 /// Buffers for the search for coincident surfaces.
 #[derive(Default)]
-pub struct CrossingBuffers {
+pub struct CoincidentSurfaceBuffers {
     around: CoincidenceScratch,
     near: Vec<CoincidentOrEnclosingSurface>,
 }
 
 impl TileContext<'_> {
     /// Finds all surfaces that a ray crosses at a hit on glass.
-    pub fn find_crossing(
+    pub fn find_interface_crossing(
         &self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
         hit: &Hit,
-        memory: &mut CrossingBuffers,
-    ) -> Crossing {
-        let CrossingBuffers { around, near: found } = memory;
+        memory: &mut CoincidentSurfaceBuffers,
+    ) -> InterfaceCrossing {
+        let CoincidentSurfaceBuffers { around, near: found } = memory;
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = CoincidenceQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
-        let sides = self.world.find_coincident_surfaces(&meeting, around, |near| found.push(near));
-        let (before, far) = self.crossing_interiors(&path.interiors, found);
+        let sides = self.world.find_coincident_surfaces_at(&meeting, around, |near| found.push(near));
+        let (before, far) = self.media_on_both_sides(&path.interiors, found);
         let opaque = found.iter().filter_map(|near| self.hit_if_opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
-        Crossing { sides, before, far, opaque }
+        InterfaceCrossing { sides, before, far, opaque }
     }
 
     /// Media before and beyond the coincident surfaces. The near medium is the medium recorded for the ray.
@@ -63,7 +63,7 @@ impl TileContext<'_> {
     /// enters or leaves them here, because it is unknown whether the ray is inside other open solids. A ray
     /// and its reverse therefore see the same media. The returned pair contains the medium that the ray
     /// traversed and the medium on the near side. It is `None` if both match the record.
-    fn crossing_interiors(
+    fn media_on_both_sides(
         &self,
         known: &InteriorList,
         found: &[CoincidentOrEnclosingSurface],
@@ -81,7 +81,7 @@ impl TileContext<'_> {
             }
         }
         // Start with the recorded media, without open solids.
-        let (mut arrived, mut near) = (*known, self.without_open_glass(*known));
+        let (mut arrived, mut near) = (*known, self.interiors_without_open_solids(*known));
         let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
@@ -122,7 +122,7 @@ impl TileContext<'_> {
         &self,
         hit: &Hit,
         [near, far]: [&InteriorList; 2],
-        memory: &CrossingBuffers,
+        memory: &CoincidentSurfaceBuffers,
     ) -> Option<GlassBoundary> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
@@ -142,7 +142,7 @@ impl TileContext<'_> {
     }
 
     /// Removes the open solids from a medium.
-    pub fn without_open_glass(&self, interiors: InteriorList) -> InteriorList {
+    pub fn interiors_without_open_solids(&self, interiors: InteriorList) -> InteriorList {
         if self.world.has_open_glass() {
             return interiors.retained(|glass| !self.world.is_open_solid(glass.body));
         }

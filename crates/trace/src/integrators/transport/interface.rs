@@ -3,7 +3,7 @@
 use super::cone::SpecularEvent;
 use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
-use super::vertex::{ShadingNormals, SurfaceVertex};
+use super::vertex::{PerturbedAndSmoothNormals, SurfaceVertex};
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
@@ -22,7 +22,7 @@ pub const PASSED: u32 = 4;
 pub fn reflected_path(
     path: &PathRay,
     vertex: &SurfaceVertex<'_>,
-    shading: &ShadingNormals,
+    shading: &PerturbedAndSmoothNormals,
     reflectance: Vec3,
 ) -> PathRay {
     let incident = path.ray.direction;
@@ -63,7 +63,7 @@ pub fn fresnel_split(
     world: &World,
     path: &PathRay,
     vertex: &SurfaceVertex<'_>,
-    shading: &ShadingNormals,
+    shading: &PerturbedAndSmoothNormals,
     far: &InteriorList,
 ) -> FresnelSplit {
     let eta = medium_ior(world, far) / medium_ior(world, &path.interiors);
@@ -85,7 +85,7 @@ pub fn fresnel_split(
 /// be inside its medium.
 fn reflectance_and_refraction(
     vertex: &SurfaceVertex<'_>,
-    shading: &ShadingNormals,
+    shading: &PerturbedAndSmoothNormals,
     incident: Vec3,
     eta: f32,
 ) -> (f32, Option<Vec3>) {

@@ -100,12 +100,12 @@ impl InteriorLists {
     }
 
     /// Whether all lists are empty.
-    pub fn are_air(&self) -> bool {
+    pub fn are_all_air(&self) -> bool {
         self.inside.is_empty()
     }
 
     /// Stores a list and returns its index.
-    pub fn insert(&mut self, interiors: &InteriorList) -> u32 {
+    pub fn push_list(&mut self, interiors: &InteriorList) -> u32 {
         if interiors.is_air() {
             return 0;
         }
@@ -124,7 +124,7 @@ impl InteriorLists {
 #[inline]
 pub fn medium_transmittance(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
     let glass = interiors.glass().and_then(|inside| dielectric_of_interior(world, inside));
-    glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
+    glass.map_or(Vec3::ONE, |glass| glass.interior_transmittance(distance))
 }
 
 /// Index of refraction of a ray's medium.

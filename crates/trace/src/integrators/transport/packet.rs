@@ -135,7 +135,7 @@ impl PacketHits {
     }
 
     /// Radiance of the environment along a ray that leaves the scene, and its light-sampling pdf in sr⁻¹.
-    pub fn sky_radiance(&self, lane_of_ray: usize) -> (Vec3, f32) {
+    pub fn sky_radiance_and_pdf(&self, lane_of_ray: usize) -> (Vec3, f32) {
         (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
@@ -151,7 +151,7 @@ impl TileContext<'_> {
         are_lit: bool,
         (row, surface): (&mut VertexBatch, &mut SurfacePacket),
     ) -> PacketHits {
-        self.world.geometry.instruction_set().run(PacketIntersection {
+        self.world.geometry.instruction_set().run(PacketIntersector {
             tile: self,
             rays,
             aov,
@@ -166,20 +166,20 @@ impl TileContext<'_> {
     #[inline(always)]
     fn can_shade_material_in_packet(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
-        self.pixel_spread == 0.0 && !self.world.is_textured(material)
+        self.pixel_spread == 0.0 && !self.world.material_needs_uvs_or_tangents(material)
     }
 
     /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
     #[inline(always)]
     pub fn plain_packet_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
-        let (plain, rough) = self.world.packet_material_and_bsdf(material)?;
+        let (plain, rough) = self.world.material_for_packet_shading(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
     }
 }
 
-struct PacketIntersection<'a> {
+struct PacketIntersector<'a> {
     tile: &'a TileContext<'a>,
     rays: PacketSource<'a>,
     aov: LightAov,
@@ -200,7 +200,7 @@ struct PlainSurfaceMasks {
     lookups: u64,
 }
 
-impl SimdKernel for PacketIntersection<'_> {
+impl SimdKernel for PacketIntersector<'_> {
     type Output = PacketHits;
 
     #[inline(always)]
@@ -236,7 +236,7 @@ impl SimdKernel for PacketIntersection<'_> {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
                 world.geometry.closest_hit_packet_simd(rows, &mut ends, traced, simd)
             }
-            PacketSource::Traced(_, known, places) => gather_known_hits(known, places),
+            PacketSource::Traced(_, known, places) => gather_hit_packet(known, places),
         };
         // Select the rays in air, whose surfaces may be plain.
         *self.surface = SurfacePacket::EMPTY;
@@ -279,7 +279,7 @@ impl SimdKernel for PacketIntersection<'_> {
     }
 }
 
-impl PacketIntersection<'_> {
+impl PacketIntersector<'_> {
     /// Stores the plain surfaces among the hits in `left` in the surface packet, and their BSDFs in the
     /// vertex packet.
     #[inline(always)]
@@ -295,7 +295,7 @@ impl PacketIntersection<'_> {
         while left != 0 {
             let (id, of_object) = lanes_matching_first(object, left, simd);
             left &= !of_object;
-            if tile.world.are_vertex_colors_used(id) {
+            if tile.world.object_uses_vertex_colors(id) {
                 continue;
             }
             // Skip materials that are not plain. The first plain material determines the kind of all BSDFs.
@@ -330,7 +330,7 @@ impl PacketIntersection<'_> {
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     row.set_start_triangles(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
-                    if !surface.fill(shape, rows, hits, of) {
+                    if !surface.compute_surface_points(shape, rows, hits, of) {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
                     }
@@ -371,7 +371,7 @@ fn lanes_matching_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd
 
 /// Gathers the previously found hits at these queue indices into a packet.
 #[inline(always)]
-fn gather_known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
+fn gather_hit_packet(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
     let (mut hits, mut object) = (HitPacket::without_hits(), [u32::MAX; PACKET_SIZE]);
     for (lane, &place) in places.iter().enumerate().take(PACKET_SIZE) {
         if let Some(hit) = &known[place as usize] {
@@ -413,7 +413,7 @@ impl TileContext<'_> {
                 continue;
             }
             let is_filled = match thing {
-                Object::Shape(shape) => surface.fill(shape, rows, hits, of),
+                Object::Shape(shape) => surface.compute_surface_points(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
                     mesh.fill_surfaces(surface, rows, hits, of, None, simd);
                     true
@@ -444,7 +444,7 @@ impl VertexBatch {
 
     /// Sets shading normals and lifted origins in the lanes of smooth surfaces.
     #[inline(always)]
-    fn set_smooth_normals(
+    fn set_smooth_normals_and_lifts(
         &mut self,
         rays: &RayPacket,
         surface: &SurfacePacket,
@@ -525,7 +525,7 @@ impl VertexBatch {
         self.bsdf.set_normals_and_directions(None, &mut self.normal, &rays.direction);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
-            self.set_smooth_normals(rays, surface, lifts, simd);
+            self.set_smooth_normals_and_lifts(rays, surface, lifts, simd);
         }
         // Copy the path state.
         match paths {

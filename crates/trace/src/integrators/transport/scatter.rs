@@ -8,7 +8,7 @@ use super::interiors::InteriorLists;
 use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
-use crate::geometry::packet::lane_indices;
+use crate::geometry::packet::set_bit_lanes;
 use crate::materials::bsdf::{DielectricSamplePacket, SampledLobes};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
@@ -65,7 +65,7 @@ impl ContinuationPolicy {
 }
 
 /// Samples the BSDFs of a packet of vertices to continue the paths.
-pub struct SampleBsdf<'a> {
+pub struct BsdfSampler<'a> {
     /// Tile context.
     pub tile: &'a TileContext<'a>,
     /// The vertices.
@@ -101,7 +101,7 @@ pub struct ScatteredDirections {
     diffuse: Vec3x16,
 }
 
-impl SampleBsdf<'_> {
+impl BsdfSampler<'_> {
     /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media at the vertices.
     /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index. `fractions` is
     /// required if `has_fractions`.
@@ -117,7 +117,7 @@ impl SampleBsdf<'_> {
         let scattered = self.tile.world.geometry.instruction_set().run(self);
         let of_lobe = |pdf: f32| move |cone: &RayCone| cone.scattered(pdf);
         // Queue the paths that continue.
-        next.extend(lane_indices(scattered.alive).map(|i| {
+        next.extend(set_bit_lanes(scattered.alive).map(|i| {
             let (from, interiors, normal) = if scattered.beyond & 1 << i == 0 {
                 (&row.from, row.interiors[i], lane(&row.normal, i))
             } else {
@@ -143,7 +143,7 @@ impl SampleBsdf<'_> {
             path
         }));
         if let Some(DiffuseFractions { current, next }) = fractions {
-            next.extend(lane_indices(scattered.alive).map(|i| {
+            next.extend(set_bit_lanes(scattered.alive).map(|i| {
                 if row.only_specular_before & 1 << i != 0 {
                     lane(&scattered.diffuse, i)
                 } else {
@@ -154,13 +154,13 @@ impl SampleBsdf<'_> {
     }
 }
 
-impl SimdKernel for SampleBsdf<'_> {
+impl SimdKernel for BsdfSampler<'_> {
     type Output = ScatteredDirections;
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> ScatteredDirections {
         let Self { tile, row, used, continuation, .. } = self;
-        let sampler = row.sampler(tile);
+        let sampler = row.sampler_packet(tile);
         // Sample a direction at each vertex.
         let u = sampler.pairs(&row.path, Dimension::Direction, 0, 1);
         let are_narrow = row.bsdf.has_narrow_lobes();
@@ -172,7 +172,7 @@ impl SimdKernel for SampleBsdf<'_> {
         let sides = if row.has_two_sides { row.bsdf.sample_either_side(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
             Some(sides) => self.sample_both_sides(&sides, simd),
-            None => self.sample_one_side(&lobe, &u, simd),
+            None => self.sample_viewer_side(&lobe, &u, simd),
         };
         scattered.alive &= used;
         // Apply Russian roulette.
@@ -191,10 +191,10 @@ impl SimdKernel for SampleBsdf<'_> {
     }
 }
 
-impl SampleBsdf<'_> {
+impl BsdfSampler<'_> {
     /// Samples directions on the viewer's side of the vertices.
     #[inline(always)]
-    fn sample_one_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> ScatteredDirections {
+    fn sample_viewer_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> ScatteredDirections {
         let Self { row, continuation, .. } = *self;
         let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.

@@ -1,7 +1,7 @@
 //! Buffers for queues of rays and hits.
 
 use super::camera::CameraRayPacket;
-use super::crossing::CrossingBuffers;
+use super::crossing::CoincidentSurfaceBuffers;
 use super::ray::PathRay;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::world::Hit;
@@ -22,7 +22,7 @@ pub struct TraceBuffers {
     /// Queue indices of the rays, ordered by the object hit.
     pub object_order: HitsByObject,
     /// Buffers for the search for coincident surfaces.
-    pub crossing: CrossingBuffers,
+    pub crossing: CoincidentSurfaceBuffers,
 }
 
 /// Queue indices grouped by the object hit, so that shading a packet takes few loop iterations.
@@ -56,7 +56,7 @@ impl HitsByObject {
     }
 
     /// Returns the grouped queue indices.
-    pub fn indices(&self) -> &[u32] {
+    pub fn grouped_queue_indices(&self) -> &[u32] {
         &self.places
     }
 }
@@ -73,9 +73,9 @@ mod tests {
         let mut object_order = HitsByObject::default();
         for _ in 0..2 {
             object_order.sort(&hits);
-            assert_eq!(object_order.indices(), [2, 6, 0, 3, 7, 4, 1, 5]);
+            assert_eq!(object_order.grouped_queue_indices(), [2, 6, 0, 3, 7, 4, 1, 5]);
         }
         object_order.sort(&[]);
-        assert!(object_order.indices().is_empty());
+        assert!(object_order.grouped_queue_indices().is_empty());
     }
 }

@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::LightSamplingMode;
+use crate::lights::LightSamplingPurpose;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
@@ -56,13 +56,14 @@ impl<'a> TileContext<'a> {
             && render.shadows == ShadowMode::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_constant && world.lights.sampler_for_mode(LightSamplingMode::Eye).is_none();
+        let lobes_find_sky =
+            is_constant && world.lights.sampler_for_mode(LightSamplingPurpose::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
     /// Sampler for a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
-        let (x, y, sample) = self.block.sample_of(slot);
+        let (x, y, sample) = self.block.pixel_and_sample(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
 }
@@ -82,7 +83,7 @@ impl SampleBlock {
     }
 
     /// Returns a slot's column, row and sample index.
-    pub fn sample_of(&self, slot: u32) -> (u32, u32, u32) {
+    pub fn pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
         let (x, y) = self.pixels.image_position(pixel);
@@ -91,13 +92,14 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of slots. Arbitrary for slots without a sample.
     #[inline(always)]
-    pub fn samples_of(
+    pub fn samples_of_slots(
         &self,
         slots: &[u32; PACKET_SIZE],
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let SelectedPixels { rect, part } = self.pixels;
-        let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
+        let (by_samples, by_width) =
+            (FastIntDivisor::new(self.samples.len() as u32), FastIntDivisor::new(rect.width));
         // Compute pixel indices within the subset.
         let mut index = [0; PACKET_SIZE];
         for lane in 0..PACKET_SIZE {
@@ -126,7 +128,7 @@ impl SampleBlock {
         first: u32,
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
-        let (mut x, mut y, mut sample) = self.sample_of(first);
+        let (mut x, mut y, mut sample) = self.pixel_and_sample(first);
         if self.samples.end - sample >= PACKET_SIZE as u32 {
             for lane in 0..PACKET_SIZE {
                 samples[lane] = sample + lane as u32;
@@ -134,7 +136,7 @@ impl SampleBlock {
             return ([x; PACKET_SIZE], [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != PixelSubset::All {
-            return self.samples_of(&array::from_fn(|lane| first + lane as u32));
+            return self.samples_of_slots(&array::from_fn(|lane| first + lane as u32));
         }
         let rect = self.pixels.rect;
         for lane in 0..PACKET_SIZE {
@@ -154,11 +156,11 @@ impl SampleBlock {
 /// Integer division by a constant, computed in `f64` because there are no vector instructions for integer
 /// division.
 #[derive(Clone, Copy)]
-struct Divisor {
+struct FastIntDivisor {
     inverse: f64,
 }
 
-impl Divisor {
+impl FastIntDivisor {
     #[inline(always)]
     fn new(divisor: u32) -> Self {
         Self { inverse: 1.0 / f64::from(divisor) }

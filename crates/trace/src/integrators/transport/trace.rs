@@ -15,7 +15,7 @@ impl TileContext<'_> {
         hits.clear();
         hits.resize(rays.len(), None);
         for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {
-            self.token.check()?;
+            self.token.check_pause_and_cancel()?;
             for (paths, hits) in paths.chunks(PACKET_SIZE).zip(hits.chunks_mut(PACKET_SIZE)) {
                 let rays: [Ray; PACKET_SIZE] =
                     std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);

@@ -48,16 +48,21 @@ pub struct SurfaceVertex<'a> {
 impl<'a> SurfaceVertex<'a> {
     /// Creates the vertex at a hit.
     pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::with_surface(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
+        Self::from_computed_surface(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
     /// Creates the vertex at a hit, computing only what the material needs.
-    pub fn with_needed_attributes(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
+    pub fn from_hit_with_needed_attributes(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::from_ray_hit(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
     /// Creates the vertex at a hit whose surface has already been computed.
-    pub fn with_surface(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
+    pub fn from_computed_surface(
+        tile: &TileContext<'a>,
+        path: &PathRay,
+        hit: &Hit,
+        surface: SurfacePoint,
+    ) -> Self {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
@@ -78,7 +83,8 @@ impl<'a> SurfaceVertex<'a> {
     fn from_ray_hit(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.has_non_delta_lobes();
-        let asked = SurfaceRequest { uv: tile.world.is_textured(index), shadow_point: is_lit };
+        let asked =
+            SurfaceRequest { uv: tile.world.material_needs_uvs_or_tangents(index), shadow_point: is_lit };
         let surface = tile.world.geometry.requested_surface(by, hit, asked);
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
@@ -97,15 +103,15 @@ impl<'a> SurfaceVertex<'a> {
         // Determine the path's side.
         let wo = -path.ray.direction;
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
-        let cone = path.cone.at_distance(distance);
+        let cone = path.cone.propagated_by(distance);
         // Compute the footprint and curvature for ray cones, if used.
         let has_beam = tile.pixel_spread > 0.0;
-        let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
+        let footprint = |tangents| match has_beam && tile.world.is_material_mipmapped(index) {
             true => Footprint::from_ray_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
             false => Footprint::POINT,
         };
         let curvature = match has_beam && material.bsdf.has_delta() {
-            true => side * tile.world.geometry.curvature(hit, &surface),
+            true => side * tile.world.geometry.mean_curvature(hit, &surface),
             false => 0.0,
         };
         Self {
@@ -197,11 +203,11 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// The shading normals on the viewer's side.
-    pub fn shading_normals(&self, counters: &mut RayCounters) -> ShadingNormals {
+    pub fn perturbed_and_smooth_normals(&self, counters: &mut RayCounters) -> PerturbedAndSmoothNormals {
         let normal = self.perturbed_front_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
         let shading_normal_cosine = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
-        ShadingNormals { normal, smooth_normal, shading_normal_cosine }
+        PerturbedAndSmoothNormals { normal, smooth_normal, shading_normal_cosine }
     }
 
     /// Ray cone after specular reflection or refraction.
@@ -214,7 +220,7 @@ impl<'a> SurfaceVertex<'a> {
     pub fn mirror_reflectance(
         &self,
         mirror: &Mirror,
-        shading: &ShadingNormals,
+        shading: &PerturbedAndSmoothNormals,
         is_colored: bool,
         counters: &mut RayCounters,
     ) -> Vec3 {
@@ -227,7 +233,7 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// Fresnel reflectance of a smooth coat at this vertex, using the shading normal.
-    pub fn coat_reflectance(&self, coated: &Coated, shading: &ShadingNormals) -> f32 {
+    pub fn coat_reflectance(&self, coated: &Coated, shading: &PerturbedAndSmoothNormals) -> f32 {
         coated.fresnel(shading.normal.dot(self.wo).abs().min(1.0))
     }
 
@@ -315,7 +321,7 @@ pub struct ShadowOriginLiftSegment {
     pub end: f32,
 }
 
-impl ShadingNormals {
+impl PerturbedAndSmoothNormals {
     /// Returns the normals on the other side.
     pub fn far_side(&self) -> Self {
         Self {
@@ -327,7 +333,7 @@ impl ShadingNormals {
 }
 
 /// Shading normals on the viewer's side.
-pub struct ShadingNormals {
+pub struct PerturbedAndSmoothNormals {
     /// The interpolated normal, perturbed by the normal or bump map.
     pub normal: Vec3,
     /// The interpolated normal.
@@ -347,7 +353,7 @@ pub struct ShadingVertex<'a> {
     /// The vertex to shade.
     pub vertex: &'a SurfaceVertex<'a>,
     /// Shading normals of the vertex.
-    pub shading: ShadingNormals,
+    pub shading: PerturbedAndSmoothNormals,
     /// BSDF of the vertex.
     pub bsdf: &'a BxdfPoint,
 }

@@ -4,7 +4,7 @@
 //! Thin panes and stochastically transparent surfaces are null interactions. They change neither the path
 //! vertex nor its pdf, just as for shadow rays.
 
-use super::crossing::{Crossing, CrossingBuffers};
+use super::crossing::{CoincidentSurfaceBuffers, InterfaceCrossing};
 use super::interface::PASSED;
 use super::interiors::{InteriorList, medium_ior, medium_transmittance};
 use super::ray::PathRay;
@@ -23,7 +23,7 @@ pub const MAX_PASSED_SURFACES: usize = 64;
 /// The interaction at which a walk ends.
 pub enum Interaction<'v, 'a> {
     /// An opaque surface, and the medium behind it.
-    Opaque(&'v SurfaceVertex<'a>, OpaqueHit, &'v InteriorList),
+    Opaque(&'v SurfaceVertex<'a>, DirectOrCoincidentHit, &'v InteriorList),
     /// A boundary between media, at a hit on glass.
     Glass(&'v SurfaceVertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
@@ -47,7 +47,7 @@ pub trait PathStepper<'a> {
     fn tile(&self) -> &'a TileContext<'a>;
 
     /// Buffers for the search for coincident surfaces.
-    fn crossing_buffers(&mut self) -> &mut CrossingBuffers;
+    fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers;
 
     /// Records that the path crossed a surface. `next` is the next hit behind the surface.
     fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>);
@@ -65,7 +65,7 @@ pub trait PathStepper<'a> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        hit: OpaqueHit,
+        hit: DirectOrCoincidentHit,
         pane: &ThinDielectric,
     ) -> NullInteraction;
 }
@@ -116,7 +116,7 @@ impl Segment {
 
 /// Hit on an opaque surface.
 #[derive(Clone, Copy, Debug)]
-pub enum OpaqueHit {
+pub enum DirectOrCoincidentHit {
     /// The ray hits the surface itself.
     Direct(Hit),
     /// The surface is coincident with glass that the ray hits.
@@ -136,8 +136,8 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     while hidden < MAX_PASSED_SURFACES {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
-            Some(surface) => SurfaceVertex::with_surface(tile, path, &hit, surface),
-            None => SurfaceVertex::with_needed_attributes(tile, path, &hit),
+            Some(surface) => SurfaceVertex::from_computed_surface(tile, path, &hit, surface),
+            None => SurfaceVertex::from_hit_with_needed_attributes(tile, path, &hit),
         };
         // Stop if the surface is opaque. Otherwise, cross it as a null interaction.
         if vertex.material.bsdf.as_dielectric().is_none() {
@@ -166,12 +166,13 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 }
             }
             if tile.world.has_open_glass() {
-                path.interiors = tile.without_open_glass(path.interiors);
+                path.interiors = tile.interiors_without_open_solids(path.interiors);
             }
             let mut far = path.interiors;
             if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
                 // The path may be inside glass that touches the surface.
-                let crossing = tile.find_crossing(path, &vertex, &hit, stepper.crossing_buffers());
+                let crossing =
+                    tile.find_interface_crossing(path, &vertex, &hit, stepper.coincident_surface_buffers());
                 if let Some([_, near]) = crossing.before {
                     path.interiors = near;
                 }
@@ -181,13 +182,13 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             let hit = way.rebase_to_last_vertex(path, hit);
             return stepper.interact(
                 path,
-                Interaction::Opaque(&vertex, OpaqueHit::Direct(hit), &far),
+                Interaction::Opaque(&vertex, DirectOrCoincidentHit::Direct(hit), &far),
                 has_passed,
             );
         }
         // At glass, find all coincident surfaces.
-        let Crossing { sides, before, far, opaque } =
-            tile.find_crossing(path, &vertex, &hit, stepper.crossing_buffers());
+        let InterfaceCrossing { sides, before, far, opaque } =
+            tile.find_interface_crossing(path, &vertex, &hit, stepper.coincident_surface_buffers());
         let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
         path.throughput *= medium_transmittance(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
@@ -200,7 +201,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_to_last_vertex(path, touched);
-                let reached = Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
+                let reached = Interaction::Opaque(&vertex, DirectOrCoincidentHit::Touching(touched), &far);
                 return stepper.interact(path, reached, has_passed);
             }
             path.path = path.continuation_path_number(PASSED);
@@ -210,7 +211,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         if near.glass() != far.glass() && medium_ior(tile.world, near) != medium_ior(tile.world, &far) {
             vertex.set_offset_points(sides);
             let rough = if tile.world.has_rough_glass() {
-                rough_boundary(stepper, path, (&vertex, &hit), (sides, &far))
+                rough_dielectric_point(stepper, path, (&vertex, &hit), (sides, &far))
             } else {
                 None
             };
@@ -224,7 +225,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         // Otherwise, cross the surface.
         (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.after_crossing_inside_glass();
-        path.cone = path.cone.at_distance(hit.shape.t);
+        path.cone = path.cone.propagated_by(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
         let next = tile.world.geometry.closest_hit(&path.ray);
         stepper.record_surface_crossing(path, next);
@@ -239,7 +240,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
 /// Rough surface between two media with different indices of refraction. `None` if the surface is smooth.
 #[cold]
 #[inline(never)]
-fn rough_boundary<'a, W: PathStepper<'a>>(
+fn rough_dielectric_point<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     (vertex, hit): (&SurfaceVertex<'a>, &Hit),
@@ -248,7 +249,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
-    let boundary = tile.boundary(hit, interior_lists, stepper.crossing_buffers())?;
+    let boundary = tile.boundary(hit, interior_lists, stepper.coincident_surface_buffers())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
@@ -274,8 +275,8 @@ fn null_interaction<'a, W: PathStepper<'a>>(
         Bsdf::ThinDielectric(pane) => {
             let mut whole = *path;
             let hit = way.rebase_to_last_vertex(&mut whole, hit);
-            whole.interiors = stepper.tile().without_open_glass(whole.interiors);
-            stepper.handle_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
+            whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
+            stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
         }
         Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
             NullInteraction::Opaque
@@ -343,7 +344,7 @@ impl TileContext<'_> {
     ) -> Option<(PathRay, Hit)> {
         let (mut path, mut hit) = (*path, *hit);
         for _ in 0..=MAX_NULL_INTERACTIONS {
-            let vertex = SurfaceVertex::with_needed_attributes(self, &path, &hit);
+            let vertex = SurfaceVertex::from_hit_with_needed_attributes(self, &path, &hit);
             if stochastic_opacity_test(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }

@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassParts, MeshGlass, RimEdge, object_glass_triangles};
+use super::parts::{GlassParts, MeshGlass, RimEdge, classify_object_glass};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -38,7 +38,7 @@ pub(super) fn covered_rim_fractions(
     holes: &[&[RimEdge]],
     token: &CancelToken,
 ) -> Result<Vec<f64>, Cancelled> {
-    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| select_rim_edges(rims)).collect();
+    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| subsample_rim_edges(rims)).collect();
     let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
         return Ok(vec![0.0; holes.len()]);
@@ -58,7 +58,7 @@ pub(super) fn covered_rim_fractions(
 }
 
 /// Returns evenly spaced edges of a hole, at most `MAX_RIM_EDGES`.
-fn select_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
+fn subsample_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
     let step = rims.len().div_ceil(MAX_RIM_EDGES).max(1);
     rims.iter().step_by(step).collect()
 }
@@ -87,7 +87,7 @@ fn rim_edge_queries<'a>(
 }
 
 impl OpaqueQuery {
-    fn bounds(&self) -> Aabb {
+    fn search_box(&self) -> Aabb {
         match *self {
             Self::Way(way) => Aabb::from_points_f64([way.origin, way.at(way.t_max)]),
             Self::Point(point, reach) => Aabb::from_points_f64([point - reach, point + reach]),
@@ -124,16 +124,16 @@ fn evaluate_queries(
     queries: &[OpaqueQuery],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Cancelled> {
-    let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::bounds).collect();
+    let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::search_box).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
     // Use a tree over the queries because there are many queries and many surfaces.
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if object_glass_triangles(scene, meshes, object) == Some(MeshGlass::All) {
+        if classify_object_glass(scene, meshes, object) == Some(MeshGlass::All) {
             continue;
         }
-        token.check()?;
+        token.check_pause_and_cancel()?;
         match object.shape.lowered(origin) {
             LoweredShape::Shape(shape) => {
                 let around = shape.bounds().unwrap_or(all);
@@ -143,7 +143,7 @@ fn evaluate_queries(
                 });
             }
             LoweredShape::Mesh(placed) => {
-                for corners in placed_triangles(placed, meshes[placed.file], origin) {
+                for corners in triangles_relative_to(placed, meshes[placed.file], origin) {
                     let around = Aabb::from_points_f64(corners);
                     if around.overlaps(&all) {
                         tree.visit_overlapping(&around, |id| {
@@ -159,7 +159,7 @@ fn evaluate_queries(
 }
 
 /// Returns the triangles of a placed mesh, in coordinates relative to `origin`.
-pub(super) fn placed_triangles<'a>(
+pub(super) fn triangles_relative_to<'a>(
     placed: &MeshReference,
     loaded: &'a LoadedMesh,
     origin: DVec3,

@@ -1,6 +1,6 @@
 //! Cavities: closed meshes with inward-facing fronts inside another solid of the same glass.
 
-use super::caps::placed_triangles;
+use super::caps::triangles_relative_to;
 use super::parts::GlassMediumKey;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -38,7 +38,7 @@ pub(super) fn cavities(
 ) -> Result<Vec<(usize, usize)>, Cancelled> {
     let corners_of = |object: u32| {
         let mesh = scene.objects[object as usize].shape.mesh();
-        mesh.into_iter().flat_map(|mesh| placed_triangles(mesh, meshes[mesh.file], origin))
+        mesh.into_iter().flat_map(|mesh| triangles_relative_to(mesh, meshes[mesh.file], origin))
     };
     let order = |holds: fn(f64) -> bool| {
         let mut order: Vec<usize> = (0..closed.len()).filter(|&i| holds(closed[i].volume)).collect();
@@ -48,7 +48,7 @@ pub(super) fn cavities(
     let (hollows, solids) = (order(|volume| volume < 0.0), order(|volume| volume > 0.0));
     let mut found: Vec<(usize, usize)> = Vec::new();
     for hollow in hollows {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let own: Vec<[DVec3; 3]> = closed[hollow].objects.iter().flat_map(|&id| corners_of(id)).collect();
         let some: Vec<DVec3> =
             own.iter().step_by(own.len().div_ceil(VERTICES).max(1)).map(|corners| corners[0]).collect();

@@ -23,8 +23,8 @@ mod shared_edges;
 use std::collections::{BTreeMap, HashMap};
 
 use cavities::{ClosedSolid, cavities};
-use parts::{GlassPart, GlassParts, RimEdge};
-use shared_edges::{RimEdgeWithEndpointIds, SharedEdge, SharedEdges, find_set_root};
+use parts::{GlassParts, GlassSolidPart, RimEdge};
+use shared_edges::{MatchedAndOpenEdges, RimEdgeWithEndpointIds, SharedEdge, find_set_root};
 
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -88,7 +88,7 @@ impl GlassSolids {
         if parts.list.is_empty() {
             return Ok(Self::default());
         }
-        let mut shared_edges = SharedEdges::match_rims(&parts.list, &parts.rims, token)?;
+        let mut shared_edges = MatchedAndOpenEdges::match_rims(&parts.list, &parts.rims, token)?;
         let groups = PartGroups::from_shared_edges(&parts, &shared_edges);
         // Reopen edges where the relative orientation of two parts differs from the rest of their common
         // border.
@@ -101,7 +101,7 @@ impl GlassSolids {
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
         let holes = Hole::find_all(&parts, &groups, &all, &shared_edges);
-        let covered = covered_flag_of_each_hole(scene, meshes, &parts, &holes, token)?;
+        let covered = hole_covered_flags(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
@@ -115,7 +115,7 @@ impl GlassSolids {
                     ObjectRole { place: place.unwrap_or(object), is_inside_out, is_open };
                 solids.open.extend(hole.open_glass_at_part(part, object, is_covered));
             }
-            if hole.part <= NO_HOLE && groups.are_flat(&parts, members) {
+            if hole.part <= NO_HOLE && groups.have_zero_volume(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
             } else if hole.part <= SMALL_HOLE {
                 closed.extend(groups.closed_solid_if_cavity_candidate(scene, &parts, members));
@@ -180,7 +180,7 @@ impl GlassSolids {
 }
 
 /// Whether opaque surfaces surround each hole.
-fn covered_flag_of_each_hole(
+fn hole_covered_flags(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
@@ -203,7 +203,7 @@ struct PartGroups {
 }
 
 impl PartGroups {
-    fn from_shared_edges(parts: &GlassParts, shared_edges: &SharedEdges) -> Self {
+    fn from_shared_edges(parts: &GlassParts, shared_edges: &MatchedAndOpenEdges) -> Self {
         let mut same: Vec<u32> = (0..parts.list.len() as u32).collect();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts().map(|part| find_set_root(&mut same, part));
@@ -253,7 +253,7 @@ impl PartGroups {
     fn volume_and_area(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
-            let GlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
+            let GlassSolidPart { volume: own, area: surface, .. } = &parts.list[part as usize];
             volume += if self.flips[part as usize] { -own } else { *own };
             area += surface;
         }
@@ -261,7 +261,7 @@ impl PartGroups {
     }
 
     /// Whether the parts of a closed solid enclose no volume.
-    fn are_flat(&self, parts: &GlassParts, members: &[u32]) -> bool {
+    fn have_zero_volume(&self, parts: &GlassParts, members: &[u32]) -> bool {
         let (volume, area) = self.volume_and_area(parts, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
@@ -321,7 +321,7 @@ impl Hole {
         parts: &GlassParts,
         groups: &PartGroups,
         all: &[Vec<u32>],
-        shared_edges: &SharedEdges,
+        shared_edges: &MatchedAndOpenEdges,
     ) -> Vec<Self> {
         let mut own: HashMap<u32, Vec<RimEdgeWithEndpointIds>> = HashMap::new();
         for open in &shared_edges.open {

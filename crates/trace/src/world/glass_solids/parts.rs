@@ -20,7 +20,7 @@ pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A glass object that does not enclose a volume on its own.
 #[derive(Clone, Debug)]
-pub(super) struct GlassPart {
+pub(super) struct GlassSolidPart {
     /// Object id.
     pub object: u32,
     /// Surface area.
@@ -52,7 +52,7 @@ pub(super) struct RimEdge {
 /// All glass parts in a scene, in coordinates relative to a point near them.
 #[derive(Debug, Default)]
 pub(super) struct GlassParts {
-    pub list: Vec<GlassPart>,
+    pub list: Vec<GlassSolidPart>,
     pub rims: Vec<RimEdge>,
     /// Origin of the coordinates.
     pub origin: DVec3,
@@ -64,8 +64,8 @@ impl GlassParts {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = object_glass_triangles(scene, meshes, object) else { continue };
-            token.check()?;
+            let Some(glass) = classify_object_glass(scene, meshes, object) else { continue };
+            token.check_pause_and_cancel()?;
             if parts.list.is_empty() {
                 parts.origin = point_on_or_inside_shape(&object.shape, meshes);
             }
@@ -116,7 +116,7 @@ impl GlassParts {
     }
 
     fn begin_part(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
-        self.list.push(GlassPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
+        self.list.push(GlassSolidPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
         self.list.len() as u32 - 1
     }
 
@@ -221,7 +221,7 @@ pub(super) enum MeshGlass {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn object_glass_triangles(
+pub(super) fn classify_object_glass(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,
@@ -255,7 +255,7 @@ fn glass_medium_key_of_object(scene: &Scene, meshes: &[&LoadedMesh], object: &Ob
 /// opposite directions are not open.
 fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
-    let open = unmatched_edges(mesh, all, |vertex| vertex);
+    let open = edges_without_opposite(mesh, all, |vertex| vertex);
     if open.is_empty() {
         return open;
     }
@@ -276,12 +276,12 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
         last = Some((bits(vertex), own));
         first.insert(vertex, own);
     }
-    unmatched_edges(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
+    edges_without_opposite(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
 /// Returns the edges in `edges` that have no matching edge in the opposite direction. `place` maps coincident
 /// vertices to one representative.
-fn unmatched_edges(
+fn edges_without_opposite(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,
     place: impl Fn(u32) -> u32,

@@ -1,7 +1,7 @@
 //! Shared edges: pairs of rim edges that belong to the same glass and have the same endpoints but opposite
 //! directions.
 
-use super::parts::{GlassMediumKey, GlassPart, RimEdge};
+use super::parts::{GlassMediumKey, GlassSolidPart, RimEdge};
 use crate::accel::Bvh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -24,7 +24,7 @@ pub(super) struct SharedEdge {
 
 /// Matched edges and open edges.
 #[derive(Debug, Default)]
-pub(super) struct SharedEdges {
+pub(super) struct MatchedAndOpenEdges {
     pub joined: Vec<SharedEdge>,
     /// Open edges, and the ids of their endpoints.
     pub open: Vec<RimEdgeWithEndpointIds>,
@@ -42,7 +42,7 @@ struct NormalizedRimEdge {
 }
 
 impl NormalizedRimEdge {
-    fn open_edge(&self) -> RimEdgeWithEndpointIds {
+    fn original_rim_edge(&self) -> RimEdgeWithEndpointIds {
         let [low, high] = self.places;
         (self.rim, if self.is_back { [high, low] } else { [low, high] })
     }
@@ -55,16 +55,20 @@ impl SharedEdge {
     }
 }
 
-impl SharedEdges {
+impl MatchedAndOpenEdges {
     /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them are
     /// paired.
-    pub fn match_rims(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn match_rims(
+        parts: &[GlassSolidPart],
+        rims: &[RimEdge],
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
         let mut edges = Self::default();
         let sites = EdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim(i)));
         let open = edges.match_equal_edges(parts, halves.collect());
-        token.check()?;
+        token.check_pause_and_cancel()?;
         // Split the remaining edges at the endpoints of other edges, and match again.
         let split = sites.split_at_endpoints(parts, &open, token)?;
         edges.open = edges.match_equal_edges(parts, split);
@@ -74,7 +78,7 @@ impl SharedEdges {
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
     fn match_equal_edges(
         &mut self,
-        parts: &[GlassPart],
+        parts: &[GlassSolidPart],
         rims: Vec<RimEdgeWithEndpointIds>,
     ) -> Vec<RimEdgeWithEndpointIds> {
         let half = |(rim, [from, to]): RimEdgeWithEndpointIds| NormalizedRimEdge {
@@ -94,8 +98,10 @@ impl SharedEdges {
         for same in halves.chunk_by(is_same) {
             let mut is_closed = vec![false; same.len()];
             let mut close = |i: usize, j: usize, disagrees: bool| {
-                self.joined
-                    .push(SharedEdge { rims: [same[i], same[j]].map(|half| half.open_edge()), disagrees });
+                self.joined.push(SharedEdge {
+                    rims: [same[i], same[j]].map(|half| half.original_rim_edge()),
+                    disagrees,
+                });
                 (is_closed[i], is_closed[j]) = (true, true);
             };
             match *same {
@@ -105,7 +111,7 @@ impl SharedEdges {
                 _ => pairs_with_glass_between(same).for_each(|[i, j]| close(i, j, false)),
             }
             let left = same.iter().zip(is_closed).filter(|(_, is_closed)| !is_closed);
-            open.extend(left.map(|(half, _)| half.open_edge()));
+            open.extend(left.map(|(half, _)| half.original_rim_edge()));
         }
         open
     }
@@ -154,7 +160,7 @@ struct EdgeEndpoints {
 }
 
 impl EdgeEndpoints {
-    fn from_rims(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+    fn from_rims(parts: &[GlassSolidPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];
         let mut order: Vec<usize> = (0..2 * rims.len()).collect();
@@ -200,7 +206,7 @@ impl EdgeEndpoints {
     /// Splits edges at the endpoints of other edges.
     fn split_at_endpoints(
         &self,
-        parts: &[GlassPart],
+        parts: &[GlassSolidPart],
         rims: &[RimEdgeWithEndpointIds],
         token: &CancelToken,
     ) -> Result<Vec<RimEdgeWithEndpointIds>, Cancelled> {

@@ -2,7 +2,9 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha_sample_index, is_channel_equal_to, linearize_pixel, rgb, sanitize, with_samples};
+use super::{
+    Sample, alpha_sample_index, is_channel_filled_with, linearize_pixel, rgb, sanitize, with_samples,
+};
 use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorCurve, ImageEncoding};
@@ -11,13 +13,9 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
 /// Alpha-weighted texels, or plain texels if the image is opaque.
-pub(super) fn alpha_weighted_texels(
-    image: DynamicImage,
-    curve: ColorCurve,
-    metadata: &ImageMetadata,
-) -> Texels {
+pub(super) fn cutout_texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMetadata) -> Texels {
     let Some(alpha) =
-        alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_equal_to(&image, *alpha, 1.0))
+        alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))
     else {
         return super::texels(image, curve.encoding(), metadata);
     };
@@ -26,8 +24,8 @@ pub(super) fn alpha_weighted_texels(
     let is_direct = space.is_default() && metadata.alpha != AlphaInterpretation::Premultiplied;
     let mut unusable = 0;
     let data = match &image {
-        DynamicImage::ImageLumaA8(pixels) if is_direct => straight_alpha_texels(pixels, alpha, curve),
-        DynamicImage::ImageRgba8(pixels) if is_direct => straight_alpha_texels(pixels, alpha, curve),
+        DynamicImage::ImageLumaA8(pixels) if is_direct => pack_straight_alpha_texels(pixels, alpha, curve),
+        DynamicImage::ImageRgba8(pixels) if is_direct => pack_straight_alpha_texels(pixels, alpha, curve),
         image => {
             let options = AlphaWeightingOptions {
                 alpha,
@@ -35,13 +33,13 @@ pub(super) fn alpha_weighted_texels(
                 space,
                 is_premultiplied: metadata.alpha == AlphaInterpretation::Premultiplied,
             };
-            with_samples!(image, samples => alpha_weighted_floats(samples, &options, &mut unusable))
+            with_samples!(image, samples => premultiplied_floats(samples, &options, &mut unusable))
         }
     };
     Texels { width, height, data, unusable }
 }
 
-fn straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
+fn pack_straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     let texel = |pixel: &[u8]| {
         let [red, green, blue] = rgb(pixel);
         [red, green, blue, pixel[alpha]]
@@ -83,7 +81,7 @@ impl AlphaWeightingOptions {
 }
 
 /// Converts samples to linear colors multiplied by alpha.
-fn alpha_weighted_floats<T: Sample>(
+fn premultiplied_floats<T: Sample>(
     samples: &[T],
     options: &AlphaWeightingOptions,
     unusable: &mut u64,
@@ -99,7 +97,7 @@ fn alpha_weighted_floats<T: Sample>(
             Linearization::Srgb => encoded.map(|value| srgb_to_linear(sanitize(value / divisor))),
             Linearization::Tables(tables) => linearize_pixel(pixel, Some(tables)),
         };
-        let color = Vec3::from_array(options.space.linear_to_rec_709(linear).map(sanitize));
+        let color = Vec3::from_array(options.space.convert_to_linear_rec_709(linear).map(sanitize));
         (color * alpha).extend(alpha)
     };
     TexelData::FloatAlpha(samples.chunks_exact(options.alpha + 1).map(texel).collect())

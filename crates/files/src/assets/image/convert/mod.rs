@@ -103,12 +103,12 @@ fn alpha_sample_index(image: &DynamicImage, metadata: &ImageMetadata) -> Option<
     match metadata.alpha {
         AlphaInterpretation::Straight | AlphaInterpretation::Premultiplied => Some(index),
         AlphaInterpretation::Unused | AlphaInterpretation::Dropped => None,
-        AlphaInterpretation::UnusedIfZero => (!is_channel_equal_to(image, index, 0.0)).then_some(index),
+        AlphaInterpretation::UnusedIfZero => (!is_channel_filled_with(image, index, 0.0)).then_some(index),
     }
 }
 
 /// Whether channel `index` equals `value` in every pixel.
-fn is_channel_equal_to(image: &DynamicImage, index: usize, value: f32) -> bool {
+fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> bool {
     fn are_channel_samples_equal_to<T: Sample>(
         samples: &[T],
         (channels, index): (usize, usize),
@@ -133,14 +133,18 @@ pub(super) fn constant_alpha_warning(
         return Some(ALPHA_BIT_IGNORED);
     }
     let alpha = alpha_sample_index(image, metadata)?;
-    if is_channel_equal_to(image, alpha, 0.0) {
+    if is_channel_filled_with(image, alpha, 0.0) {
         return Some(INVISIBLE);
     }
     match encoding {
         ImageEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
-            if is_channel_equal_to(image, alpha, 1.0) =>
+            if is_channel_filled_with(image, alpha, 1.0) =>
         {
-            Some(if scalars::uses_luminance_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
+            Some(if scalars::uses_luminance_as_opacity(image, of_any_color) {
+                LUMINANCE_USED
+            } else {
+                OPAQUE
+            })
         }
         _ => None,
     }
@@ -167,7 +171,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
         ImageEncoding::Number { of, is_srgb } => {
             return scalars::scalar_texels(&image, (of, is_srgb), metadata);
         }
-        ImageEncoding::CutOut(curve) => return cutout::alpha_weighted_texels(image, curve, metadata),
+        ImageEncoding::CutOut(curve) => return cutout::cutout_texels(image, curve, metadata),
         ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Linear | ImageEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());
@@ -263,7 +267,7 @@ fn convert_color_space(
         let tables = T::linearization_tables(space);
         let mut texel = |pixel| {
             let linear = linearize_pixel(pixel, tables.as_ref());
-            let color = space.linear_to_rec_709(linear);
+            let color = space.convert_to_linear_rec_709(linear);
             if is_raw {
                 return Vec3::from_array(color);
             }

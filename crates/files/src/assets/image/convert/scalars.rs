@@ -2,7 +2,7 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha_sample_index, channel_count, is_channel_equal_to, rgb, sanitize, with_samples};
+use super::{Sample, alpha_sample_index, channel_count, is_channel_filled_with, rgb, sanitize, with_samples};
 use crate::assets::image::metadata::ImageMetadata;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::{Channel, ChannelSelector};
@@ -36,7 +36,7 @@ fn choose_scalar_source(
         ChannelSelector::Opacity => alpha.map_or(luminance, of_alpha),
         ChannelSelector::Mask { of_any_color } => {
             let is_alpha = |alpha: &usize| {
-                !is_channel_equal_to(image, *alpha, 1.0) || !uses_luminance_mask(image, of_any_color)
+                !is_channel_filled_with(image, *alpha, 1.0) || !uses_luminance_as_opacity(image, of_any_color)
             };
             alpha.filter(is_alpha).map_or(luminance, of_alpha)
         }
@@ -48,7 +48,7 @@ fn choose_scalar_source(
 }
 
 /// Whether to use an opaque image's luminance as its opacity.
-pub(super) fn uses_luminance_mask(image: &DynamicImage, of_any_color: bool) -> bool {
+pub(super) fn uses_luminance_as_opacity(image: &DynamicImage, of_any_color: bool) -> bool {
     of_any_color || is_grayscale(image)
 }
 

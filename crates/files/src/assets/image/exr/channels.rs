@@ -90,7 +90,7 @@ impl LayerChannels {
         Some(ChosenChannels { color: ColorChannels::Rgb([red?, green?, blue?]), alpha: self.alpha })
     }
 
-    fn gray(&self) -> Option<ChosenChannels> {
+    fn gray_or_luminance_chroma(&self) -> Option<ChosenChannels> {
         let luminance = self.luminance.filter(|_| !self.has_x)?;
         let color = match self.chroma {
             [Some(ry), Some(by)] => ColorChannels::LuminanceChroma(luminance, [ry, by]),
@@ -123,8 +123,10 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
             layers.find_map(|(_, layer)| channels(layer))
         })
     };
-    let unnamed = find(false, LayerChannels::color).or_else(|| find(false, LayerChannels::gray));
-    let named = || find(true, LayerChannels::color).or_else(|| find(true, LayerChannels::gray));
+    let unnamed =
+        find(false, LayerChannels::color).or_else(|| find(false, LayerChannels::gray_or_luminance_chroma));
+    let named =
+        || find(true, LayerChannels::color).or_else(|| find(true, LayerChannels::gray_or_luminance_chroma));
     unnamed.or_else(named).or_else(|| first_single_channel(headers))
 }
 
@@ -175,7 +177,7 @@ fn first_single_channel(headers: &[Header]) -> Option<ChosenChannels> {
 }
 
 /// Error message for a file without usable channels.
-pub(super) fn describe_missing_channels(headers: &[Header]) -> String {
+pub(super) fn describe_unusable_channels(headers: &[Header]) -> String {
     const MAX_NAMES: usize = 8;
     if headers.iter().all(|header| header.deep) {
         return "deep images are not supported; flatten the image".to_owned();

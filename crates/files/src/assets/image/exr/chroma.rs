@@ -5,7 +5,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
 use super::channels::ChannelIndex;
-use super::{ChannelRow, SAMPLE_BYTES, channel_description};
+use super::{ChannelRow, SAMPLE_BYTES, channel_header};
 use crate::math::DVec3;
 
 /// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
@@ -27,7 +27,7 @@ pub(super) struct LuminanceChroma {
 impl LuminanceChroma {
     pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
-        let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
+        let (size, step) = (headers[ry.part].layer_size, channel_header(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
@@ -35,7 +35,7 @@ impl LuminanceChroma {
     /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
-        let rows = size.height() / channel_description(headers, ry).sampling.y();
+        let rows = size.height() / channel_header(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }

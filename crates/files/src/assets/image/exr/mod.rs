@@ -20,7 +20,7 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_missing_channels};
+use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_unusable_channels};
 use chroma::LuminanceChroma;
 use sampling::{BlockDecompressor, ChannelSampling, SubsamplingHidingReader};
 
@@ -42,7 +42,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let file = SubsamplingHidingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
         let Some(channels) = choose_channels(reader.headers()) else {
-            return Err(decoding_error(describe_missing_channels(reader.headers())));
+            return Err(decoding_error(describe_unusable_channels(reader.headers())));
         };
         let decompressor = BlockDecompressor::new(reader.meta_data(), &samplings);
         check_samplings(decompressor.headers(), channels).map_err(decoding_error)?;
@@ -63,8 +63,8 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             ImageMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
-                Some(matrix) => metadata.space = ColorSpace::with_matrix_to_rec_709(matrix),
-                None => metadata.warn(DEGENERATE_CHROMATICITIES),
+                Some(matrix) => metadata.space = ColorSpace::from_matrix_to_rec_709(matrix),
+                None => metadata.add_warning(DEGENERATE_CHROMATICITIES),
             }
         }
         metadata
@@ -105,13 +105,13 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_header(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
+    let sampling = |channel: ChannelIndex| channel_header(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -121,9 +121,7 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     }
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
-        Some(channel) => {
-            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
-        }
+        Some(channel) => Err(subsampled_channel_message(&channel_header(headers, channel).name.to_string())),
         None => match channels.as_luminance_chroma() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
@@ -270,7 +268,7 @@ impl ChannelRow<'_> {
     /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item from
     /// `targets`.
     fn for_each_value<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
-        fn for_each_chunk<const N: usize, T>(
+        fn for_each_raw_sample<const N: usize, T>(
             bytes: &[u8],
             skipped: usize,
             targets: impl Iterator<Item = T>,
@@ -281,15 +279,17 @@ impl ChannelRow<'_> {
         }
         match self.sample_type {
             SampleType::F32 => {
-                for_each_chunk(self.bytes, skipped, targets, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
+                for_each_raw_sample(self.bytes, skipped, targets, |at, bytes| {
+                    put(at, f32::from_ne_bytes(bytes))
+                });
             }
             SampleType::F16 => {
-                for_each_chunk(self.bytes, skipped, targets, |at, bytes| {
+                for_each_raw_sample(self.bytes, skipped, targets, |at, bytes| {
                     put(at, f16::from_ne_bytes(bytes).to_f32());
                 });
             }
             SampleType::U32 => {
-                for_each_chunk(self.bytes, skipped, targets, |at, bytes| {
+                for_each_raw_sample(self.bytes, skipped, targets, |at, bytes| {
                     put(at, u32::from_ne_bytes(bytes) as f32);
                 });
             }

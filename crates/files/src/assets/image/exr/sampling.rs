@@ -51,7 +51,7 @@ impl<'a> HeaderParser<'a> {
                 && !name.is_empty()
             {
                 let kind = self.read_c_string()?;
-                let size = self.read_u32()?;
+                let size = self.read_nonnegative_i32()?;
                 let start = self.at;
                 if name == b"channels" && kind == b"chlist" {
                     channels = Some(self.channels(start.checked_add(size)?)?);
@@ -72,7 +72,10 @@ impl<'a> HeaderParser<'a> {
         while self.at < end && !self.read_c_string()?.is_empty() {
             self.at += KIND_BYTES;
             let at = self.at as u64;
-            channels.push(ChannelSampling { at, step: Vec2(self.read_u32()?, self.read_u32()?) });
+            channels.push(ChannelSampling {
+                at,
+                step: Vec2(self.read_nonnegative_i32()?, self.read_nonnegative_i32()?),
+            });
         }
         Some(channels)
     }
@@ -85,7 +88,7 @@ impl<'a> HeaderParser<'a> {
         Some(&rest[..end])
     }
 
-    fn read_u32(&mut self) -> Option<usize> {
+    fn read_nonnegative_i32(&mut self) -> Option<usize> {
         let word = self.bytes.get(self.at..)?.first_chunk()?;
         self.at += 4;
         usize::try_from(i32::from_le_bytes(*word)).ok()

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::map::{Map, MapKind};
 use super::material::{is_opaque_despite_tr, to_file_material};
-use super::statements::{MtlColor, MtlNumber};
+use super::statements::{MtlColorKind, MtlNumber};
 use super::{MtlMaterial, WithLine};
 use crate::assets::{FileMaterial, FileMaterialKind};
 use crate::math::Vec3;
@@ -53,8 +53,8 @@ fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
     };
     warn_about_approximations(found, &converted, &mut add);
     warn_about_opacity(found, &converted, &mut add);
-    warn_about_reflectance(found, &converted, &mut add);
-    warn_about_pbr(found, &converted, &mut add);
+    warn_about_unrenderable_reflectance(found, &converted, &mut add);
+    warn_about_ineffective_pbr(found, &converted, &mut add);
     for (kind, map) in &found.maps {
         warn_about_map(found, &converted, (*kind, map), &mut add);
     }
@@ -106,7 +106,7 @@ fn line_of_value<T>(at: Option<WithLine<T>>) -> Option<usize> {
 }
 
 /// Whether a number is above 1 by more than rounding errors.
-fn is_above_one(number: f32) -> bool {
+fn is_number_above_one(number: f32) -> bool {
     number > 1.0 + 1e-5
 }
 
@@ -141,7 +141,7 @@ fn warn_about_approximations(
         | FileMaterialKind::Glass => {}
     }
     if converted.emission != Vec3::ZERO && !converted.emits() {
-        let emission = found.color(MtlColor::Emission);
+        let emission = found.color(MtlColorKind::Emission);
         if emission.is_some() {
             add(line_of_value(emission), &no_effect_on_material_warning("Ke", converted.kind()));
         }
@@ -154,7 +154,7 @@ fn warn_about_opacity(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    if let Some(at) = found.color(MtlColor::Filter).filter(|at| at.value != [1.0; 3]) {
+    if let Some(at) = found.color(MtlColorKind::Filter).filter(|at| at.value != [1.0; 3]) {
         add(Some(at.line), FILTER_IGNORED);
     }
     if converted.is_glass() {
@@ -178,24 +178,24 @@ fn warn_about_opacity(
 }
 
 /// Warns about reflectances that cannot be rendered as specified.
-fn warn_about_reflectance(
+fn warn_about_unrenderable_reflectance(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
+    let (diffuse, specular) = (found.color(MtlColorKind::Diffuse), found.color(MtlColorKind::Specular));
     let kd = match converted.diffuse_texture {
         Some(_) => 0.0,
         None => converted.diffuse.max_element(),
     };
     let ks = converted.specular.max_element();
     match converted.kind() {
-        FileMaterialKind::Phong => warn_about_phong_reflectance(found, converted, add),
-        FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_above_one(kd) => {
+        FileMaterialKind::Phong => warn_about_missing_or_excess_reflectance(found, converted, add),
+        FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_number_above_one(kd) => {
             add(line_of_value(diffuse), BRIGHT_DIFFUSE);
         }
         FileMaterialKind::Coated if ks > FileMaterial::MAX_COAT => add(line_of_value(specular), BRIGHT_COAT),
-        FileMaterialKind::Mirror if is_above_one(ks) => add(line_of_value(specular), BRIGHT_MIRROR),
+        FileMaterialKind::Mirror if is_number_above_one(ks) => add(line_of_value(specular), BRIGHT_MIRROR),
         FileMaterialKind::Mirror if kd > 0.0 => add(line_of_value(diffuse), DIFFUSE_UNDER_MIRROR),
         FileMaterialKind::Principled(_)
         | FileMaterialKind::Coated
@@ -205,12 +205,12 @@ fn warn_about_reflectance(
 }
 
 /// Warns about missing highlights and about surfaces that reflect more light than they receive.
-fn warn_about_phong_reflectance(
+fn warn_about_missing_or_excess_reflectance(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
+    let (diffuse, specular) = (found.color(MtlColorKind::Diffuse), found.color(MtlColorKind::Specular));
     let specular_map = found.map(MapKind::Specular);
     let is_matte = matches!(converted.illumination_model, Some(0 | 1));
     let has_strength = converted.specular != Vec3::ZERO || specular_map.is_some();
@@ -223,13 +223,17 @@ fn warn_about_phong_reflectance(
         true => converted.specular * (2.0 / (converted.shininess + 2.0)),
         false => Vec3::ZERO,
     };
-    if is_above_one((kd + ks).max_element()) {
+    if is_number_above_one((kd + ks).max_element()) {
         add(line_of_value(diffuse).or(line_of_value(specular)), GAINS_ENERGY);
     }
 }
 
 /// Warns about parameters of the PBR extension that have no effect.
-fn warn_about_pbr(found: &MtlMaterial, converted: &FileMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
+fn warn_about_ineffective_pbr(
+    found: &MtlMaterial,
+    converted: &FileMaterial,
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
     let nonzero = |number: MtlNumber| found.number_with_line(number).filter(|at| at.value != 0.0);
     for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
         if let Some(at) = nonzero(number) {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::assets::{FileLine, FileTexture};
 use crate::materials::{Channel, ChannelSelector};
-use crate::math::limits::{LARGEST, is_too_short};
+use crate::math::limits::{LARGEST, is_nonzero_but_too_short};
 use crate::math::{DVec2, Vec2};
 
 /// Material parameter that a map controls.
@@ -85,7 +85,7 @@ impl MapKind {
         }
     }
 
-    fn is_normal(self) -> bool {
+    fn perturbs_normals(self) -> bool {
         match self {
             Self::Normal | Self::Bump => true,
             Self::Diffuse
@@ -186,9 +186,10 @@ impl Map {
 
     /// Warnings about options that are unusable or have no effect on this kind of map.
     pub(super) fn option_warnings(&self, kind: MapKind) -> impl Iterator<Item = String> {
-        let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then_some("-imfchan");
-        let range = (self.range != [0.0, 1.0] && kind.is_normal()).then_some("-mm");
-        let strength = (self.strength != 1.0 && !kind.is_normal()).then_some("-bm");
+        let channel =
+            (self.number.is_some() && (kind.is_color() || kind.perturbs_normals())).then_some("-imfchan");
+        let range = (self.range != [0.0, 1.0] && kind.perturbs_normals()).then_some("-mm");
+        let strength = (self.strength != 1.0 && !kind.perturbs_normals()).then_some("-bm");
         let unused = channel.into_iter().chain(range).chain(strength).map(ignored_option_warning);
         self.warnings.iter().cloned().chain(unused)
     }
@@ -240,7 +241,7 @@ fn parse_channel(letter: &str) -> Option<ChannelSelector> {
 
 /// Whether a scale is 0 or too small to compute with.
 fn is_near_zero(scale: f64) -> bool {
-    scale == 0.0 || is_too_short(scale)
+    scale == 0.0 || is_nonzero_but_too_short(scale)
 }
 
 /// Whether a word looks like an option: a dash followed by letters.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::MtlMaterial;
 use super::map::MapKind;
-use super::statements::{MtlColor, MtlNumber};
+use super::statements::{MtlColorKind, MtlNumber};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
@@ -12,7 +12,7 @@ use crate::math::{DVec3, Vec3};
 /// without a texture, 1 with a texture, and 0 for mirrors. Textures that have no effect are dropped.
 pub(in crate::assets::mesh) fn to_file_material(found: &MtlMaterial, path: &Path) -> FileMaterial {
     let texture = |kind| found.map(kind).and_then(|map| map.texture(path));
-    let specular = color_or_default(found, MtlColor::Specular, 0.0);
+    let specular = color_or_default(found, MtlColorKind::Specular, 0.0);
     let is_mirror =
         matches!(found.illumination, Some(at) if matches!(at.value, 3 | 5 | 8)) && specular != Vec3::ZERO;
     let diffuse_texture = texture(MapKind::Diffuse);
@@ -26,10 +26,10 @@ pub(in crate::assets::mesh) fn to_file_material(found: &MtlMaterial, path: &Path
     let normals = found.map(MapKind::Normal).or(found.map(MapKind::Bump));
     let mut material = FileMaterial {
         name: found.name.clone(),
-        diffuse: color_or_default(found, MtlColor::Diffuse, default_diffuse),
+        diffuse: color_or_default(found, MtlColorKind::Diffuse, default_diffuse),
         specular,
         shininess: found.number(MtlNumber::Shininess).unwrap_or(0.0) as f32,
-        emission: color_or_default(found, MtlColor::Emission, default_emission),
+        emission: color_or_default(found, MtlColorKind::Emission, default_emission),
         ior: found.number(MtlNumber::Ior).unwrap_or(1.0) as f32,
         illumination_model: found.illumination.map(|at| at.value),
         opacity: opacity(found),
@@ -45,7 +45,7 @@ pub(in crate::assets::mesh) fn to_file_material(found: &MtlMaterial, path: &Path
     material
 }
 
-fn color_or_default(found: &MtlMaterial, color: MtlColor, default: f32) -> Vec3 {
+fn color_or_default(found: &MtlMaterial, color: MtlColorKind, default: f32) -> Vec3 {
     let color = found.color(color);
     color.map_or(Vec3::splat(default), |at| DVec3::from_array(at.value).as_vec3())
 }

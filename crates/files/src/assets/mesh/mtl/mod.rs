@@ -13,7 +13,7 @@ use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{IgnoredStatement, collect_warnings};
 pub(super) use map::{first_existing_or_first, utf8_and_latin1_paths, with_and_without_comments};
 pub(super) use material::to_file_material;
-use statements::{MtlColor, MtlNumber, Statement};
+use statements::{MtlColorKind, MtlNumber, Statement};
 
 /// Maximum size of an MTL file.
 pub(super) const FILE_LIMIT: u64 = 64 << 20;
@@ -33,7 +33,7 @@ pub(super) struct MtlMaterial {
     pub(super) name: String,
     /// Line of the `newmtl` statement.
     line: usize,
-    colors: [Option<WithLine<[f64; 3]>>; MtlColor::ALL.len()],
+    colors: [Option<WithLine<[f64; 3]>>; MtlColorKind::ALL.len()],
     numbers: [Option<WithLine<f64>>; MtlNumber::ALL.len()],
     illumination: Option<WithLine<u8>>,
     maps: Vec<(map::MapKind, map::Map)>,
@@ -49,7 +49,7 @@ struct WithLine<T> {
 }
 
 impl MtlMaterial {
-    fn color(&self, color: MtlColor) -> Option<WithLine<[f64; 3]>> {
+    fn color(&self, color: MtlColorKind) -> Option<WithLine<[f64; 3]>> {
         self.colors[color as usize]
     }
 
@@ -87,7 +87,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
         let mut warnings = Vec::new();
         let statement = statements::parse_line(&line, &mut warnings)
             .map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
-        library.add(statement, index + 1, warnings);
+        library.add_statement(statement, index + 1, warnings);
     }
     library.warn_about_duplicates();
     Ok(library)
@@ -113,7 +113,7 @@ pub(super) fn map_statement_image_candidates(path: &Path, line: &[u8]) -> Vec<Pa
 
 impl MtlLibrary {
     /// Adds a statement and any warnings about it.
-    fn add(&mut self, statement: Statement, line: usize, warnings: Vec<String>) {
+    fn add_statement(&mut self, statement: Statement, line: usize, warnings: Vec<String>) {
         if let Statement::New(name) = statement {
             self.materials.push(MtlMaterial { name, line, ..MtlMaterial::default() });
             return;

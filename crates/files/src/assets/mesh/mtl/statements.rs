@@ -5,7 +5,7 @@ use crate::math::limits::LARGEST;
 
 /// A color statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MtlColor {
+pub(super) enum MtlColorKind {
     Ambient,
     Diffuse,
     Specular,
@@ -14,7 +14,7 @@ pub(super) enum MtlColor {
     Filter,
 }
 
-impl MtlColor {
+impl MtlColorKind {
     /// All colors with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Ambient, "Ka"),
@@ -85,7 +85,7 @@ pub(super) enum Statement {
     /// A statement that is ignored with a warning.
     Ignored,
     New(String),
-    Color(MtlColor, [f64; 3]),
+    Color(MtlColorKind, [f64; 3]),
     Number(MtlNumber, f64),
     Illumination(u8),
     Map(MapKind, Map),
@@ -104,7 +104,7 @@ pub(super) fn parse_line(line: &str, warnings: &mut Vec<String>) -> Result<State
         let name = (!rest.is_empty()).then(|| rest.to_owned());
         return name.map(Statement::New).ok_or_else(|| expected_arguments_message("newmtl", "a name"));
     }
-    if let Some((color, _)) = MtlColor::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((color, _)) = MtlColorKind::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_color(keyword, color, rest, warnings);
     }
     if let Some((number, _)) = MtlNumber::ALL.into_iter().find(|(_, name)| is(name)) {
@@ -196,7 +196,7 @@ pub(super) fn outside_gamut_warning(keyword: &str) -> String {
 /// Parses a color: three numbers or a single gray value.
 fn parse_color(
     keyword: &str,
-    color: MtlColor,
+    color: MtlColorKind,
     rest: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Statement, String> {
@@ -218,8 +218,8 @@ fn parse_color(
     warn_about_excess(words, 3, keyword, warnings);
     let values = match (color, is_xyz) {
         // These colors have no effect.
-        (MtlColor::Ambient | MtlColor::Filter, _) => values,
-        (MtlColor::Diffuse | MtlColor::Specular | MtlColor::Emission, true) => {
+        (MtlColorKind::Ambient | MtlColorKind::Filter, _) => values,
+        (MtlColorKind::Diffuse | MtlColorKind::Specular | MtlColorKind::Emission, true) => {
             /// Maximum rounding error for colors at the edge of the gamut.
             const TINY: f64 = 1e-3;
             let rgb = xyz_to_rgb(values);
@@ -228,7 +228,7 @@ fn parse_color(
             }
             rgb.map(|part| part.clamp(0.0, LARGEST))
         }
-        (MtlColor::Diffuse | MtlColor::Specular | MtlColor::Emission, false) => {
+        (MtlColorKind::Diffuse | MtlColorKind::Specular | MtlColorKind::Emission, false) => {
             // Report only the first component.
             let mut reported = Vec::new();
             let part = |part: usize| {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::super::parsed::ParsedMesh;
-use super::statements::{CornerIndices, NONE, Smoothing, Statements};
+use super::statements::{CornerIndices, NONE, ParsedObj, Smoothing};
 use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{Vec2, Vec3};
 
@@ -19,7 +19,7 @@ pub(super) struct FaceRun {
 }
 
 /// Adds the faces from all runs. Within an object, every distinct combination of indices becomes a vertex.
-pub(super) fn build_faces(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
+pub(super) fn build_faces(statements: &ParsedObj, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
     let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
     let mut builder = VertexBuilder {
@@ -42,7 +42,7 @@ pub(super) fn build_faces(statements: &Statements, runs: &[FaceRun], parsed: &mu
 type SmoothingTag = (u32, u32);
 
 struct VertexBuilder<'a> {
-    statements: &'a Statements,
+    statements: &'a ParsedObj,
     has_uvs: bool,
     has_normals: bool,
     has_colors: bool,
@@ -96,7 +96,7 @@ impl VertexBuilder<'_> {
 
     fn add(&mut self, corner: CornerIndices, group: u32) {
         let [position, uv, normal] = corner.map(|index| index as usize);
-        let Statements { vertices, uvs, normals, .. } = self.statements;
+        let ParsedObj { vertices, uvs, normals, .. } = self.statements;
         let index = self.parsed.positions.len() as u32;
         self.parsed.positions.push(vertices.positions[position]);
         if self.has_uvs {

@@ -4,13 +4,13 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use super::super::mtl::{self, MtlLibrary, utf8_and_latin1_paths, with_and_without_comments};
-use super::super::{AssetError, MeshSource};
+use super::super::{AssetError, MeshFileBytes};
 use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
 
 /// Loads the libraries referenced by an OBJ file, in order of occurrence.
 pub(super) struct MtlLibraryLoader<'a> {
-    pub(super) source: &'a MeshSource<'a>,
+    pub(super) source: &'a MeshFileBytes<'a>,
     /// Names of the materials used by the OBJ file.
     pub(super) used: &'a BTreeSet<String>,
     pub(super) found: LoadedLibraries,
@@ -32,7 +32,10 @@ pub(super) struct LoadedLibraries {
 impl MtlLibraryLoader<'_> {
     /// Loads the libraries named in a statement. Maps each used material name that they define to its
     /// material index. Missing files only cause warnings.
-    pub(super) fn load_libraries(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
+    pub(super) fn load_mtllib_statement(
+        &mut self,
+        statement: &str,
+    ) -> Result<HashMap<String, usize>, AssetError> {
         let mut indices = HashMap::new();
         for path in library_paths(self.source.path, statement) {
             indices.extend(self.load_file_and_map_materials(&path)?);
@@ -64,7 +67,7 @@ impl MtlLibraryLoader<'_> {
             Ok(library) => Ok(self.add_and_map_used_materials(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
                 self.found.missing = true;
-                self.found.warnings.push(missing_library_warning(&error));
+                self.found.warnings.push(unreadable_library_warning(&error));
                 Ok(HashMap::new())
             }
             Err(error) => Err(error),
@@ -108,6 +111,6 @@ pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
 }
 
 /// Warning about a library that cannot be read.
-pub(super) fn missing_library_warning(error: &AssetError) -> String {
+pub(super) fn unreadable_library_warning(error: &AssetError) -> String {
     format!("{error}; its materials are skipped")
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::super::MeshSource;
+use super::super::MeshFileBytes;
 use super::super::parsed::ParsedMesh;
 use super::build::FaceRun;
-use super::statements::{CornerIndices, NONE, Statements, face_lines, face_start};
+use super::statements::{CornerIndices, NONE, ParsedObj, face_lines, face_start};
 use crate::assets::FileMaterial;
 
 /// Faces that have corners without texture coordinates.
@@ -19,7 +19,7 @@ pub(super) struct MissingUvs {
 }
 
 impl MissingUvs {
-    pub(super) fn find(statements: &Statements, runs: &[FaceRun], materials: &[FileMaterial]) -> Self {
+    pub(super) fn find(statements: &ParsedObj, runs: &[FaceRun], materials: &[FileMaterial]) -> Self {
         let has_textures =
             |material: u32| materials.get(material as usize).is_some_and(FileMaterial::has_textures);
         let mut found = Self::default();
@@ -51,13 +51,13 @@ impl MissingUvs {
     }
 
     /// Warning about objects in which only some corners have texture coordinates.
-    pub(super) fn partial_uvs_warning(&self, source: &MeshSource<'_>) -> Option<String> {
+    pub(super) fn partial_uvs_warning(&self, source: &MeshFileBytes<'_>) -> Option<String> {
         let (first, count) = self.partial?;
-        Some(partly_missing_uvs_warning(source.line_number(face_start(source, first)), count))
+        Some(corners_without_uvs_warning(source.line_number(face_start(source, first)), count))
     }
 
     /// Warnings about textured objects without texture coordinates, one for each material.
-    pub(super) fn material_warnings(&self, source: &MeshSource<'_>, parsed: &ParsedMesh) -> Vec<String> {
+    pub(super) fn material_warnings(&self, source: &MeshFileBytes<'_>, parsed: &ParsedMesh) -> Vec<String> {
         let mut faces: Vec<usize> = self.textured.values().copied().collect();
         faces.sort_unstable();
         let lines = face_lines(source, &faces);
@@ -74,7 +74,7 @@ impl MissingUvs {
     }
 }
 
-pub(super) fn partly_missing_uvs_warning(first: usize, count: usize) -> String {
+pub(super) fn corners_without_uvs_warning(first: usize, count: usize) -> String {
     let faces = match count {
         1 => format!("line {first}: a face has"),
         _ => format!("line {first} and {} more faces have", count - 1),

@@ -14,22 +14,22 @@ use std::collections::{BTreeSet, HashMap};
 use super::assemble::assemble_text_mesh;
 use super::parsed::ParsedMesh;
 use super::text::convert_mac_line_ends;
-use super::{AssetError, LoadedMesh, MeshSource};
+use super::{AssetError, LoadedMesh, MeshFileBytes};
 use crate::assets::FileMaterial;
 use build::{FaceRun, build_faces};
 use libraries::{LoadedLibraries, MtlLibraryLoader};
 use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
-use statements::{NONE, Smoothing, StateChange, Statements, face_start};
+use statements::{NONE, ParsedObj, Smoothing, StateChange, face_start};
 
-pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    parse_normalized_text(&MeshSource { bytes: &convert_mac_line_ends(source.bytes), ..*source })
+pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
+    parse_normalized_text(&MeshFileBytes { bytes: &convert_mac_line_ends(source.bytes), ..*source })
 }
 
-fn parse_normalized_text(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    let mut statements = Statements::read(source)?;
+fn parse_normalized_text(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
+    let mut statements = ParsedObj::read(source)?;
     let materials = ObjMaterials::load(source, &statements.changes)?;
-    let runs = split_into_runs(&statements, &materials.used);
+    let runs = split_into_face_runs(&statements, &materials.used);
     let mut parsed = ParsedMesh {
         materials: materials.all,
         material_warnings: materials.warnings,
@@ -58,7 +58,7 @@ struct ObjMaterials {
 impl ObjMaterials {
     /// Loads the libraries and resolves the materials. A library applies to all later `usemtl` statements,
     /// and to earlier ones that name a material no earlier library defines.
-    fn load(source: &MeshSource<'_>, changes: &[(usize, StateChange)]) -> Result<Self, AssetError> {
+    fn load(source: &MeshFileBytes<'_>, changes: &[(usize, StateChange)]) -> Result<Self, AssetError> {
         let name_of = |change: &StateChange| match change {
             StateChange::Material(name) if !name.is_empty() => Some(name.clone()),
             StateChange::Material(_)
@@ -72,7 +72,7 @@ impl ObjMaterials {
         let mut used = Vec::new();
         for (_, change) in changes {
             match change {
-                StateChange::Library(name) => known.extend(libraries.load_libraries(name)?),
+                StateChange::Library(name) => known.extend(libraries.load_mtllib_statement(name)?),
                 StateChange::Material(name) => used.push((name, known.get(name).copied())),
                 StateChange::Object | StateChange::Smoothing(_) => {}
             }
@@ -95,7 +95,7 @@ fn unknown_material_warning(name: &str) -> String {
 }
 
 /// Splits the faces into runs between state changes.
-fn split_into_runs(statements: &Statements, materials: &[u32]) -> Vec<FaceRun> {
+fn split_into_face_runs(statements: &ParsedObj, materials: &[u32]) -> Vec<FaceRun> {
     let mut materials = materials.iter();
     let mut runs =
         vec![FaceRun { faces: 0, material: NONE, smoothing: Smoothing::Unspecified, is_object: false }];

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::super::text::{Lines, convert_mac_line_ends};
 use super::super::{FILE_LIMIT, mtl};
 use super::libraries::library_paths;
-use super::words::Words;
+use super::words::ObjTextCursor;
 use crate::control::{CancelToken, Cancelled};
 
 /// Lists an OBJ file's material libraries and their images. See [`super::super::referenced_files`].
@@ -31,21 +31,21 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
         // Most lines contain only numbers.
-        lines.skip_lines_without_letter(b'm');
+        lines.skip_to_line_containing(b'm');
         let Some(line) = lines.read_next_line(token)? else { return Ok(libraries) };
         if !is_library_statement(line) {
             continue;
         }
         let statement = lines.append_continuation_lines(token)?;
         let statement = convert_mac_line_ends(statement);
-        let mut words = Words::new(&statement);
+        let mut words = ObjTextCursor::new(&statement);
         words.next_word();
         libraries.extend(library_paths(path, &words.name()));
     }
 }
 
 fn is_library_statement(line: &[u8]) -> bool {
-    Words::new(line).next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"mtllib"))
+    ObjTextCursor::new(line).next_word().is_some_and(|word| word.eq_ignore_ascii_case(b"mtllib"))
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use super::super::parsed::{alpha_ignored_warning, face_of_corner};
 use super::super::text::expected_message;
-use super::super::{AssetError, MeshSource};
+use super::super::{AssetError, MeshFileBytes};
 use super::vertex::Vertices;
-use super::words::{Words, parse_integer, parse_number, too_few_numbers_message};
+use super::words::{ObjTextCursor, parse_integer, parse_number, too_few_numbers_message};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Number of statements between polls of the cancel token.
@@ -49,7 +49,7 @@ fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; LONGEST_KEYWORD]) -> &'a [
 
 /// Parsed contents of an OBJ file.
 #[derive(Default)]
-pub(super) struct Statements {
+pub(super) struct ParsedObj {
     pub(super) vertices: Vertices,
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
@@ -64,10 +64,10 @@ pub(super) struct Statements {
     free_form: Option<(usize, String)>,
 }
 
-impl Statements {
-    pub(super) fn read(source: &MeshSource<'_>) -> Result<Self, AssetError> {
+impl ParsedObj {
+    pub(super) fn read(source: &MeshFileBytes<'_>) -> Result<Self, AssetError> {
         let mut found = Self::default();
-        let mut words = Words::new(source.bytes);
+        let mut words = ObjTextCursor::new(source.bytes);
         let mut count = 0;
         while words.move_to_next_statement() {
             if count % BATCH == 0 {
@@ -86,7 +86,11 @@ impl Statements {
         Ok(found)
     }
 
-    fn parse_statement(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>) -> Result<(), String> {
+    fn parse_statement(
+        &mut self,
+        source: &MeshFileBytes<'_>,
+        words: &mut ObjTextCursor<'_>,
+    ) -> Result<(), String> {
         let start = words.offset();
         let Some(keyword) = words.next_word() else {
             if let Some(paint) = words.take_raw_line_rest().strip_prefix(b"#MRGB ") {
@@ -128,7 +132,7 @@ impl Statements {
     }
 
     /// Parses a smoothing group. Ignores invalid groups with a warning.
-    fn parse_smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
+    fn parse_smoothing(&mut self, source: &MeshFileBytes<'_>, words: &mut ObjTextCursor<'_>, start: usize) {
         let group = words.next_word().unwrap_or(b"off");
         let smoothing = match parse_integer(group).map(u32::try_from) {
             Some(Ok(0)) => Smoothing::Flat,
@@ -143,7 +147,7 @@ impl Statements {
         self.push_state_change(StateChange::Smoothing(smoothing));
     }
 
-    fn parse_face(&mut self, words: &mut Words<'_>) -> Result<(), String> {
+    fn parse_face(&mut self, words: &mut ObjTextCursor<'_>) -> Result<(), String> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let before = self.corners.len();
         while let Some(word) = words.next_word() {
@@ -155,7 +159,7 @@ impl Statements {
 
     /// If the file lacks texture coordinates or normals, drops their indices from all corners and adds a
     /// warning.
-    fn drop_missing_attributes(&mut self, source: &MeshSource<'_>) {
+    fn drop_missing_attributes(&mut self, source: &MeshFileBytes<'_>) {
         for (part, count, name) in
             [(1, self.uvs.len(), "texture coordinates"), (2, self.normals.len(), "normals")]
         {
@@ -170,7 +174,7 @@ impl Statements {
 
     /// Checks the indices of all corners. Must be called after all statements are parsed, because faces may
     /// precede their vertices.
-    fn check_index_ranges(&self, source: &MeshSource<'_>) -> Result<(), AssetError> {
+    fn check_index_ranges(&self, source: &MeshFileBytes<'_>) -> Result<(), AssetError> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let wrong = |corner: &CornerIndices| {
             (0..3).find(|part| corner[*part] as usize >= counts[*part] && corner[*part] != NONE)
@@ -187,7 +191,7 @@ impl Statements {
         ))
     }
 
-    fn add_warnings(&mut self, source: &MeshSource<'_>) {
+    fn add_warnings(&mut self, source: &MeshFileBytes<'_>) {
         if let Some(start) = self.vertices.first_excess {
             let line = source.line_number(start);
             self.warnings.push(excess_vertex_words_warning(line));
@@ -224,7 +228,7 @@ pub(super) fn free_form_warning(line: usize, keyword: &str) -> String {
 }
 
 /// Line numbers of faces, given their indices in ascending order. Reads the file once.
-pub(super) fn face_lines(source: &MeshSource<'_>, faces: &[usize]) -> Vec<usize> {
+pub(super) fn face_lines(source: &MeshFileBytes<'_>, faces: &[usize]) -> Vec<usize> {
     let mut starts = face_byte_offsets(source);
     let (mut passed, mut at, mut line) = (0, 0, 1);
     let mut line_of = |face: usize| {
@@ -237,13 +241,13 @@ pub(super) fn face_lines(source: &MeshSource<'_>, faces: &[usize]) -> Vec<usize>
 }
 
 /// Byte offset of a face.
-pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
+pub(super) fn face_start(source: &MeshFileBytes<'_>, face: usize) -> usize {
     face_byte_offsets(source).nth(face).unwrap_or(0)
 }
 
 /// Byte offsets of all faces.
-fn face_byte_offsets<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize> + use<'a> {
-    let mut words = Words::new(source.bytes);
+fn face_byte_offsets<'a>(source: &MeshFileBytes<'a>) -> impl Iterator<Item = usize> + use<'a> {
+    let mut words = ObjTextCursor::new(source.bytes);
     std::iter::from_fn(move || {
         while words.move_to_next_statement() {
             let start = words.offset();
@@ -259,7 +263,12 @@ fn face_byte_offsets<'a>(source: &MeshSource<'a>) -> impl Iterator<Item = usize>
 }
 
 /// Parses `min` to `max` numbers in a statement. Missing numbers are 0.
-fn parse_numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
+fn parse_numbers(
+    words: &mut ObjTextCursor<'_>,
+    min: usize,
+    max: usize,
+    what: &str,
+) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;
     while let Some(word) = words.next_word().filter(|_| count < max) {

@@ -2,7 +2,7 @@ use super::super::EMPTY_FILE;
 use super::super::assemble::NO_FACES;
 use super::super::parsed::{alpha_ignored_warning, clamped_color_warning};
 use super::super::text::expected_message;
-use super::missing_uvs::{faces_without_uvs_warning, file_without_uvs_warning, partly_missing_uvs_warning};
+use super::missing_uvs::{corners_without_uvs_warning, faces_without_uvs_warning, file_without_uvs_warning};
 use super::statements::{
     CORNER_FORM, excess_vertex_words_warning, free_form_warning, invalid_smoothing_warning,
     missing_attribute_warning, out_of_range_message,
@@ -337,9 +337,9 @@ fn each_corner_keeps_its_texture_coordinates() {
     let none = [Vec2::ZERO; 3];
     let (found, warnings) = uvs("f 1 2 3\nf 1/1 3/2 4/3\nf 1 2 3\n");
     assert_eq!(found, [none, [a, b, c], none].concat());
-    assert_eq!(warnings, [partly_missing_uvs_warning(8, 2)]);
+    assert_eq!(warnings, [corners_without_uvs_warning(8, 2)]);
     let (found, warnings) = uvs("f 1/1 2/2 3\n");
-    assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![partly_missing_uvs_warning(8, 1)]));
+    assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![corners_without_uvs_warning(8, 1)]));
     // Objects without any texture coordinates do not cause a warning.
     let (found, warnings) = uvs("o one\nf 1 2 3\no two\nf 1/1 3/2 4/3\n");
     assert_eq!((found, warnings), ([none, [a, b, c]].concat(), vec![]));
@@ -513,7 +513,7 @@ fn textures_without_coordinates_are_reported() {
         (vec![faces_without_uvs_warning(12, "wall")], none.clone())
     );
     // Partially missing coordinates are reported regardless of the material.
-    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3\n")), (none, vec![partly_missing_uvs_warning(10, 1)]));
+    assert_eq!(warnings(&format!("{uvs}f 1/1 2/2 3\n")), (none, vec![corners_without_uvs_warning(10, 1)]));
 }
 
 #[test]

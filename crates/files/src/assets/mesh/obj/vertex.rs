@@ -2,7 +2,7 @@
 
 use super::super::parsed::ColorRange;
 use super::super::text::expected_message;
-use super::words::{Words, parse_number, too_few_numbers_message};
+use super::words::{ObjTextCursor, parse_number, too_few_numbers_message};
 use crate::math::DVec3;
 
 /// Positions and colors.
@@ -28,7 +28,7 @@ pub(super) const NONFINITE_COLOR: &str = "vertex colors must be finite";
 impl Vertices {
     /// Parses a `v` statement: x y z, followed by nothing, a weight, a color, a color with alpha, or a weight
     /// and a color with alpha.
-    pub(super) fn parse_vertex(&mut self, words: &mut Words<'_>) -> Result<(), String> {
+    pub(super) fn parse_vertex(&mut self, words: &mut ObjTextCursor<'_>) -> Result<(), String> {
         let start = words.offset();
         let mut numbers = [0.0; 8];
         let mut count = 0;

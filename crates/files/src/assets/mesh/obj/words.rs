@@ -5,12 +5,12 @@ use fast_float2::parse;
 use super::super::text::decode_line;
 
 /// A cursor in an OBJ file's text.
-pub(super) struct Words<'a> {
+pub(super) struct ObjTextCursor<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a> ObjTextCursor<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0 }
     }
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     fn statements(text: &str) -> Vec<Vec<String>> {
-        let mut words = Words::new(text.as_bytes());
+        let mut words = ObjTextCursor::new(text.as_bytes());
         let mut found = Vec::new();
         while words.move_to_next_statement() {
             let statement = std::iter::from_fn(|| words.next_word());
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn names_keep_blanks_and_number_signs() {
         let name = |text: &str| {
-            let mut words = Words::new(text.as_bytes());
+            let mut words = ObjTextCursor::new(text.as_bytes());
             words.next_word();
             words.name()
         };

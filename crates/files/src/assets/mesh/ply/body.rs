@@ -43,7 +43,7 @@ pub(super) enum LineEndMode {
 
 impl AsciiReader<'_> {
     fn seek_word(&mut self) -> Result<(), String> {
-        if self.0.skip_to_word() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
+        if self.0.skip_to_word_across_lines() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
     }
 }
 
@@ -83,7 +83,7 @@ impl NumberReader for AsciiReader<'_> {
 
     fn next_number_offset(&self) -> usize {
         let mut ahead = self.0;
-        ahead.skip_to_word();
+        ahead.skip_to_word_across_lines();
         ahead.offset()
     }
 

@@ -1,6 +1,6 @@
 //! Colors in a PLY file. Their range depends on their type and on the largest value.
 
-use super::super::parsed::{ALPHA_IGNORED, ColorRange, ComponentExtremes, unit_color_to_bytes};
+use super::super::parsed::{ALPHA_IGNORED, ColorComponentExtremes, ColorRange, unit_color_to_bytes};
 use super::header::ScalarType;
 
 /// Colors in file order.
@@ -13,7 +13,7 @@ pub(super) struct PlyColors {
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
     /// Extremes of red, green and blue.
-    extremes: [ComponentExtremes; 3],
+    extremes: [ColorComponentExtremes; 3],
     /// Minimum alpha, its type, and a byte offset in its item.
     alpha: Option<(f64, ScalarType, usize)>,
 }
@@ -35,7 +35,7 @@ impl PlyColors {
     }
 
     /// Adds white for an item without a color.
-    pub(super) fn push_missing(&mut self) {
+    pub(super) fn push_missing_as_white(&mut self) {
         self.push_untracked([f64::INFINITY; 3]);
     }
 
@@ -60,7 +60,7 @@ impl PlyColors {
     /// Returns the colors as bytes, and warnings about ignored alpha and out-of-range values. Each warning
     /// has a byte offset in an affected item.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
-        let max = self.extremes.iter().map(ComponentExtremes::max).fold(0.0, f64::max);
+        let max = self.extremes.iter().map(ColorComponentExtremes::max).fold(0.0, f64::max);
         let one = |scalar: ScalarType| match scalar {
             ScalarType::U8 | ScalarType::I8 => scalar.full_intensity(),
             ScalarType::I16 | ScalarType::U16 | ScalarType::I32 | ScalarType::U32 => {
@@ -72,7 +72,7 @@ impl PlyColors {
         let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar));
         let outside = self.scalars.iter().zip(&self.extremes).find_map(|(scalar, extremes)| {
             let fraction = extremes.fraction_in_integers_warning().filter(|_| scalar.is_integer());
-            extremes.out_of_range_warning(one(*scalar)).or(fraction)
+            extremes.out_of_range_color_warning(one(*scalar)).or(fraction)
         });
         let mut warnings: Vec<_> = outside.into_iter().collect();
         warnings.extend(transparent.map(|(.., at)| (at, ALPHA_IGNORED.to_owned())));

@@ -206,7 +206,7 @@ impl FaceReader {
                 Some(color) => colors.push(*color, end),
                 None if self.has_color => colors.push(COLOR.map(|index| self.values[index]), end),
                 // Missing colors are white.
-                None => colors.push_missing(),
+                None => colors.push_missing_as_white(),
             }
             let list_alpha = of_corner.and_then(|color| Some((*color.get(3)?, self.list_scalar?)));
             let alpha = list_alpha.or(self.alpha.map(|scalar| (self.values[ALPHA], scalar)));
@@ -232,7 +232,7 @@ impl FaceReader {
         if parsed.colors.is_empty() {
             let (colors, warnings) = colors.finish();
             parsed.corner_colors = colors;
-            parsed.warnings.extend(context.add_line_numbers(warnings));
+            parsed.warnings.extend(context.add_line_numbers_to_warnings(warnings));
         } else {
             parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }

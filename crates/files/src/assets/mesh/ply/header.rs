@@ -1,7 +1,7 @@
 //! PLY header: the file's elements and their properties.
 
 use super::super::text::{expected_message, quote_word};
-use super::super::{AssetError, MeshSource};
+use super::super::{AssetError, MeshFileBytes};
 
 /// Maximum size of a header. Typical headers have a few hundred bytes.
 const HEADER_LIMIT: usize = 1 << 20;
@@ -116,7 +116,7 @@ pub(super) struct PlyHeader {
 const KEYWORDS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
 
 /// Parses the header.
-pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
+pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<PlyHeader, AssetError> {
     let bytes = &source.bytes[..source.bytes.len().min(HEADER_LIMIT)];
     let mut at = 0;
     let mut lines = bytes.split_inclusive(|&byte| byte == b'\n').map(|line| {
@@ -172,7 +172,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
         parse_statement(&words, &mut encoding, &mut elements)
             .map_err(|reason| source.malformed_error_with_line(start, reason))?;
     }
-    Err(source.malformed_error(if bytes.len() == source.bytes.len() {
+    Err(source.malformed_error_without_line(if bytes.len() == source.bytes.len() {
         NO_END.to_owned()
     } else {
         header_too_long_message()

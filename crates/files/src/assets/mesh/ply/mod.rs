@@ -10,7 +10,7 @@ pub mod write;
 use super::assemble::assemble_text_mesh;
 use super::parsed::ParsedMesh;
 use super::text::Cursor;
-use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range_message};
+use super::{AssetError, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3};
 use body::{AsciiReader, BinaryReader, LineEndMode, NumberReader};
 use colors::PlyColors;
@@ -19,7 +19,7 @@ use header::{Element, Encoding, PlyHeader, PropertyType, ScalarType};
 /// Number of items between polls of the cancel token.
 const BATCH: u64 = 1 << 14;
 
-pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
     source.report_progress(0)?;
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
@@ -32,12 +32,12 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
 
 /// Reads a text file, ignoring line ends. If this fails or leaves words unread, some lines may contain
 /// undeclared values, so the file is read again with one item per line.
-fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
+fn read_text(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
     let mut words = AsciiReader(cursor, LineEndMode::Blank);
     let by_words = read(source, header, &mut words);
-    source.monitor.token.check()?;
-    if by_words.is_ok() && !words.0.skip_to_word() {
+    source.monitor.token.check_pause_and_cancel()?;
+    if by_words.is_ok() && !words.0.skip_to_word_across_lines() {
         return by_words;
     }
     let mut lines = AsciiReader(cursor, LineEndMode::EndItems(0, None));
@@ -56,7 +56,7 @@ fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, 
 
 /// Adds file positions to errors.
 struct ErrorContext<'a> {
-    source: &'a MeshSource<'a>,
+    source: &'a MeshFileBytes<'a>,
     encoding: Encoding,
 }
 
@@ -66,7 +66,7 @@ impl ErrorContext<'_> {
         let reason = item_error_message(&element.name, index + 1, reason);
         match self.encoding {
             Encoding::Ascii => self.source.malformed_error_with_line(at, reason),
-            Encoding::LittleEndian | Encoding::BigEndian => self.source.malformed_error(reason),
+            Encoding::LittleEndian | Encoding::BigEndian => self.source.malformed_error_without_line(reason),
         }
     }
 
@@ -79,7 +79,7 @@ impl ErrorContext<'_> {
     }
 
     /// Adds line numbers to warnings that have a byte offset.
-    fn add_line_numbers(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
+    fn add_line_numbers_to_warnings(&self, warnings: Vec<(usize, String)>) -> impl Iterator<Item = String> {
         warnings.into_iter().map(|(at, words)| format!("{}{words}", self.line_prefix(at)))
     }
 
@@ -90,7 +90,7 @@ impl ErrorContext<'_> {
 }
 
 fn read(
-    source: &MeshSource<'_>,
+    source: &MeshFileBytes<'_>,
     header: &PlyHeader,
     numbers: &mut impl NumberReader,
 ) -> Result<LoadedMesh, AssetError> {
@@ -99,8 +99,9 @@ fn read(
         |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
     let vertices = count_of("vertex");
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
-        return Err(source
-            .malformed_error(format!("too many vertices ({vertices}), or more than one vertex element")));
+        return Err(source.malformed_error_without_line(format!(
+            "too many vertices ({vertices}), or more than one vertex element"
+        )));
     }
     // Ignore strips if there are faces, because both describe the same triangles.
     let has_faces = count_of("face") > 0;
@@ -136,7 +137,7 @@ fn read(
 
 /// Rejects element counts that are too large for the file size, before any memory is allocated.
 fn check_plausible_counts(
-    source: &MeshSource<'_>,
+    source: &MeshFileBytes<'_>,
     element: &Element,
     encoding: Encoding,
     at: usize,
@@ -144,7 +145,7 @@ fn check_plausible_counts(
     let needed = element.count.saturating_mul(element.min_item_bytes(encoding));
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
-        return Err(source.malformed_error(implausible_count_message(
+        return Err(source.malformed_error_without_line(implausible_count_message(
             &element.name,
             element.count,
             remaining,
@@ -266,7 +267,7 @@ fn read_vertices(
         .collect();
     let has = |slots: &[usize]| slots.iter().all(|slot| layout.iter().any(|(_, to)| *to == Some(*slot)));
     if !has(&[0, 1, 2]) {
-        return Err(context.source.malformed_error(NO_POSITIONS));
+        return Err(context.source.malformed_error_without_line(NO_POSITIONS));
     }
     let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
     let has_second_uvs = has(&[11, 12]);
@@ -316,7 +317,7 @@ fn read_vertices(
     if let Some(colors) = colors {
         let (colors, warnings) = colors.finish();
         parsed.colors = colors;
-        parsed.warnings.extend(context.add_line_numbers(warnings));
+        parsed.warnings.extend(context.add_line_numbers_to_warnings(warnings));
     }
     Ok(())
 }
@@ -329,14 +330,14 @@ fn read_faces(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
+        return Err(context.source.malformed_error_without_line(no_vertex_list_message(&element.name)));
     };
     if faces::has_attributes(element, corners) {
         return faces::read_with_attributes(context, element, corners, numbers, vertices, parsed);
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    for_each_property_list(context, element, corners, numbers, |numbers, item, length| {
+    read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
             faces.push_corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
         }
@@ -355,10 +356,10 @@ fn read_strips(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.malformed_error(no_vertex_list_message(&element.name)));
+        return Err(context.source.malformed_error_without_line(no_vertex_list_message(&element.name)));
     };
     let faces = &mut parsed.faces;
-    for_each_property_list(context, element, corners, numbers, |numbers, item, length| {
+    read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.integer(item)?;
@@ -397,7 +398,7 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
 
 /// Reads all items of an element. `corners` is a property index. `read` receives the type and length of that
 /// property's list.
-fn for_each_property_list<N: NumberReader>(
+fn read_items_with_list_property<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,

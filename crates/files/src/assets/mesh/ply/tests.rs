@@ -20,7 +20,7 @@ use crate::math::{Vec2, Vec3};
 fn read_bytes(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
     let token = CancelToken::new();
     let monitor = Monitor { progress: &ignore_progress, token: &token };
-    parse(&MeshSource { path: Path::new("a.ply"), bytes, monitor })
+    parse(&MeshFileBytes { path: Path::new("a.ply"), bytes, monitor })
 }
 
 fn error(bytes: &[u8]) -> (Option<usize>, String) {

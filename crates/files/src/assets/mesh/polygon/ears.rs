@@ -146,7 +146,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         self.remaining -= 1;
         self.tree.remove(b);
         for changed in [b, a, c] {
-            self.requeue_blocked(changed);
+            self.requeue_blocked_by(changed);
         }
         for neighbor in [a, c] {
             self.enqueue(neighbor);
@@ -168,7 +168,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
     }
 
     /// Queues the corners blocked by `blocker`.
-    fn requeue_blocked(&mut self, blocker: u32) {
+    fn requeue_blocked_by(&mut self, blocker: u32) {
         let mut entry = std::mem::replace(&mut self.first_waiting[blocker as usize], NONE);
         while entry != NONE {
             let (corner, stamp, next) = self.waiting[entry as usize];
@@ -203,7 +203,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
     fn outline_enters(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
-        let turns = edge_orientations(triangle, point);
+        let turns = edge_functions(triangle, point);
         if turns.iter().any(|turn| *turn < 0.0) {
             return false;
         }
@@ -213,13 +213,13 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         // If the corner is on the triangle's boundary, the outline enters the triangle if a neighbor is
         // inside every side that the corner is on.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
-            let sides = self::edge_orientations(triangle, self.point(neighbor));
+            let sides = self::edge_functions(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
         })
     }
 }
 
 /// Returns which side of each triangle edge a point is on. Positive values are inside.
-fn edge_orientations([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
+fn edge_functions([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     [twice_signed_area(a, b, point), twice_signed_area(b, c, point), twice_signed_area(c, a, point)]
 }

@@ -31,7 +31,7 @@ impl CornerTree {
             positions: vec![0; points.len()],
             nodes: vec![empty; 2 * leaves],
         };
-        tree.build(points, 0, 0, points.len());
+        tree.build_node(points, 0, 0, points.len());
         for (position, corner) in (0..).zip(&tree.order) {
             tree.positions[*corner as usize] = position;
         }
@@ -39,7 +39,7 @@ impl CornerTree {
     }
 
     /// Computes a node's bounding box and splits its range at the median of the longer axis.
-    fn build(&mut self, points: &[DVec2], node: usize, start: usize, end: usize) {
+    fn build_node(&mut self, points: &[DVec2], node: usize, start: usize, end: usize) {
         let range = &mut self.order[start..end];
         let at = |corner: &u32| points[*corner as usize];
         let min = range.iter().map(at).fold(DVec2::INFINITY, DVec2::min);
@@ -53,8 +53,8 @@ impl CornerTree {
         let middle = (end - start) / 2;
         let key = |corner: &u32| at(corner)[axis];
         range.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
-        self.build(points, 2 * node + 1, start, start + middle);
-        self.build(points, 2 * node + 2, start + middle, end);
+        self.build_node(points, 2 * node + 1, start, start + middle);
+        self.build_node(points, 2 * node + 2, start + middle, end);
     }
 
     /// Removes a corner.

@@ -7,7 +7,7 @@ use std::array;
 
 use rayon::prelude::*;
 
-use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
+use super::cost::{PlaneSearch, PlanesWithTriangleCounts, SplitPlane};
 use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec4;
 
@@ -39,7 +39,7 @@ impl Histogram {
         };
         for reference in references {
             let low = bins(reference.bounds.min).to_array().map(f32::to_bits);
-            let high = bins(reference.bounds.max()).to_array().map(f32::to_bits);
+            let high = bins(reference.bounds.max_corner()).to_array().map(f32::to_bits);
             for axis in 0..3 {
                 own.starts[axis][low[axis] as usize % PLANES] += 1;
                 own.ends[axis][high[axis] as usize % PLANES] += 1;
@@ -76,7 +76,7 @@ pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Op
     };
     let mut search = PlaneSearch::<{ PLANES / 4 }>::new(cell, references.len());
     for axis in 0..3 {
-        let (min, max) = (around.min.to_array()[axis], around.max().to_array()[axis]);
+        let (min, max) = (around.min.to_array()[axis], around.max_corner().to_array()[axis]);
         let (mut at, mut left, mut right) = ([min; PLANES], [0; PLANES], [references.len() as u32; PLANES]);
         for bin in 1..if per_length[axis] > 0.0 { BINS } else { 1 } {
             at[bin] = min + (max - min) * (bin as f32 / BINS as f32);
@@ -89,7 +89,7 @@ pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Op
         search.add_planes(
             axis,
             false,
-            &CandidatePlanes { at: four(at), left: counts(left), right: counts(right) },
+            &PlanesWithTriangleCounts { at: four(at), left: counts(left), right: counts(right) },
         );
     }
     // At a face of the bounding box, put references in the plane on the nonempty side.

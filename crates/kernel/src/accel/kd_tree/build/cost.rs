@@ -28,7 +28,7 @@ pub struct SplitPlane {
 /// 4·`N` planes perpendicular to one axis, and the triangle counts on both sides of each plane. Triangles on
 /// both sides are counted twice.
 #[derive(Clone, Copy)]
-pub struct CandidatePlanes<const N: usize> {
+pub struct PlanesWithTriangleCounts<const N: usize> {
     pub at: [Vec4; N],
     pub left: [Vec4; N],
     pub right: [Vec4; N],
@@ -57,7 +57,7 @@ impl<const N: usize> PlaneSearch<N> {
         let [x, y, z] = extent;
         Self {
             min: cell.min.to_array(),
-            max: cell.max().to_array(),
+            max: cell.max_corner().to_array(),
             extent,
             inverse_area: 1.0 / (x * y + y * z + z * x),
             cost: [Vec4::splat(count as f32); N],
@@ -68,7 +68,7 @@ impl<const N: usize> PlaneSearch<N> {
 
     /// Adds candidate planes. Planes outside the cell are ignored.
     #[inline(always)]
-    pub fn add_planes(&mut self, axis: usize, planar_right: bool, planes: &CandidatePlanes<N>) {
+    pub fn add_planes(&mut self, axis: usize, planar_right: bool, planes: &PlanesWithTriangleCounts<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
         // Area of the plane within the cell and area per unit length along the axis, both relative to the
         // cell's area.

@@ -90,7 +90,7 @@ fn build_with_budget(
     let levels = depth_limit(references.len());
     let part = build_part(&Cell { bounds, levels, room }, references, &corners, token)?;
     let all = part.flatten();
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let (references, order) = order_by_first_use(all.ids, count);
     let triangles = order.into_par_iter().map(|id| LeafTriangle { corners: corners(id), id }).collect();
     Ok(BuiltKdTree { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
@@ -142,7 +142,7 @@ impl Cell {
         // enough.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
-        let [below, above] = self.bounds.halves(plane.axis, plane.at);
+        let [below, above] = self.bounds.split_at_plane(plane.axis, plane.at);
         [Self { bounds: below, levels, room }, Self { bounds: above, levels, room: self.room - room }]
     }
 }
@@ -159,12 +159,12 @@ fn build_part(
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
 ) -> Result<TreePart, Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let plane = if references.len() > TASK_SIZE { cell.choose_split(&references) } else { None };
     let Some(plane) = plane else {
         return Ok(TreePart::Built(KdSubtree::build(cell, references, corners, token)?));
     };
-    let left = PartitionBuffers::default().partition(&mut references, 0, &plane, corners).to_vec();
+    let left = PartitionBuffers::default().partition_references(&mut references, 0, &plane, corners).to_vec();
     references.shrink_to_fit();
     let [left_cell, right_cell] = cell.halves(&plane, [left.len(), references.len()]);
     let (left, right) = rayon::join(

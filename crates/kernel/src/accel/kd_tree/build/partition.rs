@@ -20,7 +20,7 @@ impl PartitionBuffers {
     ///
     /// Branchless, since data-dependent branches would often be mispredicted: every reference is written to
     /// both sides, and then each side's length is incremented by 0 or 1.
-    pub fn partition(
+    pub fn partition_references(
         &mut self,
         references: &mut Vec<TriangleReference>,
         first: usize,
@@ -50,7 +50,8 @@ impl PartitionBuffers {
         let (mut left, mut right, mut on_both) = (0, 0, 0);
         for place in 0..own.len() {
             let reference = own[place];
-            let (min, max) = (reference.bounds.min.to_array()[AXIS], reference.bounds.max().to_array()[AXIS]);
+            let (min, max) =
+                (reference.bounds.min.to_array()[AXIS], reference.bounds.max_corner().to_array()[AXIS]);
             let (below, above) = (min < at, max > at);
             let is_planar = !(below | above);
             self.left[left] = reference;
@@ -97,10 +98,11 @@ mod tests {
             for planar_right in [false, true] {
                 let plane = SplitPlane { axis, at: 1.0, planar_right };
                 let mut own = all.clone();
-                let left = scratch.partition(&mut own, 50, &plane, &corners).to_vec();
+                let left = scratch.partition_references(&mut own, 50, &plane, &corners).to_vec();
                 let expected = |is_there: &dyn Fn(f32, f32) -> bool| -> Vec<u32> {
-                    let reaches =
-                        |one: &&TriangleReference| is_there(one.bounds.min[axis], one.bounds.max()[axis]);
+                    let reaches = |one: &&TriangleReference| {
+                        is_there(one.bounds.min[axis], one.bounds.max_corner()[axis])
+                    };
                     all[50..].iter().filter(reaches).map(TriangleReference::id).collect()
                 };
                 let planar = |min: f32, max: f32| min == 1.0 && max == 1.0;
@@ -110,7 +112,7 @@ mod tests {
                     |side: &[TriangleReference]| side.iter().map(TriangleReference::id).collect::<Vec<_>>();
                 assert_eq!((ids(&left), ids(&own[50..])), (on_left, on_right), "{plane:?}");
                 assert_eq!(ids(&own[..50]), ids(&all[..50]), "references of other cells should not change");
-                assert!(left.iter().all(|one| one.bounds.max()[axis] <= 1.0), "{plane:?}");
+                assert!(left.iter().all(|one| one.bounds.max_corner()[axis] <= 1.0), "{plane:?}");
                 assert!(own[50..].iter().all(|one| one.bounds.min[axis] >= 1.0), "{plane:?}");
             }
         }

@@ -61,9 +61,9 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
             return Ok(());
         };
         if own.len() > POLLED {
-            self.token.check()?;
+            self.token.check_pause_and_cancel()?;
         }
-        let left = self.scratch.partition(&mut self.references, first, &plane, self.corners);
+        let left = self.scratch.partition_references(&mut self.references, first, &plane, self.corners);
         let middle = self.references.len();
         let [left_cell, right_cell] = cell.halves(&plane, [left.len(), middle - first]);
         self.references.extend_from_slice(left);

@@ -2,7 +2,7 @@
 //! Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few
 //! triangles, counting both sides of every plane with SIMD is faster than keeping the faces sorted.
 
-use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
+use super::cost::{PlaneSearch, PlanesWithTriangleCounts, SplitPlane};
 use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec4;
 
@@ -32,7 +32,7 @@ fn cheapest_plane_simd<const N: usize>(
     // below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
     for (place, reference) in references.iter().take(4 * N).enumerate() {
-        let (min, max) = (reference.bounds.min.to_array(), reference.bounds.max().to_array());
+        let (min, max) = (reference.bounds.min.to_array(), reference.bounds.max_corner().to_array());
         for axis in 0..3 {
             starts[axis][place / 4][place % 4] = min[axis];
             ends[axis][place / 4][place % 4] = max[axis];
@@ -59,7 +59,7 @@ fn add_axis_planes<const N: usize>(
     search: &mut PlaneSearch<N>,
 ) {
     let mut planes =
-        CandidatePlanes { at: at.map(Vec4::from), left: [Vec4::ZERO; N], right: [Vec4::ZERO; N] };
+        PlanesWithTriangleCounts { at: at.map(Vec4::from), left: [Vec4::ZERO; N], right: [Vec4::ZERO; N] };
     let mut planar = [Vec4::ZERO; N];
     for place in 0..count.min(4 * N) {
         let start = Vec4::splat(starts[place / 4][place % 4]);
@@ -94,16 +94,16 @@ mod tests {
     /// cell.
     fn cost(references: &[TriangleReference], cell: &SimdBounds, plane: &SplitPlane) -> f32 {
         let SplitPlane { axis, at, planar_right } = *plane;
-        if !(at > cell.min[axis] && at < cell.max()[axis]) {
+        if !(at > cell.min[axis] && at < cell.max_corner()[axis]) {
             return f32::INFINITY;
         }
         let goes = |reference: &TriangleReference, right: bool| {
-            let (min, max) = (reference.bounds.min[axis], reference.bounds.max()[axis]);
+            let (min, max) = (reference.bounds.min[axis], reference.bounds.max_corner()[axis]);
             let is_planar = min == at && max == at;
             if is_planar { right == planar_right } else { if right { max > at } else { min < at } }
         };
         let count = |right| references.iter().filter(|reference| goes(reference, right)).count() as f32;
-        let share = cell.halves(axis, at).map(|half| half.half_area() / cell.half_area());
+        let share = cell.split_at_plane(axis, at).map(|half| half.half_area() / cell.half_area());
         let cost = 1.0 + share[0] * count(false) + share[1] * count(true);
         if count(false) == 0.0 || count(true) == 0.0 { 0.8 * cost } else { cost }
     }
@@ -131,7 +131,7 @@ mod tests {
                 continue;
             }
             let faces =
-                references.iter().flat_map(|reference| [reference.bounds.min, reference.bounds.max()]);
+                references.iter().flat_map(|reference| [reference.bounds.min, reference.bounds.max_corner()]);
             let all = faces.flat_map(|corner| {
                 (0..6).map(move |i| SplitPlane { axis: i % 3, at: corner[i % 3], planar_right: i < 3 })
             });

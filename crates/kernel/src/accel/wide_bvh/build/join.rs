@@ -139,8 +139,8 @@ impl SubtreeStart {
     fn offset_node(&self, node: &WideNode) -> WideNode {
         let mut moved = *node;
         for slot in 0..WIDTH {
-            if node.bounds(slot).is_some() {
-                moved.set_child(slot, self.offset_child(node.child(slot)));
+            if node.child_bounds(slot).is_some() {
+                moved.set_child_reference(slot, self.offset_child(node.child(slot)));
             }
         }
         moved

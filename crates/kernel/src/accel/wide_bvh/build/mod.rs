@@ -17,7 +17,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
-use split::{PlannedReferenceRange, partition};
+use split::{ReferenceRangeWithSplit, partition};
 use subtree::WideSubtree;
 
 /// Maximum number of triangles in a part built by a single thread. The cancellation token is polled between
@@ -48,12 +48,12 @@ pub fn build(
     if quality == Quality::High {
         references = triangle_splits::split_large_triangles(&references, &corners, token)?;
     }
-    let whole = PlannedReferenceRange::whole(&references);
+    let whole = ReferenceRangeWithSplit::whole(&references);
     let bounds = whole.bounds.aabb();
     let part = build_part(&mut references, 0, whole, token)?;
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let (nodes, leaves) = join::flatten(part);
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let pack = |leaf: &subtree::PackReferenceRange| {
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
@@ -76,10 +76,10 @@ enum TreePart {
 fn build_part(
     references: &mut [TriangleReference],
     start: usize,
-    segment: PlannedReferenceRange,
+    segment: ReferenceRangeWithSplit,
     token: &CancelToken,
 ) -> Result<TreePart, Cancelled> {
-    token.check()?;
+    token.check_pause_and_cancel()?;
     let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
         return Ok(TreePart::Built(WideSubtree::build(references, start, segment)));
     };

@@ -28,7 +28,7 @@ const SURFACE_AREA_LEVELS: u32 = 56;
 
 /// A range of references and how to split it.
 #[derive(Clone, Debug)]
-pub struct PlannedReferenceRange {
+pub struct ReferenceRangeWithSplit {
     pub count: usize,
     pub bounds: SimdBounds,
     /// Number of ancestors of this segment.
@@ -50,7 +50,7 @@ pub enum Split {
     Middle,
 }
 
-impl PlannedReferenceRange {
+impl ReferenceRangeWithSplit {
     /// The segment that contains all references.
     pub fn whole(references: &[TriangleReference]) -> Self {
         let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(ReferenceBounds::around);
@@ -115,7 +115,7 @@ fn choose_split(
     } else {
         Histogram::<BINS>::from_references_parallel(references, &bins).cheapest_split(&bins)
     };
-    let leaf_cost = pack_count(count as u32) as f32 * bounds.half_area();
+    let leaf_cost = triangle_pack_count(count as u32) as f32 * bounds.half_area();
     match best {
         Some(CheapestBinSplit { axis, bin, cost, sides }) if must || cost < leaf_cost => {
             let is_node = must || cost + TRAVERSAL_COST * bounds.half_area() < leaf_cost;
@@ -128,7 +128,7 @@ fn choose_split(
 
 /// Number of packs for `count` triangles.
 #[inline(always)]
-fn pack_count(count: u32) -> u32 {
+fn triangle_pack_count(count: u32) -> u32 {
     count.div_ceil(PACK as u32)
 }
 
@@ -236,7 +236,7 @@ impl<const N: usize> Histogram<N> {
                 bounds.grow(own);
                 members += self.counts[bin][axis];
                 if members > 0 {
-                    right_cost[bin] = bounds.half_area() * pack_count(members) as f32;
+                    right_cost[bin] = bounds.half_area() * triangle_pack_count(members) as f32;
                 }
             }
             (bounds, members) = (SimdBounds::EMPTY, 0);
@@ -244,7 +244,7 @@ impl<const N: usize> Histogram<N> {
                 let own = &self.bounds[bin - 1][axis];
                 bounds.grow(own);
                 members += self.counts[bin - 1][axis];
-                let cost = bounds.half_area() * pack_count(members) as f32 + right_cost;
+                let cost = bounds.half_area() * triangle_pack_count(members) as f32 + right_cost;
                 if members > 0 && cost < best.map_or(f32::INFINITY, |(_, _, least)| least) {
                     best = Some((axis, bin, cost));
                 }
@@ -265,9 +265,9 @@ impl<const N: usize> Histogram<N> {
 /// Reorders the references according to the split and returns the two nonempty segments.
 pub fn partition(
     references: &mut [TriangleReference],
-    segment: &PlannedReferenceRange,
+    segment: &ReferenceRangeWithSplit,
     split: &Split,
-) -> (PlannedReferenceRange, PlannedReferenceRange) {
+) -> (ReferenceRangeWithSplit, ReferenceRangeWithSplit) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
@@ -286,8 +286,8 @@ pub fn partition(
     };
     let level = segment.level + 1;
     let (left_references, right_references) = references.split_at(middle);
-    let left = PlannedReferenceRange::new(left_references, left, level);
-    (left, PlannedReferenceRange::new(right_references, right, level))
+    let left = ReferenceRangeWithSplit::new(left_references, left, level);
+    (left, ReferenceRangeWithSplit::new(right_references, right, level))
 }
 
 fn partition_along_axis<const AXIS: usize>(
@@ -352,7 +352,7 @@ mod tests {
     }
 
     fn bits(bounds: &SimdBounds) -> [u32; 6] {
-        let (min, max) = (bounds.min + Vec4::ZERO, bounds.max() + Vec4::ZERO);
+        let (min, max) = (bounds.min + Vec4::ZERO, bounds.max_corner() + Vec4::ZERO);
         [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits)
     }
 

@@ -1,6 +1,6 @@
 //! Subtrees built by a single thread.
 
-use super::split::{PlannedReferenceRange, partition};
+use super::split::{ReferenceRangeWithSplit, partition};
 use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
@@ -24,7 +24,11 @@ pub struct WideSubtree {
 
 impl WideSubtree {
     /// Builds a subtree over `references`. `start` is the index of the first reference among all references.
-    pub fn build(references: &mut [TriangleReference], start: usize, segment: PlannedReferenceRange) -> Self {
+    pub fn build(
+        references: &mut [TriangleReference],
+        start: usize,
+        segment: ReferenceRangeWithSplit,
+    ) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),
             packs: Vec::with_capacity(references.len() / 3),
@@ -39,7 +43,7 @@ impl WideSubtree {
         &mut self,
         references: &mut [TriangleReference],
         start: usize,
-        segment: PlannedReferenceRange,
+        segment: ReferenceRangeWithSplit,
     ) -> Child {
         if segment.is_node {
             Child::Inner(self.build_node(references, start, segment))
@@ -63,11 +67,11 @@ impl WideSubtree {
         &mut self,
         references: &mut [TriangleReference],
         start: usize,
-        segment: PlannedReferenceRange,
+        segment: ReferenceRangeWithSplit,
     ) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(WideNode::EMPTY);
-        let mut children: [Option<(usize, PlannedReferenceRange)>; WIDTH] = [const { None }; WIDTH];
+        let mut children: [Option<(usize, ReferenceRangeWithSplit)>; WIDTH] = [const { None }; WIDTH];
         children[0] = Some((0, segment));
         let mut count = 1;
         while count < WIDTH {
@@ -77,7 +81,7 @@ impl WideSubtree {
             });
             let next = inner.max_by(|a, b| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2)));
             let Some((slot, ..)) = next else { break };
-            let Some((from, PlannedReferenceRange { split: Some(split), .. })) = &children[slot] else {
+            let Some((from, ReferenceRangeWithSplit { split: Some(split), .. })) = &children[slot] else {
                 break;
             };
             let (from, split) = (*from, *split);

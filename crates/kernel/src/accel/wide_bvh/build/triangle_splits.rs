@@ -32,7 +32,7 @@ pub fn split_large_triangles(
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
     let factor = find_priority_scale(&priorities, (references.len() as f64 * MOST_MORE) as u64);
     let of_chunk = |(references, priorities): (&[TriangleReference], &[f32])| {
-        token.check()?;
+        token.check_pause_and_cancel()?;
         let mut pieces = Vec::new();
         for (reference, &priority) in references.iter().zip(priorities) {
             grid.cut_into_pieces(
@@ -99,10 +99,10 @@ impl BisectionGrid {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
             // A box that ends on a plane counts as below it.
             let first = place(bounds.min[axis]) as u32;
-            let last = (place(bounds.max()[axis]).ceil() as u32).saturating_sub(1).max(first);
+            let last = (place(bounds.max_corner()[axis]).ceil() as u32).saturating_sub(1).max(first);
             let level = (first ^ last).checked_ilog2()?;
             let at = self.start[axis] + self.extent[axis] * ((last >> level << level) as f32 / cells);
-            (bounds.min[axis] < at && at < bounds.max()[axis]).then_some(GridPlane { axis, at, level })
+            (bounds.min[axis] < at && at < bounds.max_corner()[axis]).then_some(GridPlane { axis, at, level })
         };
         let length = |plane: &GridPlane| bounds.extent()[plane.axis];
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))

@@ -32,7 +32,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = lines.box_entries(node, end);
-                if let Some(next) = push_children_ordered(tree, node, near, met, &mut stack) {
+                if let Some(next) = push_farther_children(tree, node, near, met, &mut stack) {
                     code = next;
                     continue;
                 }
@@ -106,7 +106,7 @@ fn update_nearest_uninlined(
 /// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn push_children_ordered(
+fn push_farther_children(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,

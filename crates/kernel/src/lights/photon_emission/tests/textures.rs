@@ -59,7 +59,7 @@ fn quad_power_is_the_mean_of_its_texture() {
 }
 
 /// The triangles of a curved sheet after a transform, with their UV coordinates.
-fn sheet(side: u32) -> Vec<UvTriangle> {
+fn sheet(side: u32) -> Vec<TriangleWithUvs> {
     let transform = Transform::scale_rotate_translate(
         DVec3::new(0.5, -1.5, 0.8),
         DVec3::new(30.0, -50.0, 80.0),
@@ -75,7 +75,7 @@ fn sheet(side: u32) -> Vec<UvTriangle> {
         [[a, b, c], [a, c, d]]
     });
     // Every other triangle belongs to a different light.
-    let patch = |(number, corners): (u32, [(DVec3, Vec2); 3])| UvTriangle {
+    let patch = |(number, corners): (u32, [(DVec3, Vec2); 3])| TriangleWithUvs {
         primitive: number * 2 + 1,
         corners: corners.map(|(point, _)| point),
         uvs: corners.map(|(_, uv)| uv),
@@ -101,11 +101,12 @@ fn mesh_emission_matches_light_sampling() {
             radiance: COLOR,
             texture: None,
             object: OBJECT,
-            part: EmittingPart::Listed,
+            part: EmittingTriangleSelection::Listed,
             bounds,
         };
-        let area_of =
-            |UvTriangle { corners: [a, b, c], .. }: &UvTriangle| 0.5 * (*b - *a).cross(*c - *a).length();
+        let area_of = |TriangleWithUvs { corners: [a, b, c], .. }: &TriangleWithUvs| {
+            0.5 * (*b - *a).cross(*c - *a).length()
+        };
         let area: f64 = patches.iter().map(area_of).sum();
         let light = if is_textured {
             textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Triangles(patches))
@@ -114,7 +115,7 @@ fn mesh_emission_matches_light_sampling() {
         };
         let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("never canceled"));
         let source =
-            PhotonSource::new(&lights, |_| Some(EmissiveObjectGeometry::Mesh { rounding: 1e-6 }), SCENE);
+            PhotonEmitter::new(&lights, |_| Some(EmissiveObjectGeometry::Mesh { rounding: 1e-6 }), SCENE);
         let source = source.expect("power");
         assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);
         if !is_textured {

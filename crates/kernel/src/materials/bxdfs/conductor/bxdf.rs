@@ -2,9 +2,11 @@
 
 use super::{ConductorPoint, FresnelPoint, reflectance};
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::microfacet::{HalfVector, SmithTerms, frame_with_tangent, sample_reflection};
+use crate::materials::microfacet::{
+    SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
+};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
@@ -85,21 +87,21 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     }
 
     #[inline(always)]
-    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> ConductorViewTerms {
-        let &SurfaceDirections { normal, wo, tangent } = directions;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, _: BxdfFlags) -> ConductorViewTerms {
+        let &ShadingGeometry { normal, wo, tangent } = directions;
         ConductorViewTerms { normal, wo, tangent }
     }
 
     #[inline(always)]
     fn narrow_lobe_value(&self, view: &ConductorViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let distribution = if BRUSHED {
-            half.anisotropic_ggx(&Self::frame(view), self.alphas)
+            half.anisotropic_ggx_d(&Self::frame(view), self.alphas)
         } else {
-            half.isotropic_ggx(self.alphas[0])
+            half.evaluate_isotropic_ggx(self.alphas[0])
         };
         let [eye, light] = self.smith_terms(view, wi);
-        let white = eye.reflection_term(&light, distribution);
+        let white = eye.torrance_sparrow_without_fresnel(&light, distribution);
         let cosine = half.cosine_to_either_direction();
         let weight = schlick_weight(cosine);
         let f = if any.contains(INDEX) {

@@ -8,7 +8,7 @@ use crate::materials::fresnel::{conductor, schlick_weight};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::ScalarParameter;
-use crate::materials::texture::ColorParameter;
+use crate::materials::texture::ColorOrTexture;
 use crate::math::Vec3;
 pub use bxdf::ConductorBxdf;
 
@@ -27,13 +27,13 @@ pub struct Conductor {
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConductorFresnel {
     /// Schlick's approximation, based on the reflectance at normal incidence.
-    Schlick(ColorParameter),
+    Schlick(ColorOrTexture),
     /// Exact equations, from the complex index of refraction.
     Index {
         /// Real part for red, green, and blue.
-        eta: ColorParameter,
+        eta: ColorOrTexture,
         /// Imaginary part for red, green, and blue.
-        k: ColorParameter,
+        k: ColorOrTexture,
     },
 }
 

@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::PhongBsdf;
 use super::lobes::{PhongLobes, phong_cosine_power};
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
 use crate::math::Vec3;
 use glimt_base::soa;
 
@@ -81,8 +81,8 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> PhongViewTerms {
-        let &SurfaceDirections { normal, wo, .. } = directions;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, _: BxdfFlags) -> PhongViewTerms {
+        let &ShadingGeometry { normal, wo, .. } = directions;
         PhongViewTerms { reflected: normal * (2.0 * normal.dot(wo)) - wo }
     }
 
@@ -139,7 +139,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn exponent(&self) -> f32 {
+    fn narrow_lobe_exponent(&self) -> f32 {
         self.shininess
     }
 }

@@ -8,7 +8,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::lookup::ParameterLookup;
-use crate::materials::texture::ColorParameter;
+use crate::materials::texture::ColorOrTexture;
 use crate::math::Vec3;
 pub use bxdf::PhongBxdf;
 use lobes::{PhongLobes, phong_cosine_power};
@@ -17,13 +17,13 @@ use lobes::{PhongLobes, phong_cosine_power};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
     /// Diffuse reflectance kd.
-    pub diffuse: ColorParameter,
+    pub diffuse: ColorOrTexture,
     /// Specular reflectance ks.
-    pub specular: ColorParameter,
+    pub specular: ColorOrTexture,
     /// Exponent α.
     pub shininess: f32,
     /// Ambient reflectance ka. Defaults to kd if `None`.
-    pub ambient: Option<ColorParameter>,
+    pub ambient: Option<ColorOrTexture>,
 }
 
 /// [`Phong`] at a point, after texture lookups.
@@ -63,7 +63,7 @@ impl BxdfMaterial for Phong {
     }
 
     #[inline]
-    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
+    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
         Some(&self.diffuse)
     }
 }

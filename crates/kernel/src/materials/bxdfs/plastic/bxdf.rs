@@ -4,10 +4,10 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{PlasticPoint, base_layer_f};
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
 use crate::materials::fresnel::dielectric_from_outside;
-use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
-use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
+use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
+use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -52,7 +52,7 @@ impl PlasticBxdf {
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
-        let rough = evaluate_polynomial(cosine, |number| self.terms[number]);
+        let rough = evaluate_albedo_fit(cosine, |number| self.terms[number]);
         if any.contains(SMOOTH) {
             let smooth = dielectric_from_outside(cosine, self.ior);
             if self.alpha == 0.0 { smooth } else { rough }
@@ -80,8 +80,8 @@ impl PlasticBxdf {
     /// The coat's D for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
     fn distribution_and_fresnel(&self, view: &PlasticViewTerms, wi: Vec3) -> [f32; 2] {
-        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
-        let distribution = half.isotropic_ggx(if self.alpha > 0.0 { self.alpha } else { 1.0 });
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
+        let distribution = half.evaluate_isotropic_ggx(if self.alpha > 0.0 { self.alpha } else { 1.0 });
         let fresnel = dielectric_from_outside(half.cosine_to_either_direction(), self.ior);
         [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
     }
@@ -115,8 +115,8 @@ impl Bxdf for PlasticBxdf {
     }
 
     #[inline(always)]
-    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PlasticViewTerms {
-        let &SurfaceDirections { normal, wo, .. } = directions;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, any: BxdfFlags) -> PlasticViewTerms {
+        let &ShadingGeometry { normal, wo, .. } = directions;
         let cosine = normal.dot(wo);
         let albedo = self.coat_albedo(if cosine > 0.0 { cosine } else { 0.0 }, any);
         let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
@@ -136,7 +136,7 @@ impl Bxdf for PlasticBxdf {
     fn narrow_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let [distribution, fresnel] = self.distribution_and_fresnel(view, wi);
         let [eye, light] = self.smith_terms(view, wi);
-        let coat = fresnel * eye.reflection_term(&light, distribution);
+        let coat = fresnel * eye.torrance_sparrow_without_fresnel(&light, distribution);
         LobeValue { f: self.specular * coat, max: self.specular.max_element() * coat, shape: 0.0 }
     }
 
@@ -154,7 +154,7 @@ impl Bxdf for PlasticBxdf {
         if any.contains(BxdfFlags::NARROW) {
             let [distribution, _] = self.distribution_and_fresnel(view, wi);
             let [eye, light] = self.smith_terms(view, wi);
-            let pdf = eye.pdf(distribution);
+            let pdf = eye.reflection_pdf(distribution);
             coat = if light.is_above_surface() { pdf } else { 0.0 };
         }
         let cosine = normal.dot(wi);
@@ -184,7 +184,7 @@ impl Bxdf for PlasticBxdf {
             SampledLobes::All => choice < view.coat_share,
             SampledLobes::Narrow => self.alpha > 0.0,
         };
-        select_vec3(is_coat, coat, diffuse)
+        branchless_select_vec3(is_coat, coat, diffuse)
     }
 
     #[inline(always)]

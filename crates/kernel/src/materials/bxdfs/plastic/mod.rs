@@ -10,12 +10,12 @@ use std::f32::consts::FRAC_1_PI;
 
 use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::lobe_albedo::{
-    AlbedoTable, LobeAlbedo, dielectric_reflectance, reflectance_under_coat,
+    AlbedoTable, LobeAlbedoPolynomial, dielectric_reflectance, reflectance_under_coat,
 };
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::ScalarParameter;
-use crate::materials::texture::ColorParameter;
+use crate::materials::texture::ColorOrTexture;
 use crate::math::Vec3;
 pub use bxdf::PlasticBxdf;
 
@@ -23,8 +23,8 @@ pub use bxdf::PlasticBxdf;
 /// [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
-    diffuse: ColorParameter,
-    specular: ColorParameter,
+    diffuse: ColorOrTexture,
+    specular: ColorOrTexture,
     roughness: ScalarParameter,
     ior: f32,
     /// Albedos of the coat.
@@ -45,22 +45,22 @@ pub struct PlasticPoint {
     /// α. 0 if the coat is smooth.
     pub alpha: f32,
     /// Albedo of the coat.
-    pub albedo: LobeAlbedo,
+    pub albedo: LobeAlbedoPolynomial,
 }
 
 impl Plastic {
     /// Creates a plastic material from kd, a factor for the coat's reflectance, the square root of α, and an
     /// index of refraction of at least 1.
     pub fn new(
-        diffuse: ColorParameter,
-        specular: ColorParameter,
+        diffuse: ColorOrTexture,
+        specular: ColorOrTexture,
         roughness: ScalarParameter,
         ior: f32,
     ) -> Self {
         let fresnel = |cosine: f64| dielectric_reflectance(cosine, ior.into());
         let is_smooth = roughness.as_constant() == Some(0.0);
         let albedos = if is_smooth {
-            AlbedoTable::from_single_albedo(LobeAlbedo::fit_with_exact_mean(fresnel))
+            AlbedoTable::from_single_albedo(LobeAlbedoPolynomial::fit_with_exact_mean(fresnel))
         } else {
             AlbedoTable::new(
                 roughness.as_constant(),
@@ -78,7 +78,7 @@ impl Plastic {
 }
 
 /// Computes f in sr⁻¹ of a base from its kd, for light that passes through the coat in both directions.
-fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
+fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedoPolynomial) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;
     reflectance_under_coat(diffuse, returned) * (FRAC_1_PI / squared)
@@ -92,7 +92,7 @@ impl BxdfMaterial for Plastic {
         let diffuse = lookup.color(&self.diffuse).min(Vec3::ONE);
         let specular = lookup.color(&self.specular).min(Vec3::ONE);
         let roughness = lookup.number(&self.roughness);
-        let (albedo, is_smooth) = (self.albedos.lookup(roughness), self.is_smooth());
+        let (albedo, is_smooth) = (self.albedos.lobe_at_roughness(roughness), self.is_smooth());
         PlasticPoint {
             diffuse,
             base: base_layer_f(diffuse, self.ior, &albedo),
@@ -113,7 +113,7 @@ impl BxdfMaterial for Plastic {
     }
 
     #[inline]
-    fn packet_color_parameter(&self) -> Option<&ColorParameter> {
+    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
         Some(&self.diffuse)
     }
 }

@@ -10,7 +10,7 @@ use crate::materials::lookup::WhiteLookup;
 use crate::math::DVec3;
 
 fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
-    let [diffuse, specular] = [diffuse, Vec3::splat(specular)].map(ColorParameter::Constant);
+    let [diffuse, specular] = [diffuse, Vec3::splat(specular)].map(ColorOrTexture::Constant);
     Plastic::new(diffuse, specular, ScalarParameter::Constant(alpha.sqrt()), ior)
 }
 
@@ -27,7 +27,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let (eta, wide) = (f64::from(ior), [f64::from(alpha); 2]);
         let mean = f64::from(point.albedo.mean);
         let returned = 1.0 - (1.0 - mean) / (eta * eta);
-        let left = |cosine: f64| 1.0 - f64::from(point.albedo.evaluate(cosine as f32));
+        let left = |cosine: f64| 1.0 - f64::from(point.albedo.at_cosine(cosine as f32));
         check_values::<PlasticBxdf>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
             let fresnel = dielectric_reflectance((o + i).length() * 0.5, eta);
             let kd = RED.as_dvec3();

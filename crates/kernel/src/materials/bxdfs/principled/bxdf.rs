@@ -4,10 +4,10 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, PrincipledPoint};
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::lobe_albedo::{TERMS, evaluate_polynomial};
-use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
+use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
+use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -74,7 +74,7 @@ const TRANSMITS: BxdfFlags = BxdfFlags(2 << BxdfFlags::FIRST_OWN);
 
 /// Limits a cosine to at least 0.
 #[inline(always)]
-fn nonnegative(cosine: f32) -> f32 {
+fn nonnegative_cosine(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
@@ -82,7 +82,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Albedo of the coat at a cosine ≥ 0, including the coat's weight.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32) -> f32 {
-        self.coat * evaluate_polynomial(cosine, |number| self.coat_terms[number])
+        self.coat * evaluate_albedo_fit(cosine, |number| self.coat_terms[number])
     }
 
     /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
@@ -90,8 +90,8 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn specular_albedos(&self, cosine: f32) -> [f32; 2] {
         [
-            evaluate_polynomial(cosine, |number| self.terms[number]),
-            evaluate_polynomial(cosine, |number| self.grazing_terms[number]),
+            evaluate_albedo_fit(cosine, |number| self.terms[number]),
+            evaluate_albedo_fit(cosine, |number| self.grazing_terms[number]),
         ]
     }
 
@@ -102,7 +102,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
         // result negative.
-        Vec3::new(nonnegative(rest.x), nonnegative(rest.y), nonnegative(rest.z))
+        Vec3::new(nonnegative_cosine(rest.x), nonnegative_cosine(rest.y), nonnegative_cosine(rest.z))
     }
 
     /// Smith terms for the directions to the viewer and to the light.
@@ -115,7 +115,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn two_way_coat_transmittance(&self, view: &PrincipledViewTerms, cosine: f32, any: BxdfFlags) -> f32 {
         if any.contains(COATED) {
-            view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative(cosine)))
+            view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative_cosine(cosine)))
         } else {
             1.0
         }
@@ -124,15 +124,16 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// f of the specular lobe and of the coat. 0 for light from behind.
     #[inline(always)]
     fn reflection_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine_to_either_direction());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
-        let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
+        let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
         let specular = reflectance * (white * self.two_way_coat_transmittance(view, light.cosine, any));
         if any.contains(COATED) {
             let [eye, light] = Self::smith_terms(view, wi, self.coat_alpha);
-            let white = eye.reflection_term(&light, half.isotropic_ggx(self.coat_alpha));
+            let white =
+                eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.coat_alpha));
             let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
             specular + Vec3::splat(self.coat * reflectance * white)
         } else {
@@ -143,21 +144,21 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// f of transmitted light.
     #[inline(always)]
     fn transmission_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine_to_either_direction());
         let [eye, light] = Self::smith_terms(view, wi, self.alpha);
         let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
         let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
-        let white = eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
+        let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
         self.transmission * rest * (white * self.two_way_coat_transmittance(view, light.cosine, any))
     }
 
     /// Pdf of a direction that is sampled from a lobe with this α.
     #[inline(always)]
-    fn single_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
-        let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+    fn microfacet_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = Self::smith_terms(view, wi, alpha);
-        let pdf = eye.pdf(half.isotropic_ggx(alpha));
+        let pdf = eye.reflection_pdf(half.evaluate_isotropic_ggx(alpha));
         if light.is_above_surface() { pdf } else { 0.0 }
     }
 }
@@ -197,11 +198,11 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn compute_view_terms(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PrincipledViewTerms {
-        let &SurfaceDirections { normal, wo, .. } = directions;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, any: BxdfFlags) -> PrincipledViewTerms {
+        let &ShadingGeometry { normal, wo, .. } = directions;
         let mirrored = wo - normal * (2.0 * normal.dot(wo));
         let wo = if THROUGH { mirrored } else { wo };
-        let cosine = nonnegative(normal.dot(wo));
+        let cosine = nonnegative_cosine(normal.dot(wo));
         let coat = self.coat_albedo(cosine);
         let transmittance = self.specular_transmittance(cosine);
         let [at_normal, at_grazing] = self.specular_albedos(cosine);
@@ -211,7 +212,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let mut transmission = 0.0;
         if any.contains(TRANSMITS) {
             let rest = transmittance + Vec3::splat(at_normal + at_grazing - 1.0);
-            transmission = nonnegative((self.transmission * rest).max_element());
+            transmission = nonnegative_cosine((self.transmission * rest).max_element());
             all += transmission;
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
@@ -231,7 +232,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
-        let transmittance = self.specular_transmittance(nonnegative(cosine)) * view.transmittance;
+        let transmittance = self.specular_transmittance(nonnegative_cosine(cosine)) * view.transmittance;
         let coat = if cosine > 0.0 { self.two_way_coat_transmittance(view, cosine, any) } else { 0.0 };
         let f = self.base * transmittance * coat;
         LobeValue { f, max: f.max_element(), shape: 0.0 }
@@ -254,8 +255,9 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         any: BxdfFlags,
     ) -> f32 {
         let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
-        let specular = Self::single_lobe_pdf(view, wi, self.alpha);
-        let coat = if any.contains(COATED) { Self::single_lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
+        let specular = Self::microfacet_lobe_pdf(view, wi, self.alpha);
+        let coat =
+            if any.contains(COATED) { Self::microfacet_lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
         let narrow = if THROUGH {
             transmission_share * specular
         } else {
@@ -265,7 +267,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             SampledLobes::All if THROUGH => narrow,
             SampledLobes::All => {
                 let diffuse_share = 1.0 - specular_share - coat_share - transmission_share;
-                narrow + diffuse_share * nonnegative(normal.dot(wi)) * FRAC_1_PI
+                narrow + diffuse_share * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
             }
             SampledLobes::Narrow => {
                 narrow / (specular_share + coat_share + transmission_share).max(f32::MIN_POSITIVE)
@@ -303,7 +305,11 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
-        select_vec3(is_through == THROUGH, select_vec3(is_wide, wide, narrow), -view.normal)
+        branchless_select_vec3(
+            is_through == THROUGH,
+            branchless_select_vec3(is_wide, wide, narrow),
+            -view.normal,
+        )
     }
 
     #[inline(always)]

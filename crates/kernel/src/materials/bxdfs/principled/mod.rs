@@ -18,11 +18,11 @@ use std::sync::{Arc, LazyLock};
 
 use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::footprint::TexturePoint;
-use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo};
+use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedoPolynomial};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::ScalarParameter;
-use crate::materials::texture::{ColorParameter, Texture};
+use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 pub use bxdf::PrincipledBxdf;
 
@@ -34,14 +34,14 @@ const COAT_REFLECTANCE: f32 = 0.04;
 pub struct Principled {
     inputs: PrincipledInputs,
     /// Albedos of the specular lobe and of the coat. `None` for lobes with varying roughness.
-    albedos: [Option<SchlickAlbedo>; 2],
+    albedos: [Option<SchlickAlbedoPair>; 2],
 }
 
 /// The parameters of a principled material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipledInputs {
     /// Diffuse reflectance, and reflectance of the metal at normal incidence.
-    pub color: ColorParameter,
+    pub color: ColorOrTexture,
     /// Weight of the metallic part.
     pub metallic: ScalarParameter,
     /// The square root of α.
@@ -51,7 +51,7 @@ pub struct PrincipledInputs {
     /// Factor for the dielectric's reflectance.
     pub specular: ScalarParameter,
     /// Factor for the dielectric's reflectance at normal incidence.
-    pub specular_color: ColorParameter,
+    pub specular_color: ColorOrTexture,
     /// Fraction of the light that enters the dielectric and is transmitted instead of scattered.
     pub transmission: ScalarParameter,
     /// Weight of the clear coat.
@@ -78,13 +78,13 @@ pub struct PrincipledPoint {
     /// α of the specular lobe.
     pub alpha: f32,
     /// Albedos of the specular lobe.
-    pub albedo: SchlickAlbedo,
+    pub albedo: SchlickAlbedoPair,
     /// Weight of the clear coat.
     pub coat: f32,
     /// α of the clear coat.
     pub coat_alpha: f32,
     /// Albedo of the clear coat.
-    pub coat_albedo: LobeAlbedo,
+    pub coat_albedo: LobeAlbedoPolynomial,
     /// Reflectance for ambient light.
     pub ambient: Vec3,
 }
@@ -100,31 +100,31 @@ impl PrincipledPoint {
 /// Albedos of two lobes that use Schlick's approximation. The facets of one lobe have a reflectance of 1 at
 /// normal incidence and 0 at grazing angles. For the other lobe, it is the other way around.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SchlickAlbedo {
+pub struct SchlickAlbedoPair {
     /// Albedo per unit of reflectance at normal incidence.
-    pub normal: LobeAlbedo,
+    pub normal: LobeAlbedoPolynomial,
     /// Albedo per unit of reflectance at grazing angles.
-    pub grazing: LobeAlbedo,
+    pub grazing: LobeAlbedoPolynomial,
 }
 
-impl SchlickAlbedo {
+impl SchlickAlbedoPair {
     /// The albedos for a constant roughness.
     fn from_roughness(roughness: f32) -> Self {
         let [normal, grazing] = build_schlick_albedo_tables(Some(roughness));
-        Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
+        Self { normal: normal.lobe_at_roughness(roughness), grazing: grazing.lobe_at_roughness(roughness) }
     }
 
     /// The albedos for any roughness, interpolated from tables.
     fn from_tables(roughness: f32) -> Self {
         static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| build_schlick_albedo_tables(None));
         let [normal, grazing] = &*TABLES;
-        Self { normal: normal.lookup(roughness), grazing: grazing.lookup(roughness) }
+        Self { normal: normal.lobe_at_roughness(roughness), grazing: grazing.lobe_at_roughness(roughness) }
     }
 
     /// Albedo of a coat with this reflectance at normal incidence and a reflectance of 1 at grazing angles.
-    fn coat_albedo(&self, reflectance: f32) -> LobeAlbedo {
+    fn coat_albedo(&self, reflectance: f32) -> LobeAlbedoPolynomial {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
-        LobeAlbedo {
+        LobeAlbedoPolynomial {
             terms: std::array::from_fn(|i| sum(self.normal.terms[i], self.grazing.terms[i])),
             mean: sum(self.normal.mean, self.grazing.mean),
         }
@@ -139,7 +139,7 @@ pub struct EmissionCoat {
     /// The square root of the coat's α.
     roughness: ScalarParameter,
     /// The coat's albedo. `None` if the roughness varies.
-    albedo: Option<LobeAlbedo>,
+    albedo: Option<LobeAlbedoPolynomial>,
 }
 
 impl EmissionCoat {
@@ -150,7 +150,7 @@ impl EmissionCoat {
         }
         let albedo = roughness
             .as_constant()
-            .map(|one| SchlickAlbedo::from_roughness(one).coat_albedo(COAT_REFLECTANCE));
+            .map(|one| SchlickAlbedoPair::from_roughness(one).coat_albedo(COAT_REFLECTANCE));
         Some(Self { weight, roughness, albedo })
     }
 
@@ -158,12 +158,12 @@ impl EmissionCoat {
     /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.evaluate(at, lookups).clamp(0.0, 1.0);
-        let between = |roughness: f32| SchlickAlbedo::from_tables(roughness.clamp(0.0, 1.0));
+        let between = |roughness: f32| SchlickAlbedoPair::from_tables(roughness.clamp(0.0, 1.0));
         let albedo = match self.albedo {
             Some(albedo) => albedo,
             None => between(self.roughness.evaluate(at, lookups)).coat_albedo(COAT_REFLECTANCE),
         };
-        1.0 - weight * albedo.evaluate(cosine.abs())
+        1.0 - weight * albedo.at_cosine(cosine.abs())
     }
 
     /// All textures of the coat.
@@ -189,7 +189,7 @@ impl Principled {
         let has_coat = inputs.clearcoat.as_constant() != Some(0.0);
         let coat = inputs.clearcoat_roughness.as_constant().filter(|_| has_coat);
         let albedos = [inputs.roughness.as_constant(), coat]
-            .map(|roughness| roughness.map(SchlickAlbedo::from_roughness));
+            .map(|roughness| roughness.map(SchlickAlbedoPair::from_roughness));
         // The albedo is irrelevant if the coat has no weight.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
@@ -211,8 +211,8 @@ impl BxdfMaterial for Principled {
         let specular_color = lookup.color(&inputs.specular_color);
         let reflectance = (specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
         let [specular_albedo, coat_albedo] = self.albedos;
-        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::from_tables(roughness));
-        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedo::from_tables(coat_roughness));
+        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_tables(roughness));
+        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_tables(coat_roughness));
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
         let below = color * (1.0 - metallic);
         let diffuse = below * (1.0 - through);

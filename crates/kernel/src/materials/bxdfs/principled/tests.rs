@@ -17,12 +17,12 @@ fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Princip
 fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
     let number = ScalarParameter::Constant;
     Principled::new(PrincipledInputs {
-        color: ColorParameter::Constant(color),
+        color: ColorOrTexture::Constant(color),
         metallic: number(metallic),
         roughness: number(alpha.sqrt()),
         ior: 1.6,
         specular: number(0.8),
-        specular_color: ColorParameter::Constant(Vec3::new(1.0, 0.6, 1.2)),
+        specular_color: ColorOrTexture::Constant(Vec3::new(1.0, 0.6, 1.2)),
         transmission: number(transmission),
         clearcoat: number(coat[0]),
         clearcoat_roughness: number(coat[1].sqrt()),
@@ -52,14 +52,14 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
         let (color, m) = (RED.as_dvec3(), f64::from(metallic));
         let albedo = |cosine: f64| {
-            let [normal, grazing] =
-                [point.albedo.normal, point.albedo.grazing].map(|one| f64::from(one.evaluate(cosine as f32)));
+            let [normal, grazing] = [point.albedo.normal, point.albedo.grazing]
+                .map(|one| f64::from(one.at_cosine(cosine as f32)));
             f0 * normal + DVec3::splat(0.8 * grazing)
         };
         let mean = f0 * f64::from(point.albedo.normal.mean)
             + DVec3::splat(0.8 * f64::from(point.albedo.grazing.mean));
         let c = f64::from(coat[0]);
-        let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.evaluate(cosine as f32));
+        let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at_cosine(cosine as f32));
         check_values::<PrincipledBxdf<false>>(
             &format!("α {alpha}, metallic {metallic}"),
             &point,
@@ -140,12 +140,12 @@ fn fully_reflective_facets_have_bounded_weights() {
     for alpha in [0.001_f32, 0.002, 0.01, 0.05] {
         let number = ScalarParameter::Constant;
         let white = Principled::new(PrincipledInputs {
-            color: ColorParameter::Constant(Vec3::ONE),
+            color: ColorOrTexture::Constant(Vec3::ONE),
             metallic: number(0.0),
             roughness: number(alpha.sqrt()),
             ior: 1.5,
             specular: number(1.0),
-            specular_color: ColorParameter::Constant(Vec3::splat(25.0)),
+            specular_color: ColorOrTexture::Constant(Vec3::splat(25.0)),
             transmission: number(0.0),
             clearcoat: number(0.0),
             clearcoat_roughness: number(0.0),
@@ -174,7 +174,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
         let point = point(&transmitting(RED, metallic, transmission, alpha, coat));
         let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
         let c = f64::from(coat[0]);
-        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.evaluate(cosine as f32));
+        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at_cosine(cosine as f32));
         let (part, m) = (f64::from(transmission), f64::from(metallic));
         for (number, cosine) in COSINES.into_iter().enumerate() {
             let to_eye = spherical_direction(cosine, 0.7).as_vec3().as_dvec3();

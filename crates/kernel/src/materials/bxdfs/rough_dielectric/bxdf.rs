@@ -2,9 +2,11 @@
 
 use super::RoughDielectricPoint;
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, select_vec3};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
 use crate::materials::fresnel::{dielectric_from_either_side, fresnel_transmittance};
-use crate::materials::microfacet::{HalfVector, SmithTerms, reflect_at, refract_at, sample_visible_normal};
+use crate::materials::microfacet::{
+    SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
+};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
@@ -67,19 +69,22 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     fn f(&self, view: &DielectricViewTerms, wi: Vec3) -> f32 {
         let [eye, light] = self.smith_terms(view, wi);
         if !THROUGH {
-            let half = HalfVector::from_reflection(view.normal, view.wo, wi);
+            let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
             let reflectance =
                 dielectric_from_either_side(half.cosine_to_either_direction(), self.far / self.near);
-            return reflectance * eye.reflection_term(&light, half.isotropic_ggx(self.alpha));
+            return reflectance
+                * eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
         }
         let indices = [self.near, self.far];
-        let (half, sum) = HalfVector::from_refraction(view.normal, [view.wo, wi], indices);
+        let (half, sum) = UnnormalizedHalfVector::from_refraction(view.normal, [view.wo, wi], indices);
         // The facet must face the viewer if the surface does, and light must come from behind both.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * view.wo.dot(sum), -scale * wi.dot(sum)];
         let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
         let by_facet = cosines[0] * cosines[1] * fresnel_transmittance(cosines, indices) / half.squared;
-        let value = 4.0 * (by_facet * eye.reflection_term(&light, half.isotropic_ggx(self.alpha)));
+        let value = 4.0
+            * (by_facet
+                * eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha)));
         let value = value * (self.far * self.far);
         // If the indices are nearly equal, there is no usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
@@ -102,7 +107,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let reflectance = dielectric_from_either_side(cosine, eta);
         let is_reflected = choice < reflectance;
         let refracted = refract_at(half, wo, eta);
-        let wi = select_vec3(is_reflected, reflect_at(half, wo), refracted);
+        let wi = branchless_select_vec3(is_reflected, reflect_at(half, wo), refracted);
         // Compute the facet's scattering per solid angle.
         let behind = -half.dot(refracted);
         let sum = indices[0] * cosine - indices[1] * behind;
@@ -115,8 +120,8 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let side = if is_reflected { 1.0 } else { -1.0 };
         let light = SmithTerms::isotropic(normal * side, wi, self.alpha);
         let along = normal.dot(half);
-        let half = HalfVector { squared: 1.0, along, across: half - normal * along };
-        let pdf = by_facet * eye.pdf(half.isotropic_ggx(self.alpha));
+        let half = UnnormalizedHalfVector { squared: 1.0, along, across: half - normal * along };
+        let pdf = by_facet * eye.reflection_pdf(half.evaluate_isotropic_ggx(self.alpha));
         let is_seen = light.is_above_surface()
             & eye.is_above_surface()
             & (is_reflected | is_through)
@@ -151,8 +156,8 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn compute_view_terms(&self, directions: &SurfaceDirections, _: BxdfFlags) -> DielectricViewTerms {
-        let &SurfaceDirections { normal, wo, .. } = directions;
+    fn compute_view_terms(&self, directions: &ShadingGeometry, _: BxdfFlags) -> DielectricViewTerms {
+        let &ShadingGeometry { normal, wo, .. } = directions;
         DielectricViewTerms { normal: if THROUGH { -normal } else { normal }, wo }
     }
 
@@ -193,7 +198,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
         // If the other side is chosen, the path continues at that side's vertex, and this direction is not
         // used.
         let unused = if THROUGH { view.normal } else { -view.normal };
-        select_vec3(is_reflected == THROUGH, unused, wi)
+        branchless_select_vec3(is_reflected == THROUGH, unused, wi)
     }
 
     #[inline(always)]

@@ -15,7 +15,7 @@ use crate::geometry::watertight::ShearedRay;
 
 /// Implements [`WideBvh::any_hit_packet`]. Returns `None` if the rays are not coherent.
 #[inline(always)]
-pub fn try_any_hit<V: SimdVector>(
+pub fn any_hit_if_coherent<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,

@@ -15,7 +15,7 @@ use crate::geometry::{Ray, ShapeHit};
 
 /// Implements [`WideBvh::closest_hit_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
-pub fn try_closest_hit<V: SimdVector>(
+pub fn closest_hit_if_coherent<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -58,7 +58,7 @@ pub fn try_closest_hit<V: SimdVector>(
             }
         }
     }
-    best.write(hits);
+    best.write_shape_hits(hits);
     true
 }
 

@@ -14,8 +14,8 @@ use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::geometry::{Ray, ShapeHit};
 
-use any::try_any_hit;
-use closest::try_closest_hit;
+use any::any_hit_if_coherent;
+use closest::closest_hit_if_coherent;
 
 /// [`try_closest_hit()`] with AVX2.
 #[target_feature(enable = "avx2")]
@@ -27,7 +27,7 @@ pub fn try_closest_hit_avx2(
 ) -> bool {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
-    try_closest_hit(tree, rays, ends, hits, like, like8)
+    closest_hit_if_coherent(tree, rays, ends, hits, like, like8)
 }
 
 /// [`try_any_hit()`] with AVX2.
@@ -35,7 +35,7 @@ pub fn try_closest_hit_avx2(
 pub fn try_any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
-    try_any_hit(tree, rays, ends, except, like, like8)
+    any_hit_if_coherent(tree, rays, ends, except, like, like8)
 }
 
 /// [`try_closest_hit()`] with AVX-512.
@@ -48,7 +48,7 @@ pub fn try_closest_hit_avx512(
 ) -> bool {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
-    try_closest_hit(tree, rays, ends, hits, like, like8)
+    closest_hit_if_coherent(tree, rays, ends, hits, like, like8)
 }
 
 /// [`try_any_hit()`] with AVX-512.
@@ -61,5 +61,5 @@ pub fn try_any_hit_avx512(
 ) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
-    try_any_hit(tree, rays, ends, except, like, like8)
+    any_hit_if_coherent(tree, rays, ends, except, like, like8)
 }

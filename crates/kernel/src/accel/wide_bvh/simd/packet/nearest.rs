@@ -41,11 +41,11 @@ impl<V: SimdVector> NearestHits<V> {
         }
         let others = !packet.lanes_starting_on(pack.ids[lane]);
         let hits = triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits };
-        self.update_rays(&hits, pack, lane, rays)
+        self.record_nearer_hits(&hits, pack, lane, rays)
     }
 
     #[inline(always)]
-    fn update_rays(
+    fn record_nearer_hits(
         &mut self,
         hits: &triangle::Hits<V>,
         pack: &TrianglePack,
@@ -67,7 +67,7 @@ impl<V: SimdVector> NearestHits<V> {
         while singly != 0 {
             let ray = singly.trailing_zeros() as usize;
             singly &= singly - 1;
-            taken |= self.update_ray(ray, pack, lane, rays);
+            taken |= self.test_triangle_scalar(ray, pack, lane, rays);
         }
         taken
     }
@@ -75,7 +75,7 @@ impl<V: SimdVector> NearestHits<V> {
     /// [`NearestHits::test_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
-    fn update_ray(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+    fn test_triangle_scalar(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let Some(own) = rays.get(ray) else { return 0 };
         let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
         self.t.store(&mut t);
@@ -96,7 +96,7 @@ impl<V: SimdVector> NearestHits<V> {
     }
 
     #[inline(always)]
-    pub fn write(&self, hits: &mut [Option<ShapeHit>]) {
+    pub fn write_shape_hits(&self, hits: &mut [Option<ShapeHit>]) {
         let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
         self.t.store(&mut t);
         self.u.store(&mut u);
